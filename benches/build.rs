@@ -1,0 +1,55 @@
+//! The stages of a construction in tetrahedra per second of device time, verified before they are timed. `cargo bench --bench build`.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use olbvh::baseline::Lbvh;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Gpu, GpuOptions, StageTime};
+use olbvh::mesh::kuhn_jittered;
+use olbvh::options::{Assign, BuildOptions};
+use olbvh::reference::{boundary::topology, build::build};
+use std::time::Duration;
+
+/// Sum of the stages of that name; all of them for "all".
+fn time_of(stages: &[StageTime], name: &str) -> Duration {
+    let chosen = stages.iter().filter(|s| name == "all" || s.name == name);
+    Duration::from_secs_f64(chosen.map(|s| s.milliseconds).sum::<f64>() * 1e-3)
+}
+
+fn construction(c: &mut Criterion) {
+    let gpu = Gpu::new(&GpuOptions::default()).expect("a device");
+    let mesh = kuhn_jittered([32; 3], 0.3, 1).expect("a mesh");
+    let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh on the device");
+    let topology = topology(&mesh).expect("a topology");
+    let mut group = c.benchmark_group("build");
+    group.sample_size(10).throughput(Throughput::Elements(mesh.tets.len() as u64));
+    for stage in ["mesh.bounds", "mesh.boundary"] {
+        assert!(on_device.neighbours().expect("neighbours") == topology.neighbours);
+        let run = |iterations: u64| -> Duration {
+            let once = |_| time_of(&DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh").time().stages, stage);
+            (0..iterations).map(once).sum()
+        };
+        group.bench_function(BenchmarkId::new(stage, "any"), |b| b.iter_custom(run));
+    }
+    for assign in Assign::ALL {
+        let options = BuildOptions { assign, ..BuildOptions::default() };
+        let tree = Tree::build(&gpu, &on_device, &options).expect("a tree");
+        assert!(tree.download().expect("arrays") == build(&mesh, &topology, &options).expect("a tree"));
+        let mut names: Vec<String> = tree.stages().iter().map(|s| s.name.clone()).collect();
+        names.push("all".into());
+        // The stages of Aabb one by one, of the others what differs.
+        names.retain(|n| assign == Assign::Aabb || ["build.filter", "build.sort", "all"].contains(&n.as_str()));
+        for stage in names {
+            let run = |iterations: u64| -> Duration {
+                (0..iterations).map(|_| time_of(Tree::build(&gpu, &on_device, &options).expect("a tree").stages(), &stage)).sum()
+            };
+            group.bench_function(BenchmarkId::new(&stage, assign), |b| b.iter_custom(run));
+        }
+    }
+    let lbvh = |iterations: u64| -> Duration {
+        (0..iterations).map(|_| time_of(Lbvh::build(&gpu, &on_device).expect("a tree").stages(), "all")).sum()
+    };
+    group.bench_function(BenchmarkId::new("lbvh", "Apetrei 2014"), |b| b.iter_custom(lbvh));
+}
+
+criterion_group!(benches, construction);
+criterion_main!(benches);

@@ -1,0 +1,99 @@
+//! Point location and volume rendering in points and samples per second of device time, verified before they are timed.
+//! `cargo bench --bench query`.
+
+use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
+use olbvh::baseline::Lbvh;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::mesh::{Mesh, On, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions, TOLERANCE};
+use olbvh::query::{self, LocateOptions, LocateOutput, Path, PointInput, Scene};
+use olbvh::reference::boundary::topology;
+use olbvh::render::{Bounds, Prepared, RenderSettings};
+use std::time::Duration;
+
+const POINTS: u32 = 1 << 17;
+const CELLS: u32 = 32;
+
+fn setting() -> (Gpu, Mesh) {
+    (Gpu::new(&GpuOptions::default()).expect("a device"), kuhn_jittered([CELLS; 3], 0.3, 1).expect("a mesh"))
+}
+
+fn location(c: &mut Criterion) {
+    let (gpu, mesh) = setting();
+    let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh on the device");
+    let mut state = 1u32;
+    let mut next = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 16_777_216.0 * CELLS as f32
+    };
+    let points: Vec<[f32; 3]> = (0..POINTS).map(|_| [next(), next(), next()]).collect();
+    let buffer = gpu.upload("olbvh.bench.points", &points).expect("memory");
+    let owners = gpu.buffer("olbvh.bench.owners", 4 * u64::from(POINTS)).expect("memory");
+    let barycentrics = gpu.buffer("olbvh.bench.barycentrics", 16 * u64::from(POINTS)).expect("memory");
+    let input = PointInput { points: buffer.all(), stride: 3, count: POINTS, hints: None };
+    let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
+    let found = || gpu.download::<u32>(&owners, owners.all()).expect("owners");
+    let mut group = c.benchmark_group("locate");
+    group.sample_size(10).throughput(Throughput::Elements(u64::from(POINTS)));
+    let mut expected: Option<Vec<u32>> = None;
+    for assign in Assign::ALL {
+        let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).expect("a tree");
+        let scene = Scene::new(&on_device, &tree);
+        for (name, path) in [("descent", Path::Descent), ("traversal", Path::Traversal(8))] {
+            let options = LocateOptions { path, ..LocateOptions::default() };
+            let run = |iterations: u64| -> Duration {
+                let record = |_| {
+                    let ((), time) = gpu.run("olbvh.bench", |r| query::cmd_locate(r, &scene, &input, &output, &options)).expect("it runs");
+                    Duration::from_secs_f64(time.milliseconds("query.locate") * 1e-3)
+                };
+                (0..iterations).map(record).sum()
+            };
+            run(1);
+            let owners = found();
+            assert!(!owners.contains(&u32::MAX), "a point is lost");
+            assert!(expected.get_or_insert(owners.clone()) == &owners, "{assign} {name} finds other owners");
+            group.bench_function(BenchmarkId::new(name, assign), |b| b.iter_custom(run));
+        }
+    }
+    let lbvh = Lbvh::build(&gpu, &on_device).expect("a tree");
+    let run = |iterations: u64| -> Duration {
+        let record = |_| {
+            let ((), time) = gpu.run("olbvh.bench", |r| lbvh.cmd_locate(r, &on_device, &input, &output, TOLERANCE)).expect("it runs");
+            Duration::from_secs_f64(time.milliseconds("lbvh.locate") * 1e-3)
+        };
+        (0..iterations).map(record).sum()
+    };
+    run(1);
+    assert!(expected.as_ref() == Some(&found()), "the LBVH finds other owners");
+    group.bench_function(BenchmarkId::new("lbvh", "Apetrei 2014"), |b| b.iter_custom(run));
+}
+
+/// A figure of a drawn picture.
+type Part = fn(&query::Drawn) -> f64;
+
+fn rendering(c: &mut Criterion) {
+    let (gpu, mesh) = setting();
+    let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh on the device");
+    let tree = Tree::build(&gpu, &on_device, &BuildOptions::default()).expect("a tree");
+    let topology = topology(&mesh).expect("a topology");
+    let bounds = Bounds { lo: [0.0; 3], hi: [CELLS as f32; 3] };
+    let settings = RenderSettings { size: [256, 256], ..RenderSettings::default() };
+    let field = &mesh.fields[0];
+    let prepared = Prepared::new(&settings, &mesh, &bounds, &topology.neighbours, |_| true, field).expect("a plan");
+    let draw = || {
+        query::render(&on_device, &tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), &|_, _| {})
+            .expect("a picture")
+    };
+    let first = draw();
+    assert!(first.found_samples > 0 && first.colors == draw().colors, "two pictures differ");
+    let mut group = c.benchmark_group("render");
+    group.sample_size(10).throughput(Throughput::Elements(first.samples));
+    for (name, part) in [("intervals", (|d| d.interval_ms) as Part), ("march", |d| d.march_ms)] {
+        let run = |iterations: u64| -> Duration { (0..iterations).map(|_| Duration::from_secs_f64(part(&draw()) * 1e-3)).sum() };
+        group.bench_function(BenchmarkId::new(name, "256x256"), |b| b.iter_custom(run));
+    }
+}
+
+criterion_group!(benches, location, rendering);
+criterion_main!(benches);

@@ -1,0 +1,203 @@
+//! Compiles every kernel of `glsl/` in both permutations, reflects it, and generates its Rust side into `OUT_DIR`:
+//! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V) and `layout.rs` (shared structs).
+
+#[path = "build/reflect.rs"]
+mod reflect;
+
+use reflect::{Interface, StructLayout};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::{env, fs, process, thread};
+
+const GLSL: &str = "glsl";
+
+fn main() {
+    println!("cargo:rerun-if-changed={GLSL}");
+    println!("cargo:rerun-if-changed=build");
+    let out = PathBuf::from(env::var("OUT_DIR").unwrap_or_default());
+    let result = generate(&out);
+    if let Err(message) = result {
+        // Straight to the reader: file, line and the compiler's words.
+        eprintln!("\n{message}");
+        process::exit(1);
+    }
+}
+
+fn generate(out: &Path) -> Result<(), String> {
+    let mut kernels = Vec::new();
+    find_kernels(Path::new(GLSL), &mut kernels)?;
+    kernels.sort();
+    // glslang is slow enough that half the time is worth a second thread.
+    let (left, right) = kernels.split_at(kernels.len() / 2);
+    let (left, right) = thread::scope(|scope| {
+        let left = scope.spawn(|| left.iter().map(|k| compile_kernel(k, out)).collect::<Result<Vec<_>, _>>());
+        let right = right.iter().map(|k| compile_kernel(k, out)).collect::<Result<Vec<_>, _>>();
+        (left.join().map_err(|_| "the shader compiler panicked".to_string()), right)
+    });
+    let interfaces = [left??, right?].concat();
+    write(&out.join("kernels.rs"), &kernels_source(&interfaces))?;
+    write(&out.join("layout.rs"), &layout_source()?)
+}
+
+fn find_kernels(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
+    let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    for path in entries.filter_map(Result::ok).map(|e| e.path()) {
+        if path.is_dir() {
+            find_kernels(&path, found)?;
+        } else if path.extension().is_some_and(|e| e == "comp") {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+/// Compiles one source, with `#include`s from `glsl/`.
+fn compile(source: &str, name: &str, descriptors: bool, optimise: bool) -> Result<Vec<u32>, String> {
+    let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
+    let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
+    options.set_target_spirv(shaderc::SpirvVersion::V1_5);
+    options.set_warnings_as_errors();
+    options.set_optimization_level(if optimise { shaderc::OptimizationLevel::Performance } else { shaderc::OptimizationLevel::Zero });
+    if descriptors {
+        options.add_macro_definition("OLBVH_DESCRIPTORS", Some("1"));
+    }
+    options.set_include_callback(|file, _, _, _| {
+        let path = Path::new(GLSL).join(file);
+        let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
+    });
+    let artifact = compiler
+        .compile_into_spirv(source, shaderc::ShaderKind::Compute, name, "main", Some(&options))
+        .map_err(|e| format!("{e}{}", if descriptors { "\n(in the descriptor permutation)" } else { "" }))?;
+    Ok(artifact.as_binary().to_vec())
+}
+
+fn compile_kernel(path: &Path, out: &Path) -> Result<Interface, String> {
+    let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let name = path.display().to_string();
+    let stem = path.with_extension("").strip_prefix(GLSL).map_err(|e| e.to_string())?.display().to_string().replace(['/', '\\'], ".");
+    // Optimised modules may lose names, so the plain one is reflected and the optimised ones are shipped.
+    let plain = compile(&source, &name, true, false)?;
+    let interface = reflect::interface(&plain, &stem).map_err(|e| format!("{name}: {e}"))?;
+    for (descriptors, suffix) in [(false, "address"), (true, "descriptor")] {
+        let words = compile(&source, &name, descriptors, true)?;
+        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+        fs::write(out.join(format!("{stem}.{suffix}.spv")), bytes).map_err(|e| e.to_string())?;
+    }
+    Ok(interface)
+}
+
+fn write(path: &Path, text: &str) -> Result<(), String> {
+    fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// `build.30_splits` → `Splits`, `primitives.scan_tiles` → `ScanTiles`.
+fn type_name(stem: &str) -> String {
+    let words = stem.rsplit('.').next().unwrap_or(stem).split('_');
+    let words = words.filter(|w| !w.chars().all(|c| c.is_ascii_digit()));
+    words.map(|w| w[..1].to_uppercase() + &w[1..]).collect()
+}
+
+fn kernels_source(interfaces: &[Interface]) -> String {
+    let mut s = String::from("// Generated by build.rs by reflection of glsl/.\n");
+    for k in interfaces {
+        let name = type_name(&k.stem);
+        let _ = writeln!(s, "\n/// Arguments of `{}`.\n#[derive(Clone, Copy, Debug)]\npub(crate) struct {name} {{", k.stem);
+        for b in &k.buffers {
+            let _ = writeln!(s, "    pub {}: BufferRef,", b.name);
+        }
+        for a in &k.scalars {
+            let _ = writeln!(s, "    pub {}: {},", a.name, a.rust_type);
+        }
+        let _ = writeln!(
+            s,
+            "}}\n/// Specialization constants of `{}`.\n#[derive(Clone, Copy, Debug)]\npub(crate) struct {name}Spec {{",
+            k.stem
+        );
+        for c in &k.constants {
+            let _ = writeln!(s, "    pub {}: u32,", c.name.to_lowercase());
+        }
+        let _ = writeln!(s, "}}\nimpl Default for {name}Spec {{\n    fn default() -> Self {{\n        Self {{");
+        for c in &k.constants {
+            let _ = writeln!(s, "            {}: {},", c.name.to_lowercase(), c.default);
+        }
+        let _ = writeln!(
+            s,
+            "        }}\n    }}\n}}\nimpl Specialization for {name}Spec {{\n    fn values(&self) -> Vec<(u32, u32)> {{\n        vec!["
+        );
+        for c in &k.constants {
+            let _ = writeln!(s, "            ({}, self.{}),", c.id, c.name.to_lowercase());
+        }
+        let _ = writeln!(s, "        ]\n    }}\n}}\nimpl Kernel for {name} {{\n    type Spec = {name}Spec;");
+        let _ = writeln!(s, "    const INFO: &'static KernelInfo = &KernelInfo {{\n        name: \"olbvh.{}\",", k.stem);
+        for suffix in ["address", "descriptor"] {
+            let _ = writeln!(s, "        {suffix}: include_bytes!(concat!(env!(\"OUT_DIR\"), \"/{}.{suffix}.spv\")),", k.stem);
+        }
+        let _ = writeln!(s, "        buffers: &[");
+        for b in &k.buffers {
+            let access = if !b.writes {
+                "Read"
+            } else if b.reads {
+                "ReadWrite"
+            } else {
+                "Write"
+            };
+            let _ = writeln!(s, "            BufferInfo {{ name: \"{}\", access: Access::{access} }},", b.name);
+        }
+        let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n    }};", k.scalar_bytes);
+        let _ = writeln!(
+            s,
+            "    fn buffers(&self) -> Vec<BufferRef> {{\n        vec![{}]\n    }}",
+            list(k.buffers.iter().map(|b| format!("self.{}", b.name)))
+        );
+        let _ = writeln!(s, "    fn scalars(&self, base: usize, out: &mut [u8]) {{");
+        for a in &k.scalars {
+            let _ = writeln!(s, "        put(out, base + {}, bytemuck::bytes_of(&self.{}));", a.offset, a.name);
+        }
+        let _ = writeln!(s, "    }}\n}}");
+    }
+    let _ = writeln!(
+        s,
+        "\n/// Every kernel, by name.\npub(crate) const ALL: &[&KernelInfo] = &[{}];",
+        list(interfaces.iter().map(|k| format!("{}::INFO", type_name(&k.stem))))
+    );
+    s
+}
+
+fn list(items: impl Iterator<Item = String>) -> String {
+    items.collect::<Vec<_>>().join(", ")
+}
+
+/// Compiles a module that uses every struct of `layout.glsl`, and turns the reflected structs into Rust, with the source's comments.
+fn layout_source() -> Result<String, String> {
+    let file = Path::new(GLSL).join("shared/layout.glsl");
+    let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+    let docs = reflect::comments(&text);
+    let names: Vec<&str> = text.lines().filter_map(|l| l.strip_prefix("struct ")).filter_map(|l| l.split_whitespace().next()).collect();
+    let mut probe = String::from("#version 460\n#include \"shared/layout.glsl\"\nlayout(local_size_x = 1) in;\n");
+    for (i, n) in names.iter().enumerate() {
+        let _ = writeln!(probe, "layout(set = 0, binding = {i}, std430) buffer Probe{i} {{ {n} at[]; }} probe{i};");
+    }
+    probe.push_str("void main() {}\n");
+    let words = compile(&probe, &file.display().to_string(), true, false)?;
+    let mut s = String::from("// Generated by build.rs by reflection of glsl/shared/layout.glsl.\n");
+    for StructLayout { name, bytes, members } in reflect::structs(&words, &names)? {
+        let doc = |key: &str| docs.get(key).cloned().unwrap_or_else(|| "Undocumented.".into());
+        let _ = writeln!(
+            s,
+            "\n/// {}\n#[repr(C)]\n#[derive(Clone, Copy, Debug, Default, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]",
+            doc(&name)
+        );
+        let _ = writeln!(s, "pub struct {name} {{");
+        for m in &members {
+            let _ = writeln!(s, "    /// {}\n    pub {}: {},", doc(&format!("{name}.{}", m.name)), m.name, m.rust_type);
+        }
+        let _ = writeln!(s, "}}\nconst _: () = {{\n    assert!(std::mem::size_of::<{name}>() == {bytes});");
+        for m in &members {
+            let _ = writeln!(s, "    assert!(std::mem::offset_of!({name}, {}) == {});", m.name, m.offset);
+        }
+        let _ = writeln!(s, "}};");
+    }
+    Ok(s)
+}

@@ -1,0 +1,62 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// From the bounds to the grid (SPEC 2.1), by integers where the host divides: Vulkan's division is not correctly rounded.
+ARGUMENTS(2)
+    uint unused;
+END_ARGUMENTS
+BUFFER(0, readonly, MeshStatus, status)
+BUFFER16(1, writeonly, Grid, grid)
+
+float from_ordered(uint k) { return uintBitsToFloat((k & 0x80000000u) != 0u ? k & 0x7fffffffu : ~k); }
+
+// 1024 / e for a normal e, correctly rounded (to nearest, ties to even): long division of the mantissas.
+float divide_1024(float e) {
+    uint bits = floatBitsToUint(e);
+    uint divisor = (bits & 0x007fffffu) | 0x00800000u;
+    int exponent = int(bits >> 23) - 127;
+    // quotient of 2^k by 2^23 * m, m in [1, 2): in (2^-1, 1]
+    uint remainder = 0x00800000u;
+    int scale = 10 - exponent + 127;
+    if (divisor != 0x00800000u) {
+        remainder <<= 1;
+        scale -= 1;
+    }
+    uint quotient = 0u;
+    for (int i = 0; i < 25; ++i) { // 24 bits and one to round by
+        quotient = quotient << 1 | uint(remainder >= divisor);
+        if (remainder >= divisor) remainder -= divisor;
+        remainder <<= 1;
+    }
+    bool up = (quotient & 1u) != 0u && (remainder != 0u || (quotient & 2u) != 0u);
+    quotient = (quotient >> 1) + uint(up);
+    // A carry out of the mantissa moves into the exponent by itself.
+    return uintBitsToFloat((uint(scale) << 23) + (quotient - 0x00800000u));
+}
+
+void main() {
+    if (item_index() > 0u) return;
+    Grid g;
+    g.lo = vec4(0.0);
+    g.hi = vec4(0.0);
+    g.inv = vec4(0.0);
+    g.extent = vec4(0.0);
+    const float MIN_EXTENT = uintBitsToFloat((127u - 103u) << 23);
+    float largest = MIN_EXTENT;
+    bool any_cell = status.at[0].hi[0] != 0u;
+    for (uint c = 0u; any_cell && c < 3u; ++c) {
+        g.lo[c] = from_ordered(~status.at[0].lo[c]);
+        g.hi[c] = from_ordered(status.at[0].hi[c]);
+        precise float d = g.hi[c] - g.lo[c];
+        float e = canonical(d);
+        largest = max(largest, e);
+        g.inv[c] = e < MIN_EXTENT ? 0.0 : divide_1024(e);
+    }
+    uint exponent = floatBitsToUint(largest) >> 23;
+    g.scale = uintBitsToFloat((254u - exponent) << 23);
+    g.level = MAX_LEVEL;
+    g.pad = uint[2](0u, 0u);
+    g.extent = vec4(normalise(g, g.hi.xyz), 0.0);
+    grid.at[0] = g;
+}

@@ -1,0 +1,88 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Finds the two tetrahedra of every face (SPEC 2.3) through a table with open addressing. A face looks first near the place of its
+// smallest vertex, where its neighbours in the file looked just before (memory that is still close), then anywhere.
+// mates[face] becomes the other face's number and side, or ALONE or CROWDED: the same whichever face came first.
+ARGUMENTS(6)
+    uint tets;
+    uint points;
+    uint slots; // of the table
+END_ARGUMENTS
+BUFFER16(0, readonly, vec4, vertices)
+BUFFER16(1, readonly, uvec4, cells)
+BUFFER(2, readonly, uint, bad)
+BUFFER(3, READ_WRITE, uint, table) // faces, or NONE; filled with NONE
+BUFFER(4, READ_WRITE, uint, mates) // filled with NONE, which is ALONE
+BUFFER(5, READ_WRITE, MeshStatus, status)
+
+const uint CROWDED = 0xfffffffeu;
+const uint SIDE = 0x80000000u;
+const uint NEAR_PROBES = 16u;
+const uint MAX_PROBES = 16384u;
+
+uint mix_bits(uint h) {
+    h ^= h >> 16;
+    h *= 0x7feb352du;
+    h ^= h >> 15;
+    h *= 0x846ca68bu;
+    return h ^ (h >> 16);
+}
+
+// The vertices of face f (opposite to vertex f) in ascending order.
+uvec3 face_of(uvec4 v, uint f) {
+    uvec3 t = f == 0u ? v.yzw : f == 1u ? v.xzw : f == 2u ? v.xyw : v.xyz;
+    uint lo = min(t.x, min(t.y, t.z)), hi = max(t.x, max(t.y, t.z));
+    return uvec3(lo, t.x ^ t.y ^ t.z ^ lo ^ hi, hi);
+}
+
+void main() {
+    uint t = item_index();
+    bool live = t < tets && (bad.at[min(t, tets - 1u) >> 5u] >> (t & 31u) & 1u) == 0u;
+    uint without_volume = 0u, negative = 0u;
+    if (live) {
+        uvec4 ids = cells.at[t];
+        Tet tet = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+        float vol = volume(tet);
+        // The sign in the caller's order follows from the parity of the permutation.
+        uvec4 r = tet.rank;
+        uint inversions = uint(r.y < r.x) + uint(r.z < r.x) + uint(r.w < r.x) + uint(r.z < r.y) + uint(r.w < r.y) + uint(r.w < r.z);
+        without_volume = uint(vol == 0.0);
+        negative = uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
+        uint near_slots = max(slots / points, 1u);
+        for (uint f = 0u; f < 4u; ++f) {
+            uvec3 face = face_of(ids, f);
+            bool positive = (vol >= 0.0) == ((r[f] & 1u) == 1u);
+            uint me = (4u * t + f) | (positive ? SIDE : 0u);
+            uint h = mix_bits(face.y ^ mix_bits(face.z));
+            uint near_base = min(face.x * near_slots, slots - near_slots);
+            uint high, low;
+            umulExtended(mix_bits(h ^ face.x), slots, high, low);
+            uint probe = 0u;
+            for (; probe < MAX_PROBES; ++probe) {
+                uint slot = probe < NEAR_PROBES ? near_base + (h + probe) % near_slots : (high + probe) % slots;
+                uint other = atomicCompSwap(table.at[slot], NONE, me);
+                if (other == NONE) break;
+                uint other_face = other & ~SIDE;
+                if (face_of(cells.at[other_face >> 2], other_face & 3u) == face) {
+                    if (atomicCompSwap(mates.at[other_face], NONE, me) == NONE) {
+                        mates.at[4u * t + f] = other;
+                    } else {
+                        atomicExchange(mates.at[other_face], CROWDED);
+                        mates.at[4u * t + f] = CROWDED;
+                    }
+                    break;
+                }
+            }
+            if (probe == MAX_PROBES) status.at[0].overflow = 1u;
+        }
+    }
+    without_volume = subgroupAdd(without_volume);
+    negative = subgroupAdd(negative);
+    if (subgroupElect()) {
+        if (without_volume > 0u) atomicAdd(status.at[0].zero_volume, without_volume);
+        if (negative > 0u) atomicAdd(status.at[0].negative, negative);
+    }
+}

@@ -1,0 +1,27 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// Codes, 1 of 2: cells in the quantized box of every tetrahedron; one more element for the total.
+ARGUMENTS(5)
+    uint tets;
+    uint stride;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, float, positions)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER(4, writeonly, uint, counts) // tets + 1
+#include "shared/cells.glsl"
+
+void main() {
+    uint t = item_index();
+    if (t > tets) return;
+    uint n = 0u;
+    if (t < tets) {
+        Grid g = grid.at[0];
+        uvec3 size = coarser(finest_box(g, t, stride), g.level).size;
+        n = size.x * size.y * size.z;
+    }
+    counts.at[t] = n;
+}

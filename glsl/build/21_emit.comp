@@ -1,0 +1,43 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// Codes, 2 of 2 (Aabb): every invocation writes a run of entries, whichever tetrahedra they belong to, so one large tetrahedron
+// among small ones is no long loop.
+ARGUMENTS(8)
+    uint tets;
+    uint stride;
+    uint capacity;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, float, positions)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER(4, readonly, uint, offsets)
+BUFFER(5, readonly, uint, candidates)
+BUFFER(6, writeonly, uint, codes)
+BUFFER(7, writeonly, uint, ids)
+#include "shared/cells.glsl"
+#include "shared/owner.glsl"
+
+void main() {
+    uint n = min(candidates.at[0], capacity);
+    uint first = first_item();
+    if (first >= n) return;
+    uint end = min(n, first + ROWS);
+    Grid g = grid.at[0];
+    uint t = owner_of(first, tets);
+    uint next = offsets.at[t + 1u];
+    CellBox box = coarser(finest_box(g, t, stride), g.level);
+    uvec3 at = candidate(box, first - offsets.at[t]);
+    for (uint i = first; i < end; ++i) {
+        if (i >= next) {
+            while (next <= i && t + 1u < tets) next = offsets.at[++t + 1u];
+            box = coarser(finest_box(g, t, stride), g.level);
+            at = box.lo;
+        }
+        codes.at[i] = morton(at);
+        ids.at[i] = t;
+        at = next_candidate(box, at);
+    }
+}

@@ -1,0 +1,62 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// From the number of entries to the length of the table of splits (STAGE 0); from the scanned table to NO and the dispatches of the
+// leaves and the levels (STAGE 1).
+layout(constant_id = 2) const uint STAGE = 0;
+layout(constant_id = 3) const uint EACH = 64; // items per workgroup of the dispatches planned here
+ARGUMENTS(7)
+    uint capacity; // entries
+    uint nodes;    // capacity of the node arrays
+    uint run;      // codes per run
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, entries)
+BUFFER(2, readonly, uint, places)          // scanned table of splits
+BUFFER(3, writeonly, uint, table_length)   // of the splits
+BUFFER(4, READ_WRITE, BuildStatus, status)
+BUFFER(5, writeonly, uint, groups)         // x, y, z: per level 0…10, then the leaves
+BUFFER(6, readonly, uint, node_total)      // total of the table's scan
+
+void plan(uint slot, uint items) {
+    uint g = items / EACH + uint(items % EACH != 0u);
+    bool fold = g > 65535u;
+    groups.at[3u * slot] = fold ? 32768u : g;
+    groups.at[3u * slot + 1u] = fold ? (g + 32767u) / 32768u : 1u;
+    groups.at[3u * slot + 2u] = 1u;
+}
+
+void main() {
+    if (item_index() > 0u) return;
+    uint n = min(entries.at[0], capacity);
+    uint level = grid.at[0].level;
+    uint runs = n / run + uint(n % run != 0u);
+    if (STAGE == 0u) {
+        table_length.at[0] = (level + 1u) * runs;
+        status.at[0].entries = n;
+        if (n < entries.at[0]) status.at[0].overflow = 1u;
+        return;
+    }
+    bool empty = n == 0u;
+    uint total = empty ? 1u : node_total.at[0];
+    if (total > nodes || status.at[0].overflow != 0u) {
+        status.at[0].overflow = 1u;
+        total = 0u;
+        level = 0u;
+    }
+    uint before = 0u;
+    for (uint k = 0u; k <= MAX_LEVEL; ++k) {
+        uint through = k >= level ? total : empty ? 1u : places.at[(k + 1u) * runs];
+        if (total == 0u) through = 0u;
+        status.at[0].levels[k] = through;
+        plan(k, k < level ? through - before : 0u);
+        if (k == level) {
+            status.at[0].leaves = through - before;
+            status.at[0].internal = before;
+            plan(11u, through - before);
+        }
+        before = through;
+    }
+    status.at[0].nodes = total;
+}

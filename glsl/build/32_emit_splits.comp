@@ -1,0 +1,45 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// Splits, 2 of 2: node ends by level (PO), in place of a sort by level. Where a node ends, so does its last child on the next
+// level, which is being written at the same moment: CO needs no search (the paper's CI array of n_m words is not needed).
+ARGUMENTS(7)
+    uint capacity;
+    uint nodes; // capacity
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, entries)
+BUFFER(2, readonly, uint, codes)
+BUFFER(3, readonly, uint, places)
+BUFFER(4, readonly, BuildStatus, status)
+BUFFER(5, writeonly, uint, po)
+BUFFER(6, writeonly, uint, co)
+#include "shared/splits.glsl"
+
+void main() {
+    uint n = min(entries.at[0], capacity);
+    uint runs = n / ROWS + uint(n % ROWS != 0u);
+    uint run = item_index();
+    if (run == 0u) {
+        po.at[0] = 0u;
+        co.at[0] = 0u;
+        if (n == 0u) po.at[1] = 0u;
+    }
+    if (run >= runs || status.at[0].overflow != 0u) return;
+    uint level = grid.at[0].level;
+    uint first = run * ROWS, end = min(n, first + ROWS);
+    uint node[12]; // one more than `levels` of the status, whose type, layout included, the optimiser would choose otherwise
+    for (uint k = 0u; k <= level; ++k) node[k] = places.at[k * runs + run];
+    uint code = codes.at[first];
+    for (uint i = first; i < end; ++i) {
+        bool last = i + 1u == n;
+        uint next = last ? 0u : codes.at[i + 1u];
+        for (uint k = split_level(code, next, level, last); k <= level; ++k) {
+            po.at[node[k] + 1u] = i + 1u;
+            if (k < level) co.at[node[k] + 1u] = node[k + 1u];
+            node[k] += 1u;
+        }
+        code = next;
+    }
+}

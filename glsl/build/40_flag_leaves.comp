@@ -1,0 +1,40 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// Leaves, 1 of 2 (Alg. 1, boundary flags): parallel over entries, so that a long leaf is no long loop.
+ARGUMENTS(6)
+    uint capacity;
+END_ARGUMENTS
+BUFFER(0, readonly, uint, entries)
+BUFFER(1, readonly, uint, p)
+BUFFER(2, readonly, uint, po)
+BUFFER(3, readonly, uint, boundary_cells)
+BUFFER(4, READ_WRITE, BuildStatus, status)
+BUFFER(5, READ_WRITE, uint, flags) // zeroed
+
+void main() {
+    uint n = min(entries.at[0], capacity);
+    uint first = first_item();
+    if (first >= n || status.at[0].overflow != 0u) return;
+    uint end = min(n, first + ROWS);
+    // The leaf of the first entry: the first whose end lies behind it.
+    uint lo = status.at[0].internal, hi = status.at[0].nodes - 1u;
+    while (lo < hi) {
+        uint mid = lo + (hi - lo) / 2u;
+        if (po.at[mid + 1u] > first) hi = mid;
+        else lo = mid + 1u;
+    }
+    uint leaf = lo, leaf_end = po.at[leaf + 1u];
+    bool flag = false;
+    for (uint i = first; i < end; ++i) {
+        if (i >= leaf_end) {
+            if (flag) atomicOr(flags.at[leaf >> 5u], 1u << (leaf & 31u));
+            flag = false;
+            leaf_end = po.at[++leaf + 1u];
+        }
+        uint t = p.at[i];
+        flag = flag || (boundary_cells.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+    }
+    if (flag) atomicOr(flags.at[leaf >> 5u], 1u << (leaf & 31u));
+}

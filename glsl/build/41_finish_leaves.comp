@@ -1,0 +1,69 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/boxes.glsl"
+#include "shared/assign.glsl"
+#include "shared/separate.glsl"
+// Leaves, 2 of 2 (Alg. 1): the box of every leaf where boxes are stored, from the code of its last entry; the flag of
+// leaves outside of the mesh (see src/reference/leaves.rs); statistics.
+layout(constant_id = 2) const uint BOXES = 0;
+ARGUMENTS(9)
+    uint unused;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, codes)
+BUFFER(2, readonly, uint, po)
+BUFFER(3, READ_WRITE, uint, flags)
+BUFFER(4, READ_WRITE, BuildStatus, status)
+BUFFER(5, writeonly, float, boxes) // 6 per node: lo, hi
+BUFFER(6, readonly, uint, p)
+BUFFER16(7, readonly, uvec4, cells)
+BUFFER16(8, readonly, vec4, vertices)
+
+const uint ASKED = 16u;
+
+// Whether one of the first primitives of a leaf touches its cell.
+bool touched(Grid g, uint begin, uint end, uint code) {
+    vec3 h = half_cell(g, g.level), centre = cell_centre(h, unmorton(code));
+    vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
+    for (uint i = begin; i < min(end, begin + ASKED); ++i) {
+        uvec4 ids = cells.at[p.at[i]];
+        Tet t = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+        vec3 v[4];
+        for (uint k = 0u; k < 4u; ++k) v[k] = difference(t.v[k], centre);
+        if (box_touches(v, axes, vec3(0.0))) return true;
+    }
+    return false;
+}
+
+void main() {
+    uint i = item_index();
+    uint entries = 0u, flagged = 0u;
+    if (i < status.at[0].leaves && status.at[0].overflow == 0u) {
+        uint node = status.at[0].internal + i;
+        uint begin = po.at[node], end = po.at[node + 1u];
+        entries = begin >= end ? end : end - begin;
+        flagged = flags.at[node >> 5u] >> (node & 31u) & 1u;
+        Grid g = grid.at[0];
+        if (flagged == 0u && entries > 0u && !touched(g, end - entries, end, codes.at[end - 1u])) {
+            atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
+            flagged = 1u;
+        }
+        if (BOXES != 0u) {
+            vec3 lo, hi;
+            cell_box(g, g.level, end == 0u ? 0u : codes.at[end - 1u], lo, hi);
+            for (uint c = 0u; c < 3u; ++c) {
+                boxes.at[6u * node + c] = lo[c];
+                boxes.at[6u * node + 3u + c] = hi[c];
+            }
+        }
+    }
+    entries = subgroupMax(entries);
+    flagged = subgroupAdd(flagged);
+    if (subgroupElect()) {
+        if (entries > 0u) atomicMax(status.at[0].longest_leaf, entries);
+        if (flagged > 0u) atomicAdd(status.at[0].boundary_leaves, flagged);
+    }
+}

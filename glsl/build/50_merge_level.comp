@@ -1,0 +1,40 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// One level of internal nodes from their children (Alg. 2): boundary flag, child mask, and the union of boxes where they are stored.
+// Dispatched from the level above the leaves up to the root, with a barrier between levels.
+layout(constant_id = 2) const uint BOXES = 0;
+ARGUMENTS(8)
+    uint level;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, BuildStatus, status)
+BUFFER(2, readonly, uint, codes)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, co)
+BUFFER(5, READ_WRITE, uint, flags)
+BUFFER(6, READ_WRITE, uint, masks) // zeroed; one byte per internal node
+BUFFER(7, READ_WRITE, float, boxes)
+
+void main() {
+    uint first = level == 0u ? 0u : status.at[0].levels[level - 1u];
+    uint node = first + item_index();
+    if (level >= status.at[0].level || node >= status.at[0].levels[level] || status.at[0].overflow != 0u) return;
+    uint begin = co.at[node] + 1u, end = co.at[node + 1u];
+    uint shift = 3u * (grid.at[0].level - 1u - level);
+    uint flag = 0u, mask = 0u;
+    for (uint child = begin; child <= end; ++child) {
+        flag |= flags.at[child >> 5u] >> (child & 31u) & 1u;
+        mask |= 1u << (codes.at[po.at[child + 1u] - 1u] >> shift & 7u);
+        if (BOXES != 0u) {
+            for (uint c = 0u; c < 3u; ++c) {
+                float lo = boxes.at[6u * child + c], hi = boxes.at[6u * child + 3u + c];
+                boxes.at[6u * node + c] = child == begin ? lo : min(boxes.at[6u * node + c], lo);
+                boxes.at[6u * node + 3u + c] = child == begin ? hi : max(boxes.at[6u * node + 3u + c], hi);
+            }
+        }
+    }
+    if (flag != 0u) atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
+    atomicOr(masks.at[node >> 2u], mask << (8u * (node & 3u)));
+}

@@ -1,0 +1,31 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/sort.glsl"
+// Radix sort, tiles of a workgroup: digits are counted in shared memory. For processors with many narrow cores.
+ARGUMENTS(3)
+    uint count;
+    uint shift;
+    uint mask; // of the digit: the last pass may have fewer bits
+END_ARGUMENTS
+BUFFER(0, readonly, uint, live)
+BUFFER(1, readonly, uint, keys)
+BUFFER(2, writeonly, uint, counts)
+
+shared uint digit_counts[DIGITS];
+
+void main() {
+    uint n = min(count, live.at[0]);
+    uint tile_items = WORKGROUP * ROWS;
+    uint tiles = sort_tiles(n, tile_items);
+    uint stride = sort_stride(tiles);
+    uint tile = group_index();
+    if (tiles == 0u || tile >= stride) return;
+    for (uint d = local_index(); d < DIGITS; d += WORKGROUP) digit_counts[d] = 0u;
+    barrier();
+    for (uint row = 0u; row < ROWS; ++row) {
+        uint i = tile * tile_items + row * WORKGROUP + local_index();
+        if (i < n) atomicAdd(digit_counts[keys.at[i] >> shift & mask], 1u);
+    }
+    barrier();
+    for (uint d = local_index(); d < DIGITS; d += WORKGROUP) counts.at[d * stride + tile] = digit_counts[d];
+}

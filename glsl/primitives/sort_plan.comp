@@ -1,0 +1,25 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/sort.glsl"
+// From the number of pairs to what the passes need: workgroups, and the length of the table of counts.
+ARGUMENTS(3)
+    uint count;
+    uint tile;      // pairs per tile
+    uint per_group; // tiles that one workgroup takes
+END_ARGUMENTS
+BUFFER(0, readonly, uint, live)
+BUFFER(1, writeonly, uint, groups) // x, y, z of the passes
+BUFFER(2, writeonly, uint, table)  // length of the table of counts
+
+void main() {
+    if (item_index() > 0u) return;
+    uint n = min(count, live.at[0]);
+    uint tiles = sort_tiles(n, tile);
+    uint stride = tiles == 0u ? 0u : sort_stride(tiles);
+    uint g = (stride + per_group - 1u) / per_group;
+    bool fold = g > 65535u;
+    groups.at[0] = fold ? 32768u : g;
+    groups.at[1] = fold ? (g + 32767u) / 32768u : 1u;
+    groups.at[2] = 1u;
+    table.at[0] = stride * DIGITS;
+}

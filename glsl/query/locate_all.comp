@@ -1,0 +1,57 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Every primitive that contains a point, ascending; where none does, the owner alone (SPEC 3.1). FILL 0 counts, FILL 1 writes, list by list in
+// slices. `owners` are the answers of locate.
+layout(constant_id = 2) const uint FILL = 0;
+layout(constant_id = 3) const uint SLICE = 16384;
+ARGUMENTS(12)
+    uint count;
+    uint stride;
+    uint slice;
+    uint capacity; // of `found`
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER(5, readonly, uint, flags)
+BUFFER16(6, readonly, uvec4, cells)
+BUFFER16(7, readonly, vec4, vertices)
+BUFFER(8, readonly, float, points)
+BUFFER(9, readonly, uint, owners)
+BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: where the next one goes
+BUFFER(11, READ_WRITE, uint, found)
+#include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
+
+void main() {
+    uint i = item_index();
+    if (i >= count || owners.at[i] == NONE) return;
+    Grid g = grid.at[0];
+    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 x = normalise(g, at);
+    uint leaf = find_leaf(g.level, quantize(g, at));
+    Tet own = load_tet(cells.at[owners.at[i]]);
+    uint place = places.at[i];
+    if (!weights(own, x).inside) {
+        // The nearest cell, which nothing contains.
+        if (slice == 0u) {
+            if (FILL != 0u && place < capacity) found.at[place] = owners.at[i];
+            places.at[i] = place + 1u;
+        }
+        return;
+    }
+    uvec2 range = entry_range(leaf);
+    uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
+    for (uint e = begin; e < end; ++e) {
+        uint t = p.at[e];
+        if (!weights(load_tet(cells.at[t]), x).inside) continue;
+        if (FILL != 0u && place < capacity) found.at[place] = t;
+        ++place;
+    }
+    places.at[i] = place;
+}

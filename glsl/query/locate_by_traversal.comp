@@ -1,0 +1,65 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/node.glsl"
+// Point location through the paper's traversal (SPEC 3.2): a baseline that must agree with the descent. The node predicate tests the point's
+// cell, in integers.
+layout(constant_id = 2) const uint STACK = 8;
+ARGUMENTS(11)
+    uint count;
+    uint stride;
+    float tolerance;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER(5, readonly, uint, flags)
+BUFFER16(6, readonly, uvec4, cells)
+BUFFER16(7, readonly, vec4, vertices)
+BUFFER(8, readonly, float, points)
+BUFFER(9, writeonly, uint, owners)
+BUFFER16(10, writeonly, vec4, barycentrics)
+#include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
+
+uint point_code;
+uint leaf_found;
+
+bool visit_node(Node node) { return node.code == point_code >> (3u * (MAX_LEVEL - node.level)); }
+
+bool visit_leaf(Node node) {
+    leaf_found = node.index;
+    return true;
+}
+#include "shared/traverse.glsl"
+
+void main() {
+    uint i = item_index();
+    if (i >= count) return;
+    Grid g = grid.at[0];
+    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    leaf_found = NONE;
+    uint owner = NONE;
+    vec4 b = vec4(0.0);
+    if (near_bounds(g, at)) {
+        point_code = morton(quantize(g, at));
+        traverse(g.level);
+    }
+    if (leaf_found != NONE) {
+        vec3 x = normalise(g, at);
+        Best best = no_best();
+        uvec2 range = entry_range(leaf_found);
+        search(best, range.x, min(range.y, range.x + 32000u), x);
+        owner = decide(best, leaf_found, tolerance);
+        if (owner != NONE) {
+            Tet tet = load_tet(cells.at[owner]);
+            b = barycentric(weights(tet, x), tet.rank);
+        }
+    }
+    owners.at[i] = owner;
+    barycentrics.at[i] = b;
+}

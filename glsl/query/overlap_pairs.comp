@@ -1,0 +1,111 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/node.glsl"
+#include "shared/cell_range.glsl"
+#include "shared/separate.glsl"
+#include "shared/overlap.glsl"
+// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0) or written (FILL 1) behind the scanned counts. Twin of src/reference/overlap.rs.
+layout(constant_id = 2) const uint EACH_ONCE = 1;
+layout(constant_id = 3) const uint BUDGET = 256;
+layout(constant_id = 4) const uint OWN_STRIDE = 3;
+layout(constant_id = 5) const uint STRIDE = 3;
+layout(constant_id = 6) const uint FILL = 0;
+ARGUMENTS(15)
+    uint tets;
+    uint capacity; // pairs that `found` holds
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER16(5, readonly, uvec4, cells)
+BUFFER(6, readonly, float, positions)
+BUFFER16(7, readonly, uvec4, own_cells)
+BUFFER(8, readonly, float, own_positions)
+BUFFER(9, readonly, uint, bad)
+BUFFER16(10, readonly, NodeFrame, frame)
+BUFFER16(11, READ_WRITE, SearchState, states) // zeroed
+BUFFER(12, READ_WRITE, uint, places) // FILL 0: counts; FILL 1: where the pairs of a primitive begin
+BUFFER(13, writeonly, uvec2, found)
+BUFFER(14, READ_WRITE, OverlapStatus, status)
+#include "shared/tree.glsl"
+#include "shared/overlap_tets.glsl"
+
+bool walk_ended = false;
+uvec3 lo, hi;
+
+bool enters(Node node) { return meets_range(node, lo, hi); }
+#include "shared/leaf_walk.glsl"
+
+void main() {
+    uint t = item_index();
+    uint unfinished = 0u, narrow = 0u, pairs = 0u;
+    if (t < tets && states.at[t].code != NONE) {
+        SearchState state = states.at[t];
+        Grid g = grid.at[0];
+        joint = g;
+        joint.lo = frame.at[0].joint_lo;
+        joint.scale = frame.at[0].scale;
+        bool done = (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+        RawTet own;
+        if (!done) {
+            own = own_tet(t);
+            done = !boxes_meet(own.lo, own.hi, g.lo.xyz, g.hi.xyz);
+        }
+        if (!done) {
+            vec3 v[4];
+            to_joint(own, v);
+            lo = quantize(g, own.lo);
+            hi = quantize(g, own.hi);
+            LeafWalk at = walk_from(state.code);
+            uint leaf = WALK_PAUSED;
+            for (uint work = 0u; work < BUDGET;) {
+                leaf = next_leaf(at, g.level, work, BUDGET);
+                if (leaf >= WALK_PAUSED) break;
+                uvec2 range = entry_range(leaf);
+                uint begin = range.x + state.entry, end = min(range.y, begin + max(BUDGET - min(work, BUDGET), 1u));
+                for (uint e = begin; e < end; ++e) {
+                    uint b = p.at[e];
+                    RawTet other = other_tet(b);
+                    if (!compared_in(g, at.code, own, other)) continue;
+                    vec3 w[4];
+                    to_joint(other, w);
+                    ++narrow;
+                    if (!tets_touch(v, w)) continue;
+                    ++pairs;
+                    if (FILL != 0u) {
+                        uint place = places.at[t] + state.place;
+                        if (place < capacity) found.at[place] = uvec2(t, b);
+                    }
+                    ++state.place;
+                }
+                work += end - begin;
+                state.entry = end - range.x;
+                if (end < range.y) break;
+                state.entry = 0u;
+                leaf = walk_past(at, g.level, g.level) ? WALK_PAUSED : WALK_DONE;
+                if (leaf == WALK_DONE) break;
+            }
+            state.code = at.code;
+            done = leaf == WALK_DONE;
+        }
+        if (done) {
+            state.code = NONE;
+            if (FILL == 0u) places.at[t] = state.place;
+        }
+        states.at[t] = state;
+        unfinished = uint(!done);
+    }
+    unfinished = subgroupAdd(unfinished);
+    narrow = subgroupAdd(narrow);
+    pairs = subgroupAdd(pairs);
+    if (subgroupElect()) {
+        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+        if (FILL == 0u && narrow > 0u && atomicAdd(status.at[0].narrow[0], narrow) > NONE - narrow) atomicAdd(status.at[0].narrow[1], 1u);
+        if (FILL == 0u && pairs > 0u && atomicAdd(status.at[0].pairs[0], pairs) > NONE - pairs) atomicAdd(status.at[0].pairs[1], 1u);
+    }
+}

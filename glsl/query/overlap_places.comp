@@ -1,0 +1,60 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Overlap (SPEC 3.5), step 1: which vertices lie in the other mesh: those in a cell of a non-boundary leaf, and those that a list says so. Lists
+// are searched in slices of at most SLICE entries per dispatch. Twin of src/reference/overlap.rs.
+layout(constant_id = 2) const uint SLICE = 16384;
+ARGUMENTS(13)
+    uint points;
+    uint stride; // floats from one point to the next
+    uint slice;  // number of this dispatch
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `vertices`
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER(5, readonly, uint, flags)
+BUFFER16(6, readonly, uvec4, cells)
+BUFFER16(7, readonly, vec4, vertices)
+BUFFER(8, readonly, float, own_positions)
+BUFFER(9, readonly, uint, used)
+BUFFER(10, READ_WRITE, uint, places) // 1: in the other mesh
+BUFFER(11, READ_WRITE, uint, around) // one bit per tetrahedron of the other mesh: holds a vertex of this one
+BUFFER(12, READ_WRITE, OverlapStatus, status)
+#include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
+
+void main() {
+    uint i = item_index();
+    uint located = 0u;
+    bool look = i < points && (used.at[i >> 5u] >> (i & 31u) & 1u) != 0u;
+    if (look && slice > 0u) look = places.at[i] == 0u;
+    if (i < points && slice == 0u) places.at[i] = 0u;
+    if (look) {
+        Grid g = grid.at[0];
+        vec3 x = vec3(own_positions.at[i * stride], own_positions.at[i * stride + 1u], own_positions.at[i * stride + 2u]);
+        x = vec3(canonical(x.x), canonical(x.y), canonical(x.z));
+        bool within = all(lessThanEqual(g.lo.xyz, x)) && all(lessThanEqual(x, g.hi.xyz));
+        uint leaf = within ? find_leaf(g.level, quantize(g, x)) : NONE;
+        if (leaf != NONE && !is_boundary_node(leaf)) {
+            places.at[i] = 1u;
+        } else if (leaf != NONE) {
+            located = uint(slice == 0u);
+            x = normalise(g, x);
+            uvec2 range = entry_range(leaf);
+            uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
+            for (uint e = begin; e < end; ++e) {
+                uint t = p.at[e];
+                if (!weights(load_tet(cells.at[t]), x).inside) continue;
+                places.at[i] = 1u;
+                atomicOr(around.at[t >> 5u], 1u << (t & 31u));
+                break;
+            }
+        }
+    }
+    located = subgroupAdd(located);
+    if (subgroupElect() && located > 0u) atomicAdd(status.at[0].located, located);
+}

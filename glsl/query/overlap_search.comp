@@ -1,0 +1,140 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/node.glsl"
+#include "shared/cell_range.glsl"
+#include "shared/separate.glsl"
+#include "shared/overlap.glsl"
+// Overlap (SPEC 3.5), steps 2 and 3: primitives that no vertex decides descend the other tree, first to its non-boundary nodes, then to the lists of
+// boundary leaves. Twin of src/reference/overlap.rs.
+layout(constant_id = 2) const uint EACH_ONCE = 1;
+layout(constant_id = 3) const uint BUDGET = 256;
+layout(constant_id = 4) const uint OWN_STRIDE = 3;
+layout(constant_id = 5) const uint STRIDE = 3;
+ARGUMENTS(15)
+    uint most; // length of `waiting`
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER(5, readonly, uint, flags)
+BUFFER16(6, readonly, uvec4, cells)
+BUFFER(7, readonly, float, positions)
+BUFFER16(8, readonly, uvec4, own_cells)
+BUFFER(9, readonly, float, own_positions)
+BUFFER16(10, readonly, NodeFrame, frame)
+BUFFER(11, readonly, uint, waiting)
+BUFFER16(12, READ_WRITE, SearchState, states) // zeroed
+BUFFER(13, READ_WRITE, uint, hits)
+BUFFER(14, READ_WRITE, OverlapStatus, status)
+#include "shared/tree.glsl"
+#include "shared/overlap_tets.glsl"
+
+bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
+
+bool walk_ended = false;
+Grid g;
+uvec3 lo, hi;
+vec3 v[4]; // of the primitive, in the joint frame
+uint phase;
+
+bool touches_node(Node node) {
+    NodeFrame f = frame.at[0];
+    float part = power_of_two(-int(node.level));
+    precise vec3 scaled = f.half_size.xyz * part;
+    vec3 size = vec3(f.flat_axis.x == 0.0 ? scaled.x : f.half_size.x, f.flat_axis.y == 0.0 ? scaled.y : f.half_size.y,
+                     f.flat_axis.z == 0.0 ? scaled.z : f.half_size.z);
+    precise vec3 at = f.corner.xyz + vec3(2u * unmorton(node.code) + 1u) * size;
+    precise vec3 centre = floor(at * power_of_two(42)) * power_of_two(-42);
+    precise vec3 h = size + power_of_two(18);
+    vec3 around[4] = vec3[4](difference(v[0], centre), difference(v[1], centre), difference(v[2], centre), difference(v[3], centre));
+    return box_touches(around, vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z)), vec3(0.0));
+}
+
+bool enters(Node node) {
+    if (!meets_range(node, lo, hi)) return false;
+    if (is_boundary_node(node.index)) return phase != 0u || node.level < g.level;
+    if (phase == 0u) walk_ended = touches_node(node);
+    return false;
+}
+#include "shared/leaf_walk.glsl"
+
+void add_wide(uint n, bool elected) {
+    if (elected && n > 0u && atomicAdd(status.at[0].narrow[0], n) > NONE - n) atomicAdd(status.at[0].narrow[1], 1u);
+}
+
+void main() {
+    uint i = item_index();
+    uint unfinished = 0u, narrow = 0u, by_node = 0u;
+    if (i < min(status.at[0].waiting, most) && states.at[i].code != NONE) {
+        SearchState state = states.at[i];
+        g = grid.at[0];
+        joint = g;
+        joint.lo = frame.at[0].joint_lo;
+        joint.scale = frame.at[0].scale;
+        uint t = waiting.at[i];
+        RawTet own = own_tet(t);
+        to_joint(own, v);
+        lo = quantize(g, own.lo);
+        hi = quantize(g, own.hi);
+        bool found = false, done = false;
+        phase = state.phase;
+        for (uint work = 0u; work < BUDGET && !done;) {
+            uint leaf = WALK_DONE;
+            if (enters(Node(0u, 0u, 0u))) {
+                leaf = WALK_PAUSED;
+                LeafWalk at = walk_from(state.code);
+                while (work < BUDGET) {
+                    leaf = next_leaf(at, g.level, work, BUDGET);
+                    if (leaf >= WALK_PAUSED) break;
+                    uvec2 range = entry_range(leaf);
+                    uint begin = range.x + state.entry, end = min(range.y, begin + max(BUDGET - min(work, BUDGET), 1u)), e = begin;
+                    for (; e < end && !found; ++e) {
+                        RawTet other = other_tet(p.at[e]);
+                        if (!compared_in(g, at.code, own, other)) continue;
+                        vec3 w[4];
+                        to_joint(other, w);
+                        ++narrow;
+                        found = tets_touch(v, w);
+                    }
+                    work += end - begin;
+                    state.entry = e - range.x;
+                    if (found || e < range.y) break;
+                    state.entry = 0u;
+                    leaf = walk_past(at, g.level, g.level) ? WALK_PAUSED : WALK_DONE;
+                    if (leaf == WALK_DONE) break;
+                }
+                state.code = at.code;
+            }
+            if (walk_ended) {
+                by_node = 1u;
+                found = true;
+            }
+            if (found) {
+                done = true;
+            } else if (leaf == WALK_DONE) {
+                done = phase != 0u;
+                phase = 1u;
+                state.code = 0u;
+                state.entry = 0u;
+            }
+        }
+        if (found) atomicOr(hits.at[t >> 5u], 1u << (t & 31u));
+        if (done) state.code = NONE;
+        state.phase = phase;
+        states.at[i] = state;
+        unfinished = uint(!done);
+    }
+    unfinished = subgroupAdd(unfinished);
+    narrow = subgroupAdd(narrow);
+    by_node = subgroupAdd(by_node);
+    if (subgroupElect()) {
+        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+        if (by_node > 0u) atomicAdd(status.at[0].by_node, by_node);
+        add_wide(narrow, true);
+    }
+}

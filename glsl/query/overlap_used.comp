@@ -1,0 +1,20 @@
+#version 460
+#include "shared/kernel.glsl"
+// Overlap (SPEC 3.5): which points are vertices of valid tetrahedra.
+ARGUMENTS(3)
+    uint tets;
+END_ARGUMENTS
+BUFFER(0, readonly, uint, bad)
+BUFFER16(1, readonly, uvec4, cells)
+BUFFER(2, READ_WRITE, uint, used) // one bit per point, zeroed
+
+void main() {
+    uint t = item_index();
+    if (t >= tets || (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u) return;
+    uvec4 ids = cells.at[t];
+    for (uint i = 0u; i < 4u; ++i) {
+        uint bit = 1u << (ids[i] & 31u);
+        // Most bits are set already.
+        if ((used.at[ids[i] >> 5u] & bit) == 0u) atomicOr(used.at[ids[i] >> 5u], bit);
+    }
+}

@@ -1,0 +1,114 @@
+// Does a tetrahedron touch a cell? (SPEC 2.2) Twin of src/reference/assign.rs, which explains the bounds: the same operations in the
+// same order.
+const uint PLANES = 1u;
+const uint EXACT = 2u;
+
+struct Filter {
+    vec3 h; // half a cell, not inflated
+    vec3 normal[4];
+    vec3 at[4];
+    float limit[4];
+    bool edges;
+    vec3 edge_at[6];
+    vec3 along[6];
+    vec3 shadow_lo[6];
+    vec3 shadow_hi[6];
+};
+
+const uvec3 FILTER_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
+// Edges, and the two vertices that are not on them.
+const uvec4 FILTER_EDGES[6] =
+    uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
+
+float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
+
+vec3 half_cell(Grid g, uint level) {
+    precise vec3 cell = g.extent.xyz * two_to(-1 - int(level));
+    precise vec3 whole = g.extent.xyz * 0.5;
+    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
+}
+
+vec3 inflated(Grid g, vec3 h) {
+    precise vec3 r = h + (g.extent.xyz * two_to(-20) + two_to(-41));
+    return r;
+}
+
+vec3 cell_centre(vec3 h, uvec3 cell) {
+    precise vec3 a = vec3(2u * cell + 1u) * h;
+    precise vec3 b = floor(a * two_to(42)) * two_to(-42);
+    return b;
+}
+
+vec3 cross_bound(vec3 a, vec3 b) {
+    a = abs(a);
+    b = abs(b);
+    precise vec3 r = vec3(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
+    return r;
+}
+
+Filter make_filter(Tet t, Grid g, uint level, uint assign) {
+    Filter f;
+    f.h = half_cell(g, level);
+    vec3 box_half = inflated(g, f.h);
+    precise vec3 size = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3])) - min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
+    precise vec3 slack = (size + 2.0 * box_half) * two_to(-18) + two_to(-42);
+    float vol = volume(t);
+    float s = vol < 0.0 ? -1.0 : 1.0;
+    for (uint i = 0u; i < 4u; ++i) {
+        uvec3 face = FILTER_FACES[i];
+        precise vec3 a = t.v[face.y] - t.v[face.x];
+        precise vec3 b = t.v[face.z] - t.v[face.x];
+        float outward = (i & 1u) == 0u ? s : -s;
+        precise vec3 normal = outward * cross_product(a, b);
+        precise float limit = dot_product(abs(normal), box_half) + dot_product(cross_bound(a, b), slack);
+        f.normal[i] = normal;
+        f.at[i] = t.v[face.x];
+        f.limit[i] = limit;
+    }
+    vol = abs(vol);
+    precise float room = (size.x * size.y) * size.z;
+    precise float least = room * two_to(-12);
+    f.edges = assign == EXACT && vol > least;
+    if (!f.edges) return f;
+    precise float spread_by = (room * reciprocal(vol)) * two_to(-16);
+    for (uint e = 0u; e < 6u; ++e) {
+        uvec4 edge = FILTER_EDGES[e];
+        precise vec3 along = t.v[edge.y] - t.v[edge.x];
+        precise vec3 um = t.v[edge.z] - t.v[edge.x];
+        precise vec3 un = t.v[edge.w] - t.v[edge.x];
+        f.edge_at[e] = t.v[edge.x];
+        f.along[e] = along;
+        for (uint axis = 0u; axis < 3u; ++axis) {
+            uint i = (axis + 1u) % 3u, j = (axis + 2u) % 3u;
+            precise float tm = um[i] * along[j] - um[j] * along[i];
+            precise float tn = un[i] * along[j] - un[j] * along[i];
+            float lo = min(min(tm, tn), 0.0), hi = max(max(tm, tn), 0.0);
+            float ai = abs(along[i]), aj = abs(along[j]);
+            precise float width = hi - lo;
+            precise float grow = ((aj * box_half[i] + ai * box_half[j]) + (aj * slack[i] + ai * slack[j])) + spread_by * width;
+            precise float grown_lo = lo - grow, grown_hi = hi + grow;
+            f.shadow_lo[e][axis] = grown_lo;
+            f.shadow_hi[e][axis] = grown_hi;
+        }
+    }
+    return f;
+}
+
+bool touches(Filter f, uvec3 cell) {
+    vec3 centre = cell_centre(f.h, cell);
+    for (uint i = 0u; i < 4u; ++i) {
+        precise vec3 u = centre - f.at[i];
+        if (dot_product(f.normal[i], u) > f.limit[i]) return false;
+    }
+    if (!f.edges) return true;
+    for (uint e = 0u; e < 6u; ++e) {
+        precise vec3 u = centre - f.edge_at[e];
+        vec3 along = f.along[e];
+        for (uint axis = 0u; axis < 3u; ++axis) {
+            uint i = (axis + 1u) % 3u, j = (axis + 2u) % 3u;
+            precise float t = u[i] * along[j] - u[j] * along[i];
+            if (t < f.shadow_lo[e][axis] || t > f.shadow_hi[e][axis]) return false;
+        }
+    }
+    return true;
+}

@@ -1,0 +1,21 @@
+// Candidates for the owner of a point. Needs grid.glsl, tet.glsl, and vertices.
+
+// Far outside of the bounds, or not a number: no mesh can be there.
+bool near_bounds(Grid g, vec3 x) {
+    precise vec3 t = from_corner(g, x) * g.scale;
+    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+}
+
+Tet load_tet(uvec4 ids) {
+    return make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+}
+
+// The best of the candidates so far.
+struct Best {
+    uint owner; // NONE: none yet
+    bool inside;
+    bool in_box;
+    float smallest;
+};
+
+Best no_best() { return Best(NONE, false, false, SMALLEST_FLOAT); }

@@ -1,0 +1,21 @@
+// Boxes of cells of the finest grid. Twin of src/reference/leaf_walk.rs. Needs grid.glsl and node.glsl.
+
+// Whether the cell of a node meets a range of cells of the finest grid.
+bool meets_range(Node node, uvec3 lo, uvec3 hi) {
+    uvec3 cell = unmorton(node.code);
+    uint shift = MAX_LEVEL - node.level;
+    return all(lessThanEqual(lo >> shift, cell)) && all(lessThanEqual(cell, hi >> shift));
+}
+
+// The cells of the finest grid that the box around `centre` meets; false: it lies outside of the bounds.
+bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) {
+    vec3 d = from_corner(g, centre);
+    precise vec3 a = d - reach, b = d + reach, size = g.hi.xyz - g.lo.xyz;
+    a = vec3(canonical(a.x), canonical(a.y), canonical(a.z));
+    b = vec3(canonical(b.x), canonical(b.y), canonical(b.z));
+    size = vec3(canonical(size.x), canonical(size.y), canonical(size.z));
+    precise vec3 qa = floor(a * g.inv.xyz), qb = floor(b * g.inv.xyz);
+    lo = uvec3(clamp(qa, vec3(0.0), vec3(1023.0)));
+    hi = uvec3(clamp(qb, vec3(0.0), vec3(1023.0)));
+    return all(greaterThanEqual(b, vec3(0.0))) && all(lessThanEqual(a, size));
+}

@@ -1,0 +1,56 @@
+// The quantized box of a tetrahedron at a level (the paper's Eq. 5), from its vertices as the caller stores them. The including kernel declares grid,
+// positions, cells and bad.
+struct CellBox {
+    uvec3 lo;   // first cell
+    uvec3 size; // cells per axis; 0 for a bad tetrahedron
+};
+
+bool is_bad(uint t) { return (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u; }
+
+vec3 position(uint v, uint stride) { return vec3(positions.at[v * stride], positions.at[v * stride + 1u], positions.at[v * stride + 2u]); }
+
+CellBox finest_box(Grid g, uint t, uint stride) {
+    CellBox box;
+    box.lo = uvec3(0u);
+    box.size = uvec3(0u);
+    if (is_bad(t)) return box;
+    uvec3 lo = uvec3(1023u), hi = uvec3(0u);
+    uvec4 ids = cells.at[t];
+    for (uint i = 0u; i < 4u; ++i) {
+        uvec3 q = quantize(g, position(ids[i], stride));
+        lo = min(lo, q);
+        hi = max(hi, q);
+    }
+    box.lo = lo;
+    box.size = hi - lo + 1u;
+    return box;
+}
+
+// The same at a coarser level.
+CellBox coarser(CellBox finest, uint level) {
+    if (finest.size.x == 0u) return finest;
+    uint shift = MAX_LEVEL - level;
+    CellBox box;
+    box.lo = finest.lo >> shift;
+    box.size = ((finest.lo + finest.size - 1u) >> shift) - box.lo + 1u;
+    return box;
+}
+
+// Candidate number i of a box, x fastest.
+uvec3 candidate(CellBox box, uint i) {
+    uint row = box.size.x, slab = box.size.x * box.size.y;
+    uint z = i / slab, rest = i - z * slab, y = rest / row;
+    return box.lo + uvec3(rest - y * row, y, z);
+}
+
+// The candidate after `at`, without the divisions above.
+uvec3 next_candidate(CellBox box, uvec3 at) {
+    at.x += 1u;
+    bool row = at.x == box.lo.x + box.size.x;
+    at.x = row ? box.lo.x : at.x;
+    at.y += uint(row);
+    bool slab = at.y == box.lo.y + box.size.y;
+    at.y = slab ? box.lo.y : at.y;
+    at.z += uint(slab);
+    return at;
+}

@@ -1,0 +1,58 @@
+// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs: the same operations in the same order.
+
+const uint MAX_LEVEL = 10u;
+
+// x without denormals.
+float canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
+
+// Distance from the lower corner, per axis.
+vec3 from_corner(Grid g, vec3 x) {
+    precise vec3 d = vec3(canonical(x.x), canonical(x.y), canonical(x.z)) - g.lo.xyz;
+    return vec3(canonical(d.x), canonical(d.y), canonical(d.z));
+}
+
+// Cell of the finest grid, clamped into the grid.
+uvec3 quantize(Grid g, vec3 x) {
+    precise vec3 q = floor(from_corner(g, x) * g.inv.xyz);
+    return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
+}
+
+// Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
+vec3 normalise(Grid g, vec3 x) {
+    precise vec3 unit = from_corner(g, x) * g.scale;
+    unit = vec3(canonical(unit.x), canonical(unit.y), canonical(unit.z));
+    precise vec3 whole = floor(unit * uintBitsToFloat((82u + 127u) << 23));
+    precise vec3 r = whole * uintBitsToFloat((127u - 42u) << 23);
+    return r;
+}
+
+uint spread(uint v) {
+    v = (v | v << 16) & 0x030000ffu;
+    v = (v | v << 8) & 0x0300f00fu;
+    v = (v | v << 4) & 0x030c30c3u;
+    return (v | v << 2) & 0x09249249u;
+}
+
+uint gather(uint v) {
+    v &= 0x09249249u;
+    v = (v | v >> 2) & 0x030c30c3u;
+    v = (v | v >> 4) & 0x0300f00fu;
+    v = (v | v >> 8) & 0x030000ffu;
+    return (v | v >> 16) & 0x000003ffu;
+}
+
+// Morton code of a cell (Eq. 1), and back.
+uint morton(uvec3 q) { return spread(q.x) << 2 | spread(q.y) << 1 | spread(q.z); }
+uvec3 unmorton(uint code) { return uvec3(gather(code >> 2), gather(code >> 1), gather(code)); }
+
+// Deterministic reciprocal: see src/reference/grid.rs.
+float reciprocal(float x) {
+    float a = abs(x);
+    precise float r = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(a));
+    for (int i = 0; i < 4; ++i) {
+        precise float e = a * r;
+        precise float f = 2.0 - e;
+        r = r * f;
+    }
+    return x < 0.0 ? -r : r;
+}

@@ -1,0 +1,49 @@
+// Common ground of every kernel: how arguments arrive, how work is indexed.
+//
+// A kernel states its arguments once:
+//     ARGUMENTS(2)            // number of buffers
+//         uint count;         // scalars
+//     END_ARGUMENTS
+//     BUFFER(0, readonly, uint, keys)
+//     BUFFER(1, writeonly, uint, sorted)
+// and reads keys.at[i]. Compiled plainly, the push constants hold one 64-bit address per buffer, then the scalars. Compiled with
+// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i` and the push constants hold the scalars only.
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#extension GL_KHR_shader_subgroup_basic : require
+#extension GL_KHR_shader_subgroup_vote : require
+#extension GL_KHR_shader_subgroup_arithmetic : require
+#extension GL_KHR_shader_subgroup_ballot : require
+
+#define READ_WRITE
+#define END_ARGUMENTS };
+#ifdef OLBVH_DESCRIPTORS
+#define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments {
+#define ALIGNED_BUFFER(alignment, slot, access, T, name) layout(set = 0, binding = slot, std430) access buffer name##Block { T at[]; } name;
+#else
+#define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments { uvec2 address[buffers];
+#define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \
+    layout(buffer_reference, std430, buffer_reference_align = alignment) access buffer name##Block { T at[]; };                 \
+    name##Block name = name##Block(address[slot]);
+#endif
+#define BUFFER(slot, access, T, name) ALIGNED_BUFFER(4, slot, access, T, name)
+// Elements of 16 bytes at addresses that are multiples of 16: one load each.
+#define BUFFER16(slot, access, T, name) ALIGNED_BUFFER(16, slot, access, T, name)
+
+layout(constant_id = 0) const uint WORKGROUP = 64; // invocations per workgroup
+layout(constant_id = 1) const uint ROWS = 4;       // items per invocation
+layout(local_size_x_id = 0) in;
+
+const uint NONE = 0xffffffffu;
+
+// Workgroups are folded into two dimensions, since 65,535 is the limit of one.
+uint group_index() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
+
+// Place in the workgroup; consecutive within a subgroup, whatever the driver's mapping.
+uint local_index() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID; }
+
+// First item of this invocation's ROWS consecutive ones.
+uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
+
+// One item per invocation.
+uint item_index() { return group_index() * WORKGROUP + local_index(); }

@@ -1,0 +1,165 @@
+// Every struct that host and device share; build.rs reflects this file into src/layout.rs, comments included.
+
+// The grid of a mesh (SPEC 2.1).
+struct Grid {
+    vec4 lo;      // Lower corner of the bounds.
+    vec4 hi;      // Upper corner of the bounds.
+    vec4 inv;     // Finest cells per unit of length, 0 on a flat axis.
+    vec4 extent;  // Upper corner in normalised coordinates.
+    float scale;  // Power of two that brings the largest extent into [1, 2).
+    uint level;   // Level of the leaves, l.
+    uint pad[2];  // Unused.
+};
+
+// What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
+struct MeshStatus {
+    uint lo[3];     // Lower corner of the bounds as ordered keys (complemented, so that zeroes mean nothing seen).
+    uint hi[3];     // Upper corner of the bounds as ordered keys.
+    uint bad;       // Tetrahedra left out: index out of range, repeated vertex, coordinate not finite.
+    uint boundary;  // Boundary tetrahedra.
+    uint zero_volume; // Tetrahedra of zero volume.
+    uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
+    uint overflow;  // Not 0: the table of faces was too small; never happens with the planned size.
+    uint pad;       // Unused.
+};
+
+// What a build made (SPEC 2.4, 2.5).
+struct BuildStatus {
+    uint level;            // Level of the leaves, l.
+    uint heuristic_level;  // Level that the heuristic chose; above `level` where a capacity clipped it.
+    uint candidates;       // Cells within the quantized boxes of all tetrahedra, the entries of `Aabb`.
+    uint entries;          // n_m.
+    uint nodes;            // n_n.
+    uint internal;         // n_ni.
+    uint leaves;           // Nodes on the last level.
+    uint boundary_leaves;  // Leaves with the boundary flag.
+    uint longest_leaf;     // Entries of the longest leaf.
+    uint pad;              // Unused.
+    uint sum[2];           // Sum of the estimates of Eq. 11, low word first.
+    uint total[22];        // Entries of `Aabb` on every level, low word first.
+    uint levels[11];       // NO: nodes on levels 0 to k.
+    uint overflow;         // Not 0: a capacity was exceeded; never happens with a planned one.
+};
+
+// What a picture needs besides mesh, tree and field; see src/render.
+struct RenderPlan {
+    vec4 origin;     // Origin of the ray of pixel (0, 0).
+    vec4 origin_x;   // What one pixel to the right adds to it.
+    vec4 origin_y;   // What one pixel down adds to it.
+    vec4 way;        // Direction of the ray of pixel (0, 0), of any length.
+    vec4 way_x;      // What one pixel to the right adds to it.
+    vec4 way_y;      // What one pixel down adds to it.
+    vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
+    vec4 to_light;   // Unit vector to the light.
+    vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
+    uint size[2];    // Width and height in pixels.
+    float step_size; // Distance of two samples.
+    float inverse_step; // Its reciprocal, rounded on the host.
+    float value_lo;  // Value at place 0 of the table.
+    float value_scale; // Places per unit of value.
+    float termination; // A ray ends once it is this opaque.
+    uint pad;        // Unused.
+};
+
+// Where the march of a ray stands between two dispatches.
+struct RayState {
+    vec4 color;     // Gathered colour, premultiplied, and opacity.
+    uint next;      // Number of the next sample.
+    uint end;       // One past the last sample.
+    uint hint;      // Cell of the last sample found, or all ones.
+    uint cursor;    // Entries of the leaf's list already searched for the next sample.
+    uint best;      // Best candidate among them, or all ones.
+    float smallest; // Its smallest barycentric coordinate.
+    uint in_box;    // Whether its box holds the sample.
+    uint pad;       // Unused.
+};
+
+// Counters of a picture, 64 bits each, low word first.
+struct RenderStatus {
+    uint samples[2]; // Samples taken.
+    uint found[2];   // Samples in the mesh.
+    uint unfinished; // Rays that need another dispatch.
+    uint pad;        // Unused.
+};
+
+// A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i.
+struct LbvhNode {
+    float lo[3];   // Lower corner of the box.
+    uint left;     // Left child: an internal node, or with the highest bit set a place in the sorted primitives.
+    float hi[3];   // Upper corner of the box.
+    uint right;    // Right child.
+};
+
+// A stack of layers of voxels over a mesh; see src/slicing.
+struct SlicePlan {
+    vec4 origin; // Centre of voxel (0, 0) of layer 0.
+    vec4 across; // From one voxel of a row to the next.
+    vec4 down;   // From one row to the next.
+    vec4 up;     // From one layer to the next.
+    vec4 half0;  // Half axis of a voxel's box in normalised coordinates, along the row.
+    vec4 half1;  // The same from row to row.
+    vec4 half2;  // The same from layer to layer.
+    vec4 reach;  // Half extent of a voxel's box along the axes in the units of the mesh, and a little more.
+    uint width;  // Voxels per row.
+    uint height; // Rows of a layer.
+    uint layers; // Layers.
+    uint pad;    // Unused.
+};
+
+// Where the search for the primitive closest to a voxel stands between two dispatches.
+struct TouchState {
+    uint code;    // Morton code of the leaf to go on with; all ones: done.
+    uint entry;   // Entries of that leaf already seen.
+    uint owner;   // Closest primitive so far, or all ones.
+    float square; // Its squared distance.
+};
+
+// Where the location of a run of voxels stands between two dispatches.
+struct RunState {
+    uint next;      // Number of the next voxel in the run.
+    uint hint;      // Cell of the last voxel found, or all ones.
+    uint cursor;    // Candidates of the current leaf already tested.
+    uint best;      // Best candidate so far, or all ones.
+    uint in_box;    // Whether the best one's box holds the centre.
+    float smallest; // Its smallest barycentric coordinate.
+    uint pad0;      // Unused.
+    uint pad1;      // Unused.
+};
+
+// Counters of a slice.
+struct SliceStatus {
+    uint unfinished; // Items that need another dispatch.
+    uint pad;        // Unused.
+};
+
+// The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.
+struct NodeFrame {
+    vec4 corner;    // Lower corner of the tree's bounds.
+    vec4 half_size; // Half the tree's bounds.
+    vec4 flat_axis; // 1 where an axis is flat to the quantization, else 0.
+    vec4 joint_lo;  // Lower corner of the joint grid in the units of the meshes.
+    float scale;    // Scale of the joint grid.
+    uint pad0;      // Unused.
+    uint pad1;      // Unused.
+    uint pad2;      // Unused.
+};
+
+// Counters of one direction of an overlap; 64 bits as two words, low first.
+struct OverlapStatus {
+    uint waiting;    // Primitives that need a search.
+    uint unfinished; // Primitives that need another dispatch.
+    uint by_vertex;  // Primitives with a vertex in the other mesh, or around one of its vertices.
+    uint by_node;    // Primitives that touch a non-boundary node of the other tree.
+    uint located;    // Vertices that had to be looked up in the list of a leaf.
+    uint pad;        // Unused.
+    uint narrow[2];  // Tests of two tetrahedra by separating axes.
+    uint pairs[2];   // Pairs that touch.
+};
+
+// Where the search of a primitive stands between two dispatches.
+struct SearchState {
+    uint code;  // Morton code of the leaf to go on with; all ones: done.
+    uint entry; // Entries of that leaf already seen.
+    uint phase; // 0: non-boundary nodes; 1: lists.
+    uint place; // Pairs found so far, or where the next one goes.
+};

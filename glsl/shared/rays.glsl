@@ -1,0 +1,33 @@
+// Rays of a picture. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs.
+
+// 1 / sqrt(x) of a normal x by correctly rounded operations only.
+float inverse_sqrt(float x) {
+    precise float r = uintBitsToFloat(0x5f3759dfu - (floatBitsToUint(x) >> 1));
+    precise float h = x * 0.5;
+    for (int i = 0; i < 4; ++i) {
+        precise float hr = h * r;
+        precise float hrr = hr * r;
+        precise float f = 1.5 - hrr;
+        r = r * f;
+    }
+    return r;
+}
+
+void make_ray(RenderPlan plan, uvec2 pixel, out vec3 origin, out vec3 direction) {
+    vec2 at = vec2(pixel);
+    precise vec3 o = (plan.origin.xyz + at.x * plan.origin_x.xyz) + at.y * plan.origin_y.xyz;
+    precise vec3 w = (plan.way.xyz + at.x * plan.way_x.xyz) + at.y * plan.way_y.xyz;
+    float r = inverse_sqrt(dot_product(w, w));
+    precise vec3 d = w * r;
+    origin = o;
+    direction = d;
+}
+
+// Pixels go to invocations in blocks of 8 × 8, within them along a Z curve: neighbouring rays read neighbouring cells.
+bool pixel_of(uint item, uvec2 size, out uvec2 pixel) {
+    uint across = (size.x + 7u) / 8u;
+    uint block = item / 64u, in_block = item % 64u;
+    uvec2 corner = 8u * uvec2(block % across, block / across);
+    pixel = corner + uvec2((in_block & 1u) | (in_block >> 1 & 2u) | (in_block >> 2 & 4u), (in_block >> 1 & 1u) | (in_block >> 2 & 2u) | (in_block >> 3 & 4u));
+    return pixel.x < size.x && pixel.y < size.y;
+}

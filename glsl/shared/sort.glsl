@@ -1,0 +1,7 @@
+// What the sort's kernels agree on: counts[digit * stride + tile], the stride odd so that tiles of one digit do not all fall
+// into the same cache set.
+layout(constant_id = 2) const uint DIGIT_BITS = 8;
+const uint DIGITS = 1u << DIGIT_BITS;
+
+uint sort_tiles(uint n, uint tile) { return n / tile + uint(n % tile != 0u); }
+uint sort_stride(uint tiles) { return tiles | 1u; }

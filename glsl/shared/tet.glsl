@@ -1,0 +1,91 @@
+// Orientation, containment, barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of src/reference/tet.rs: the
+// same operations in the same order.
+
+vec3 cross_product(vec3 a, vec3 b) {
+    precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+    return r;
+}
+
+float dot_product(vec3 a, vec3 b) {
+    precise float r = (a.x * b.x + a.y * b.y) + a.z * b.z;
+    return r;
+}
+
+// Six times the signed volume of (a, b, c, p).
+float orient(vec3 a, vec3 b, vec3 c, vec3 p) {
+    precise vec3 ab = b - a;
+    precise vec3 ac = c - a;
+    precise vec3 ap = p - a;
+    return dot_product(cross_product(ab, ac), ap);
+}
+
+// A tetrahedron with its vertices in ascending global index.
+struct Tet {
+    vec3 v[4];
+    uvec4 rank; // place in v of each vertex as the caller numbered them
+};
+
+// A point relative to a tetrahedron.
+struct Weights {
+    vec4 w;      // signed volumes opposite to the vertices in ascending index, positive inside
+    float sum;
+    bool in_box; // inside the closed box of the vertices
+    bool inside; // the closed, not flat cell holds the point
+    bool clear;  // by so much that rounding cannot put it into a neighbour as well
+};
+
+// Ascending places of four different vertex indices.
+uvec4 ranks(uvec4 ids) {
+    uint yx = uint(ids.y < ids.x), zx = uint(ids.z < ids.x), wx = uint(ids.w < ids.x);
+    uint zy = uint(ids.z < ids.y), wy = uint(ids.w < ids.y), wz = uint(ids.w < ids.z);
+    return uvec4(yx + zx + wx, (1u - yx) + zy + wy, (1u - zx) + (1u - zy) + wz, (1u - wx) + (1u - wy) + (1u - wz));
+}
+
+vec3 select_rank(uvec4 rank, uint r, vec3 a, vec3 b, vec3 c, vec3 d) {
+    return rank.x == r ? a : rank.y == r ? b : rank.z == r ? c : d;
+}
+
+// From corners in the caller's order.
+Tet make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
+    Tet t;
+    t.rank = ranks(ids);
+    for (uint r = 0u; r < 4u; ++r) t.v[r] = select_rank(t.rank, r, a, b, c, d);
+    return t;
+}
+
+float volume(Tet t) { return orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
+
+Weights weights(Tet t, vec3 p) {
+    float vol = volume(t);
+    float s = vol < 0.0 ? -1.0 : 1.0;
+    Weights r;
+    r.w = vec4(-s * orient(t.v[1], t.v[2], t.v[3], p), s * orient(t.v[0], t.v[2], t.v[3], p), -s * orient(t.v[0], t.v[1], t.v[3], p),
+               s * orient(t.v[0], t.v[1], t.v[2], p));
+    precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
+    r.sum = sum;
+    vec3 lo = min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
+    vec3 hi = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3]));
+    r.in_box = all(lessThanEqual(lo, p)) && all(lessThanEqual(p, hi));
+    float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
+    r.inside = r.in_box && vol != 0.0 && least >= 0.0;
+    precise vec3 size = hi - lo;
+    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    r.clear = r.inside && least > margin;
+    return r;
+}
+
+const float SMALLEST_FLOAT = -3.40282347e38;
+
+// Smallest barycentric coordinate; the smallest float for a flat cell.
+float smallest(Weights r) {
+    if (r.sum <= 0.0) return SMALLEST_FLOAT;
+    precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * reciprocal(r.sum);
+    return b;
+}
+
+// Barycentric coordinates in the caller's order of vertices.
+vec4 barycentric(Weights r, uvec4 rank) {
+    float k = r.sum <= 0.0 ? 0.0 : reciprocal(r.sum);
+    precise vec4 b = vec4(r.w[rank.x], r.w[rank.y], r.w[rank.z], r.w[rank.w]) * k;
+    return b;
+}

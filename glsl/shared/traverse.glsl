@@ -1,0 +1,63 @@
+// Traversal for predicates with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of src/reference/traverse.rs, which
+// explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
+//     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
+//     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+// STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+const uint MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
+
+// True if the traversal ended by itself, false at the loop limit.
+bool traverse(uint level) {
+    Node node = Node(0u, 0u, 0u);
+    if (!visit_node(node)) return true;
+    if (level == 0u) {
+        visit_leaf(node);
+        return true;
+    }
+    Node stack[STACK];
+    uint top = 0u, held = 0u; // ring: the oldest node is dropped where there is no room
+    uint trail = 0u, resume = 0u;
+    for (uint visits = 0u; visits < MAX_VISITS; ++visits) {
+        bool leaves = node.level + 1u == level;
+        uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
+        uint accepted = 0u, place = first; // bit per digit
+        for (uint digit = 0u; digit < 8u; ++digit) {
+            if ((mask >> digit & 1u) == 0u) continue;
+            Node child = Node(place++, node.level + 1u, node.code << 3 | digit);
+            if (!visit_node(child)) continue;
+            if (!leaves) accepted |= 1u << digit;
+            else if (visit_leaf(child)) return true;
+        }
+        uint n = bitCount(accepted);
+        if (n > 0u) {
+            uint shift = 3u * node.level;
+            if (node.level >= resume) trail |= (n - 1u) << shift;
+            uint left = min(trail >> shift & 7u, n - 1u);
+            // Siblings behind the next node, last first; then the next node itself.
+            Node parent = node;
+            for (uint k = 0u; k <= left; ++k) {
+                uint digit = uint(findMSB(accepted));
+                accepted ^= 1u << digit;
+                node = Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
+                if (k < left) {
+                    stack[top] = node;
+                    top = top + 1u == STACK ? 0u : top + 1u;
+                    held = min(held + 1u, STACK);
+                }
+            }
+            continue;
+        }
+        if (trail == 0u) return true;
+        uint at = uint(findMSB(trail)) / 3u;
+        trail -= 1u << (3u * at);
+        if (held > 0u) {
+            top = top == 0u ? STACK - 1u : top - 1u;
+            --held;
+            node = stack[top];
+            resume = 0u;
+        } else {
+            node = Node(0u, 0u, 0u);
+            resume = at + 1u;
+        }
+    }
+    return false;
+}

@@ -1,0 +1,37 @@
+// Scans and reductions over a workgroup, by subgroups of any size.
+shared uint subgroup_totals[128];
+
+// Sum of `v` over the invocations before this one; `total` over all. Called by the whole workgroup.
+uint workgroup_exclusive_add(uint v, out uint total) {
+    uint before = subgroupExclusiveAdd(v);
+    total = subgroupAdd(v);
+    if (gl_NumSubgroups > 1u) {
+        barrier();
+        if (subgroupElect()) subgroup_totals[gl_SubgroupID] = total;
+        barrier();
+        total = 0u;
+        for (uint s = 0u; s < gl_NumSubgroups; ++s) {
+            if (s == gl_SubgroupID) before += total;
+            total += subgroup_totals[s];
+        }
+    }
+    return before;
+}
+
+// Sum, smallest, largest of `v` over the workgroup.
+uint workgroup_add(uint v) {
+    uint total;
+    workgroup_exclusive_add(v, total);
+    return total;
+}
+
+uint workgroup_max(uint v) {
+    v = subgroupMax(v);
+    if (gl_NumSubgroups > 1u) {
+        barrier();
+        if (subgroupElect()) subgroup_totals[gl_SubgroupID] = v;
+        barrier();
+        for (uint s = 0u; s < gl_NumSubgroups; ++s) v = max(v, subgroup_totals[s]);
+    }
+    return v;
+}

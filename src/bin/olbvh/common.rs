@@ -1,0 +1,100 @@
+//! Arguments that every subcommand has, and how a failure becomes an exit code.
+
+use olbvh::error::Error;
+use std::process::ExitCode;
+
+/// Arguments that every subcommand has.
+#[derive(clap::Args)]
+pub struct Common {
+    /// Print one JSON object on standard output instead of text.
+    #[arg(long, global = true)]
+    pub json: bool,
+    /// Where to compute: part of a device's name or its number (see `olbvh devices`), or `cpu` for the reference implementation, which needs no
+    /// Vulkan and is slower.
+    #[arg(long, global = true, value_name = "NAME|INDEX|cpu")]
+    pub device: Option<String>,
+    /// No progress and no remarks, errors only.
+    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    pub quiet: bool,
+    /// Tell what is being done.
+    #[arg(long, short, global = true)]
+    pub verbose: bool,
+}
+
+impl Common {
+    /// Sends the library's log to standard error.
+    pub fn start_log(&self) {
+        let level = match (self.quiet, self.verbose) {
+            (true, _) => log::LevelFilter::Error,
+            (_, true) => log::LevelFilter::Debug,
+            _ => log::LevelFilter::Warn,
+        };
+        env_logger::Builder::new().filter_level(level).format_timestamp(None).init();
+    }
+
+    /// A remark on standard error, unless `--quiet`.
+    pub fn remark(&self, message: impl std::fmt::Display) {
+        if !self.quiet {
+            output_line(&format!("{message}"));
+        }
+    }
+}
+
+/// A line on standard error; a closed one is no reason to fail.
+fn output_line(line: &str) {
+    use std::io::Write as _;
+    let _ = writeln!(std::io::stderr(), "{line}");
+}
+
+/// Why the program ends, by its exit code.
+#[derive(Debug)]
+pub enum Failure {
+    /// 1: anything else.
+    Failed(String),
+    /// 2: the arguments make no sense.
+    Usage(String),
+    /// 3: an input file is not what it should be.
+    Input(String),
+    /// 4: no device.
+    Device(String),
+    /// 0: whoever reads standard output has had enough.
+    Closed,
+}
+
+impl From<Error> for Failure {
+    fn from(error: Error) -> Self {
+        let message = error.to_string();
+        match error {
+            Error::Invalid(_) => Self::Usage(message),
+            Error::File { .. } | Error::BadCells { .. } => Self::Input(message),
+            Error::NoVulkan(_) | Error::NoDevice(_) | Error::SelfTest { .. } => Self::Device(message),
+            _ => Self::Failed(message),
+        }
+    }
+}
+
+impl Failure {
+    /// An error while an input file was read.
+    pub fn input(error: Error) -> Self {
+        match error {
+            Error::Io { .. } | Error::TooLarge(_) => Self::Input(error.to_string()),
+            other => other.into(),
+        }
+    }
+
+    /// Says why on standard error and gives the exit code.
+    pub fn report(self) -> ExitCode {
+        let (code, message) = match self {
+            Self::Closed => return ExitCode::SUCCESS,
+            Self::Failed(message) => (1, message),
+            Self::Usage(message) => (2, message),
+            Self::Input(message) => (3, message),
+            Self::Device(message) => (4, message),
+        };
+        output_line(&format!("olbvh: error: {message}"));
+        ExitCode::from(code)
+    }
+}
+
+/// Result of a subcommand.
+pub type Outcome<T = ()> = Result<T, Failure>;

@@ -1,0 +1,184 @@
+//! `olbvh conformance`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::output::{self, Progress};
+use olbvh::conformance::{Case, Lab, Outcome as Ending, Report, cases};
+use olbvh::gpu::{Binding, GpuOptions};
+use serde_json::{Value, json};
+use std::fmt::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Compare a device, kernel by kernel, with the reference implementation.
+///
+/// Every primitive, every stage of the construction and every query is run on inputs that the program makes itself, and compared word by word
+/// with the same computation on the processor. A case that fails names the kernel or stage, the array, the first index that differs, what was
+/// expected and what was found.
+#[derive(clap::Args)]
+#[command(after_help = "Examples:
+  olbvh conformance --filter quick                   under two minutes on a software device
+  olbvh conformance --filter sort/21-bits            the cases whose name contains that
+  olbvh conformance --filter large                   buffers past 2^26 words, which no other filter includes
+  olbvh conformance --device 1 --junit report.xml    all but the large ones on device 1, with a report for CI
+
+Exit codes: 0 all passed, 1 a case failed, 2 wrong usage, 4 no suitable device.")]
+pub struct Args {
+    /// List the cases and run none.
+    #[arg(long)]
+    list: bool,
+    /// Cases whose name contains this; or a group: quick, full (all but large), large.
+    #[arg(long, value_name = "S")]
+    filter: Option<String>,
+    /// How kernels get their buffers; both where the device can.
+    #[arg(long, value_enum, default_value_t = Bindings::Both)]
+    binding: Bindings,
+    /// Write a `JUnit` report to this file as well.
+    #[arg(long, value_name = "FILE")]
+    junit: Option<PathBuf>,
+}
+
+/// Bindings to run.
+#[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
+enum Bindings {
+    /// Every case by address and by descriptors.
+    Both,
+    /// By address only.
+    Address,
+    /// By descriptors only.
+    Descriptors,
+}
+
+fn name(binding: Binding) -> &'static str {
+    match binding {
+        Binding::Address => "address",
+        Binding::Descriptors => "descriptors",
+    }
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    let chosen: Vec<Case> = cases().into_iter().filter(|c| c.matches(args.filter.as_deref())).collect();
+    if chosen.is_empty() {
+        let filter = args.filter.as_deref().unwrap_or_default();
+        return Err(Failure::Usage(format!("no case is called `{filter}`; `olbvh conformance --list` names them all")));
+    }
+    if args.list {
+        let list: Vec<_> = chosen.iter().map(|c| json!({ "name": c.name, "group": c.group.name() })).collect();
+        let lines = chosen.iter().fold(String::new(), |lines, c| format!("{lines}{:<6} {}\n", c.group.name(), c.name));
+        return output::result(common, &json!({ "cases": list }), &lines);
+    }
+    if common.device.as_deref().is_some_and(|d| d.eq_ignore_ascii_case("cpu")) {
+        return Err(Failure::Usage("the cases compare a Vulkan device with `cpu`; name another device".into()));
+    }
+    let (device, runs) = run_cases(args, common, &chosen)?;
+    finish(args, common, &device, &runs)
+}
+
+/// Runs the cases by each binding.
+fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, Vec<(Binding, Report)>)> {
+    let mut bindings = match args.binding {
+        Bindings::Both => vec![Binding::Address, Binding::Descriptors],
+        Bindings::Address => vec![Binding::Address],
+        Bindings::Descriptors => vec![Binding::Descriptors],
+    };
+    let lab = |binding| Lab::new(&GpuOptions { device: common.device.clone(), binding: Some(binding), ..GpuOptions::default() });
+    let mut runs = Vec::new();
+    let mut device = Value::Null;
+    let progress = Progress::new(common, "cases");
+    if args.binding == Bindings::Both {
+        // The device's own choice tells whether it has addresses.
+        let any = Lab::new(&GpuOptions { device: common.device.clone(), ..GpuOptions::default() })?;
+        if any.device().binding() == Binding::Descriptors {
+            common.remark("The device has no buffer addresses: cases run by descriptors only.");
+            bindings.remove(0);
+        }
+    }
+    let total = (bindings.len() * chosen.len()) as u64;
+    for binding in bindings {
+        let mut lab = lab(binding)?;
+        let report = lab.device().report().clone();
+        device = json!({
+            "name": report.name, "driver": report.driver, "api": report.api, "subgroup": report.subgroup, "kind": report.kind,
+        });
+        for case in chosen {
+            if common.verbose {
+                // Before it runs: a driver that crashes takes the program with it.
+                common.remark(format!("running {} ({})", case.name, name(binding)));
+            }
+            runs.push((binding, lab.run(case)));
+            progress.set(runs.len() as u64, total);
+        }
+    }
+    Ok((device, runs))
+}
+
+/// Reports, and fails if a case has failed.
+fn finish(args: &Args, common: &Common, device: &Value, runs: &[(Binding, Report)]) -> Outcome {
+    let count = |wanted: fn(&Ending) -> bool| runs.iter().filter(|r| wanted(&r.1.outcome)).count();
+    let passed = count(|o| matches!(o, Ending::Passed));
+    let failed = count(|o| matches!(o, Ending::Failed(_)));
+    let skipped = runs.len() - passed - failed;
+    let time: Duration = runs.iter().map(|r| r.1.time).sum();
+    if let Some(file) = &args.junit {
+        write_junit(file, runs)?;
+    }
+    let mut lines = String::new();
+    for (binding, report) in runs {
+        let _ = match &report.outcome {
+            Ending::Failed(failure) => writeln!(lines, "FAILED  {} ({})\n        {failure}", report.name, name(*binding)),
+            Ending::Skipped(why) => writeln!(lines, "skipped {} ({}): {why}", report.name, name(*binding)),
+            Ending::Passed if common.verbose => {
+                writeln!(lines, "passed  {} ({}), {} ms", report.name, name(*binding), report.time.as_millis())
+            }
+            Ending::Passed => Ok(()),
+        };
+    }
+    let _ = writeln!(lines, "{}", device["name"].as_str().unwrap_or_default());
+    let _ = writeln!(lines, "{passed} passed, {failed} failed, {skipped} skipped in {:.1} s", time.as_secs_f64());
+    let json = json!({
+        "device": device, "passed": passed, "failed": failed, "skipped": skipped, "seconds": time.as_secs_f64(),
+        "cases": runs.iter().map(entry).collect::<Vec<_>>(),
+    });
+    output::result(common, &json, &lines)?;
+    if failed > 0 { Err(Failure::Failed(format!("{failed} of {} cases failed", runs.len()))) } else { Ok(()) }
+}
+
+fn entry((binding, report): &(Binding, Report)) -> Value {
+    let mut entry = json!({ "name": report.name, "binding": name(*binding), "seconds": report.time.as_secs_f64() });
+    match &report.outcome {
+        Ending::Passed => entry["outcome"] = "passed".into(),
+        Ending::Skipped(why) => {
+            entry["outcome"] = "skipped".into();
+            entry["reason"] = why.as_str().into();
+        }
+        Ending::Failed(f) => {
+            entry["outcome"] = "failed".into();
+            entry["stage"] = f.stage.as_str().into();
+            entry["array"] = f.array.as_str().into();
+            entry["index"] = f.index.into();
+            entry["expected"] = f.expected.as_str().into();
+            entry["found"] = f.found.as_str().into();
+        }
+    }
+    entry
+}
+
+/// Writes the report that CI systems read.
+fn write_junit(file: &Path, runs: &[(Binding, Report)]) -> Outcome {
+    let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
+    let failures = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Failed(_))).count();
+    let skipped = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Skipped(_))).count();
+    let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
+    let _ = writeln!(text, "<testsuite name=\"olbvh conformance\" tests=\"{}\" failures=\"{failures}\" skipped=\"{skipped}\">", runs.len());
+    for (binding, report) in runs {
+        let (case, seconds) = (escape(&report.name), report.time.as_secs_f64());
+        let _ = write!(text, "  <testcase classname=\"{}\" name=\"{case}\" time=\"{seconds:.3}\"", name(*binding));
+        let _ = match &report.outcome {
+            Ending::Passed => writeln!(text, "/>"),
+            Ending::Failed(f) => writeln!(text, "><failure message=\"{}\"/></testcase>", escape(&f.to_string())),
+            Ending::Skipped(why) => writeln!(text, "><skipped message=\"{}\"/></testcase>", escape(why)),
+        };
+    }
+    text.push_str("</testsuite>\n");
+    std::fs::write(file, text).map_err(|e| Failure::Failed(format!("{}: {e}", file.display())))
+}

@@ -1,0 +1,52 @@
+//! `olbvh devices`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::{output, text};
+use olbvh::error::Error;
+use olbvh::gpu::list_devices;
+use serde_json::json;
+use std::fmt::Write as _;
+
+/// List every Vulkan device, whether it can be used, and if not, what it lacks.
+#[derive(clap::Args)]
+#[command(
+    after_help = "Example:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1"
+)]
+pub struct Args {}
+
+/// Runs it.
+pub fn run(_: &Args, common: &Common) -> Outcome {
+    let devices = match list_devices() {
+        Ok(devices) => devices,
+        // No loader is no failure of a listing: there are no devices, and why is said.
+        Err(error @ Error::NoVulkan(_)) => {
+            common.remark(&error);
+            Vec::new()
+        }
+        Err(error) => return Err(Failure::from(error)),
+    };
+    let mut lines = String::new();
+    for (i, d) in devices.iter().enumerate() {
+        let missing = &d.requirements.missing;
+        let verdict = if missing.is_empty() { "qualifies".to_owned() } else { format!("cannot be used; it lacks {}", missing.join(", ")) };
+        let _ = writeln!(
+            lines,
+            "{i:>3}  {}\n     {}; Vulkan {}; subgroups of {}; {} of memory; {}\n     {verdict}",
+            d.name,
+            d.driver,
+            d.api,
+            d.subgroup,
+            text::bytes(d.memory),
+            d.kind
+        );
+    }
+    lines.push_str("cpu  the reference implementation on the processor, always there\n");
+    let entry = |(i, d): (usize, &olbvh::gpu::DeviceReport)| {
+        json!({
+            "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
+            "qualifies": d.requirements.missing.is_empty(), "missing": d.requirements.missing,
+        })
+    };
+    let json = json!({ "devices": devices.iter().enumerate().map(entry).collect::<Vec<_>>() });
+    output::result(common, &json, &lines)
+}

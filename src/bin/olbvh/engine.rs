@@ -1,0 +1,113 @@
+//! The seam between the subcommands and what computes: build a tree, locate points, draw.
+
+mod cpu;
+mod gpu;
+
+use crate::common::Outcome;
+use olbvh::error::Result;
+use olbvh::mesh::{Field, Mesh};
+use olbvh::options::BuildOptions;
+use olbvh::reference::boundary::{Counts, Fault};
+use olbvh::reference::overlap::Overlap;
+use olbvh::reference::volume::Picture;
+use olbvh::render::{Bounds, RenderSettings};
+use olbvh::slicing::{Band, Extrapolate, VoxelGrid};
+use olbvh::tree::Memory;
+
+/// So much of so much is done.
+pub type Report<'a> = &'a (dyn Fn(u64, u64) + Sync);
+
+/// Takes the bands of a stack of slices.
+pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;
+
+/// Where two meshes overlap, and how long that took.
+pub struct Overlapped {
+    /// What intersects what.
+    pub overlap: Overlap,
+    /// Seconds for both trees.
+    pub build_seconds: f64,
+    /// Seconds for the overlap.
+    pub seconds: f64,
+}
+
+/// Something that builds trees.
+pub trait Engine {
+    /// What it is called in results.
+    fn name(&self) -> String;
+    /// Marks the boundary and builds the tree.
+    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>>;
+    /// Builds a tree over each of two meshes and finds out where they overlap.
+    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped>;
+}
+
+/// A mesh with its tree.
+pub trait Built {
+    /// What they are like.
+    fn summary(&self) -> &Summary;
+    /// Owner, barycentric coordinates and value of each point (mesh coordinates).
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>>;
+    /// Every tetrahedron that contains each point.
+    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>>;
+    /// Draws a field.
+    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn>;
+    /// Slices the mesh, band by band into `sink`.
+    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()>;
+}
+
+/// A picture and what was found out for it.
+pub struct Drawn {
+    /// The picture.
+    pub picture: Picture,
+    /// The field's values at the ends of the transfer function.
+    pub range: [f32; 2],
+    /// Distance of two samples.
+    pub step: f32,
+}
+
+/// Where a point lies.
+#[derive(Clone, Copy, Debug)]
+pub struct Located {
+    /// Tetrahedron of the mesh, or `u32::MAX`.
+    pub owner: u32,
+    /// Barycentric coordinates in it, 0 outside the mesh.
+    pub bary: [f32; 4],
+    /// The field's value, NaN outside the mesh or without field.
+    pub value: f32,
+}
+
+/// A mesh and its tree in figures.
+#[derive(Clone, Debug)]
+pub struct Summary {
+    /// Cells by kind.
+    pub counts: Counts,
+    /// Bad cells, as tetrahedra of the mesh.
+    pub bad: Vec<(u32, Fault)>,
+    /// Bounds of the valid cells, relative to the mesh's origin.
+    pub bounds: Bounds,
+    /// Level of the leaves.
+    pub level: u32,
+    /// Entries.
+    pub entries: u64,
+    /// Nodes.
+    pub nodes: u64,
+    /// Leaves.
+    pub leaves: u64,
+    /// Bytes of each array.
+    pub memory: Memory,
+    /// Bytes as the paper counts them.
+    pub paper_bytes: u64,
+    /// Milliseconds for neighbours and boundary.
+    pub topology_ms: f64,
+    /// Milliseconds for the tree.
+    pub build_ms: f64,
+    /// Milliseconds of each stage, in order; empty where stages are not timed.
+    pub stages: Vec<(String, f64)>,
+}
+
+/// The engine that `--device` names: the best Vulkan device without one.
+pub fn open(device: Option<&str>) -> Outcome<Box<dyn Engine>> {
+    match device {
+        Some(name) if name.eq_ignore_ascii_case("cpu") => Ok(Box::new(cpu::Cpu)),
+        name => Ok(Box::new(gpu::Device::open(name)?)),
+    }
+}

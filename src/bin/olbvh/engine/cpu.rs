@@ -1,0 +1,122 @@
+//! The reference implementation as an engine.
+
+use super::{Built, Drawn, Engine, Located, Overlapped, Report, Sink, Summary};
+use olbvh::error::Result;
+use olbvh::mesh::{Field, Mesh};
+use olbvh::options::BuildOptions;
+use olbvh::reference::boundary::{Topology, topology};
+use olbvh::reference::locate::Locator;
+use olbvh::reference::overlap::{Side, overlap};
+use olbvh::reference::slice::Slicer;
+use olbvh::reference::volume::{self, Scene};
+use olbvh::render::{Bounds, RenderSettings};
+use olbvh::slicing::{Extrapolate, VoxelGrid, bands};
+use olbvh::tree::TreeArrays;
+use rayon::prelude::*;
+use std::time::Instant;
+
+/// The processor.
+pub struct Cpu;
+
+/// Tree and topology in host memory.
+struct CpuTree<'a> {
+    mesh: &'a Mesh,
+    topology: Topology,
+    tree: TreeArrays,
+    summary: Summary,
+}
+
+impl Engine for Cpu {
+    fn name(&self) -> String {
+        "cpu".into()
+    }
+
+    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
+        let start = Instant::now();
+        let topology = topology(mesh)?;
+        let topology_ms = start.elapsed().as_secs_f64() * 1e3;
+        let start = Instant::now();
+        let tree = olbvh::reference::build::build(mesh, &topology, options)?;
+        let build_ms = start.elapsed().as_secs_f64() * 1e3;
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let summary = Summary {
+            counts: topology.counts,
+            bad: topology.bad.clone(),
+            bounds: Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) },
+            level: tree.grid.level,
+            entries: tree.p.len() as u64,
+            nodes: u64::from(tree.nodes()),
+            leaves: tree.leaves().len() as u64,
+            memory: tree.memory(),
+            paper_bytes: tree.paper_bytes(),
+            topology_ms,
+            build_ms,
+            stages: Vec::new(),
+        };
+        Ok(Box::new(CpuTree { mesh, topology, tree, summary }))
+    }
+
+    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped> {
+        let start = Instant::now();
+        let (topology_a, topology_b) = (topology(a)?, topology(b)?);
+        let build = olbvh::reference::build::build;
+        let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
+        let build_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
+        let overlap = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, pairs);
+        report(1, 1);
+        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64() })
+    }
+}
+
+impl Built for CpuTree<'_> {
+    fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>> {
+        let locator = Locator::new(self.mesh, &self.tree).with_tolerance(tolerance);
+        let one = |p: [f32; 3]| {
+            let location = locator.locate(p);
+            let value = field.map_or(f32::NAN, |field| locator.value(field, &location));
+            Located { owner: location.owner, bary: location.barycentric, value }
+        };
+        Ok(each(points, one, report))
+    }
+
+    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {
+        let locator = Locator::new(self.mesh, &self.tree).with_tolerance(tolerance);
+        Ok(each(points, |p| locator.owners(p), report))
+    }
+
+    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {
+        let scene = Scene::new(self.mesh, &self.topology, &self.tree, field, settings)?;
+        let picture = volume::render(&scene, report);
+        Ok(Drawn { picture, range: scene.range(), step: scene.plan().step })
+    }
+
+    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()> {
+        let slicer = Slicer::new(self.mesh, &self.topology, &self.tree, field, *voxels, extrapolate)?;
+        let mut done = 0;
+        for rows in bands(voxels, CHUNK as u64) {
+            sink(slicer.band(rows))?;
+            done += u64::from(rows.count) * u64::from(voxels.size[0]);
+            report(done, voxels.voxels());
+        }
+        Ok(())
+    }
+}
+
+/// Points between two reports.
+const CHUNK: usize = 1 << 16;
+
+/// The answers for all points, in parallel, chunk by chunk.
+fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: Report<'_>) -> Vec<T> {
+    let mut all = Vec::with_capacity(points.len());
+    for chunk in points.chunks(CHUNK) {
+        all.par_extend(chunk.par_iter().map(|&p| one(p)));
+        report(all.len() as u64, points.len() as u64);
+    }
+    all
+}

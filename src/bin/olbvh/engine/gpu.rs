@@ -1,0 +1,135 @@
+//! A Vulkan device as an engine.
+
+use super::{Built, Drawn, Engine, Located, Overlapped, Report, Sink, Summary};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::error::Result;
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::mesh::{Field, Mesh};
+use olbvh::options::BuildOptions;
+use olbvh::query::{self, LocateOptions, Party};
+use olbvh::reference::boundary::{Counts, fault_of};
+use olbvh::reference::volume::Picture;
+use olbvh::render::{Bounds, Prepared, RenderSettings};
+use olbvh::slicing::{Extrapolate, VoxelGrid};
+use olbvh::tree::Memory;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// An opened device.
+pub struct Device(Gpu);
+
+impl Device {
+    /// Opens the device that `name` (part of a name, or an index) means, or the best one. Pipelines are kept in the user's cache folder.
+    pub fn open(name: Option<&str>) -> Result<Self> {
+        let options = GpuOptions { device: name.map(Into::into), pipeline_cache: cache_file(), ..GpuOptions::default() };
+        Ok(Self(Gpu::new(&options)?))
+    }
+}
+
+/// Where compiled pipelines are kept.
+fn cache_file() -> Option<PathBuf> {
+    let folder =
+        std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache")))?;
+    Some(folder.join("olbvh").join(concat!("pipelines-", env!("CARGO_PKG_VERSION"), ".bin")))
+}
+
+/// A mesh and its tree in device memory.
+struct DeviceTree<'a> {
+    mesh: &'a Mesh,
+    device: DeviceMesh,
+    tree: Tree,
+    summary: Summary,
+}
+
+impl Engine for Device {
+    fn name(&self) -> String {
+        self.0.report().name.clone()
+    }
+
+    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
+        let device = DeviceMesh::upload(&self.0, mesh, BadCells::Skip)?;
+        let tree = Tree::build(&self.0, &device, options)?;
+        let (cells, built) = (device.status(), tree.status());
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let (nodes, internal) = (u64::from(built.nodes), u64::from(built.internal));
+        let memory = Memory {
+            p: 4 * u64::from(built.entries),
+            po: 4 * (nodes + 1),
+            co: 4 * (internal + 1),
+            no: 4 * (u64::from(built.level) + 1),
+            boundary: 4 * nodes.div_ceil(32),
+            mask: 4 * internal.div_ceil(4),
+            boxes: if options.boxes { 24 * nodes } else { 0 },
+        };
+        let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
+        let summary = Summary {
+            counts: Counts {
+                cells: device.input().tets,
+                bad: cells.bad,
+                boundary: cells.boundary,
+                negative: cells.negative,
+                flat: cells.zero_volume,
+            },
+            bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
+            bounds: Bounds { lo: corner(tree.grid().lo), hi: corner(tree.grid().hi) },
+            level: built.level,
+            entries: u64::from(built.entries),
+            nodes,
+            leaves: u64::from(built.leaves),
+            memory,
+            paper_bytes: 4 * u64::from(built.entries) + 25 * nodes + 4 * internal,
+            topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
+            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
+            stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
+        };
+        Ok(Box::new(DeviceTree { mesh, device, tree, summary }))
+    }
+
+    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped> {
+        let start = Instant::now();
+        let (mesh_a, mesh_b) = (DeviceMesh::upload(&self.0, a, BadCells::Skip)?, DeviceMesh::upload(&self.0, b, BadCells::Skip)?);
+        let (tree_a, tree_b) = (Tree::build(&self.0, &mesh_a, options)?, Tree::build(&self.0, &mesh_b, options)?);
+        let build_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let parties = [Party { mesh: &mesh_a, tree: &tree_a }, Party { mesh: &mesh_b, tree: &tree_b }];
+        let overlap = query::overlap(parties[0], parties[1], pairs, report)?.overlap;
+        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64() })
+    }
+}
+
+impl Built for DeviceTree<'_> {
+    fn summary(&self) -> &Summary {
+        &self.summary
+    }
+
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>> {
+        let options = LocateOptions { tolerance, ..LocateOptions::default() };
+        let values = field.map(|f| (f.values.as_slice(), f.on));
+        let found = query::locate(&self.device, &self.tree, points, values, &options, report)?;
+        let value = |i: usize| found.values.get(i).copied().unwrap_or(f32::NAN);
+        let located = found.owners.iter().zip(&found.barycentrics).enumerate();
+        Ok(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect())
+    }
+
+    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {
+        query::locate_all(&self.device, &self.tree, points, &LocateOptions { tolerance, ..LocateOptions::default() }, report)
+    }
+
+    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {
+        let neighbours = self.device.neighbours()?;
+        let valid = |tet: usize| self.summary.bad.binary_search_by_key(&(tet as u32), |b| b.0).is_err();
+        let Prepared { plan, normals, range, .. } = Prepared::new(settings, self.mesh, &self.summary.bounds, &neighbours, valid, field)?;
+        let normals = (!normals.is_empty()).then_some(normals.as_slice());
+        let drawn = query::render(&self.device, &self.tree, &plan, (&field.values, field.on), normals, report)?;
+        let [width, height] = plan.size;
+        let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
+        let pixels = rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
+        let query::Drawn { samples, found_samples, interval_ms, march_ms, .. } = drawn;
+        Ok(Drawn { picture: Picture { pixels, samples, found_samples, interval_ms, march_ms }, range, step: plan.step })
+    }
+
+    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()> {
+        let field = field.map(|f| (f.values.as_slice(), f.on));
+        query::slice(&self.device, &self.tree, field, voxels, extrapolate, report, sink).map(|_| ())
+    }
+}

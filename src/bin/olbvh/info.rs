@@ -1,0 +1,160 @@
+//! `olbvh info`.
+
+use crate::common::{Common, Outcome};
+use crate::engine::{self, Summary};
+use crate::input::{self, TreeArgs};
+use crate::output;
+use crate::text::{Page, bytes, grouped, joined, milliseconds};
+use olbvh::formats::{Fate, Loaded};
+use olbvh::mesh::{Mesh, On};
+use serde_json::{Value, json};
+use std::path::PathBuf;
+
+/// Show what is in a mesh, and build its tree and show what that is like.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh info bracket.vtu
+  olbvh info bracket.vtu --alpha 1 --assign planes
+  olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
+
+Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no
+volume, or overlap a neighbour. Negative cells have their vertices in the other order, which does no harm.")]
+pub struct Args {
+    /// Mesh file, or kuhn:NX,NY,NZ.
+    mesh: PathBuf,
+    #[command(flatten)]
+    tree: TreeArgs,
+    /// List every bad cell and why it is one.
+    #[arg(long)]
+    bad_cells: bool,
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    let options = args.tree.options(true)?;
+    let engine = engine::open(common.device.as_deref())?;
+    let loaded = input::mesh(&args.mesh, common)?;
+    let built = engine.build(&loaded.mesh, &options)?;
+    let summary = built.summary();
+    let json = json(args, &engine.name(), &loaded, summary);
+    output::result(common, &json, &page(args, &engine.name(), &loaded, summary, common.verbose).to_string())
+}
+
+/// Lower and upper corner in the coordinates of the source.
+fn bounds(mesh: &Mesh, summary: &Summary) -> [[f64; 3]; 2] {
+    [summary.bounds.lo, summary.bounds.hi].map(|corner| [0, 1, 2].map(|c| mesh.origin[c] + f64::from(corner[c])))
+}
+
+fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
+    let mesh = &loaded.mesh;
+    let [lo, hi] = bounds(mesh, s);
+    let field = |f: &olbvh::mesh::Field| {
+        let on = if f.on == On::Points { "points" } else { "cells" };
+        json!({ "name": f.name, "on": on, "min": f.range().map(|r| r[0]), "max": f.range().map(|r| r[1]) })
+    };
+    let mut arrays: serde_json::Map<String, Value> = s.memory.arrays().into_iter().map(|(name, n)| (name.to_owned(), n.into())).collect();
+    arrays.insert("total".into(), s.memory.total().into());
+    let mut all = json!({
+        "file": args.mesh.display().to_string(),
+        "format": loaded.report.format,
+        "cells": mesh.tets.len(),
+        "source_cells": mesh.source_cells,
+        "cell_types": loaded.report.cells,
+        "points": mesh.points.len(),
+        "bad_cells": s.counts.bad,
+        "boundary_cells": s.counts.boundary,
+        "negative_cells": s.counts.negative,
+        "flat_cells": s.counts.flat,
+        "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
+        "bounds": { "min": lo, "max": hi },
+        "warnings": loaded.report.warnings,
+        "device": device,
+        "load_ms": loaded.report.seconds * 1e3,
+        "topology_ms": s.topology_ms,
+        "tree": {
+            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
+            "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
+            "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
+        },
+    });
+    if args.bad_cells {
+        let entry =
+            |(tet, fault): &(u32, olbvh::reference::boundary::Fault)| json!({ "cell": mesh.cell_id(*tet), "reason": fault.to_string() });
+        all["bad_cell_list"] = s.bad.iter().map(entry).collect();
+    }
+    all
+}
+
+fn page(args: &Args, device: &str, loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
+    let (mesh, report) = (&loaded.mesh, &loaded.report);
+    let mut page = Page::default();
+    page.section(&format!("Mesh {}", args.mesh.display()));
+    page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
+    page.row("points", grouped(mesh.points.len() as u64));
+    page.row("tetrahedra", grouped(mesh.tets.len() as u64));
+    for cells in &report.cells {
+        let fate = match cells.fate {
+            Fate::Kept => continue,
+            Fate::Straightened => "taken by their corners".into(),
+            Fate::Split => format!("split into {} tetrahedra", grouped(cells.tetrahedra)),
+            Fate::Boundary => "left out, no volume".into(),
+            Fate::Ghost => "left out, ghost copies".into(),
+            Fate::Unsupported => "NOT READ: the mesh has holes there".into(),
+        };
+        page.row(&cells.name, format_args!("{}, {fate}", grouped(cells.count)));
+    }
+    let counts = &s.counts;
+    page.row(
+        "bad cells",
+        format_args!(
+            "{}{}",
+            grouped(counts.bad),
+            if counts.bad > 0 && !args.bad_cells { ", left out (--bad-cells lists them)" } else { "" }
+        ),
+    );
+    page.row("boundary cells", grouped(counts.boundary));
+    page.row("negative cells", grouped(counts.negative));
+    page.row("flat cells", grouped(counts.flat));
+    let [lo, hi] = bounds(mesh, s);
+    page.row("bounds", format_args!("({}) to ({})", joined(&lo, ", "), joined(&hi, ", ")));
+    page.row("extent", joined(&[0, 1, 2].map(|c| s.bounds.hi[c] - s.bounds.lo[c]), " × "));
+    page.section(if mesh.fields.is_empty() { "No fields" } else { "Fields" });
+    for f in &mesh.fields {
+        let range = f.range().map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
+        page.row(&f.name, format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
+    }
+    page.section(&format!("Tree (alpha {}, {}), built in {} on {device}", args.tree.alpha, args.tree.assign, milliseconds(s.build_ms)));
+    page.row("level of the leaves, l", s.level);
+    page.row("entries, n_m", grouped(s.entries));
+    page.row("nodes, n_n", grouped(s.nodes));
+    page.row("leaves", grouped(s.leaves));
+    for (name, n) in s.memory.arrays() {
+        let what = match name {
+            "P" => "primitive ids",
+            "PO" => "primitive offsets",
+            "BV" => "boxes",
+            "CO" => "child offsets",
+            "NO" => "level offsets",
+            "BF" => "boundary flags",
+            "mask" => "child masks",
+            _ => "",
+        };
+        page.row(format_args!("{name:4} {what}"), bytes(n));
+    }
+    page.row("total", bytes(s.memory.total()));
+    page.row("as the paper counts", format_args!("{} (4 n_m + 25 n_n + 4 n_ni, without PO)", bytes(s.paper_bytes)));
+    page.row("neighbours, boundary", format_args!("found in {}", milliseconds(s.topology_ms)));
+    if verbose {
+        for (name, ms) in &s.stages {
+            page.row(format_args!("  {name}"), milliseconds(*ms));
+        }
+    }
+    if args.bad_cells && !s.bad.is_empty() {
+        page.section("Bad cells");
+        for (tet, fault) in &s.bad {
+            page.row(format_args!("cell {}", mesh.cell_id(*tet)), fault);
+        }
+    }
+    page
+}

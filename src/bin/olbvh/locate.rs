@@ -1,0 +1,136 @@
+//! `olbvh locate`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::engine::{self, Built};
+use crate::input::{self, TreeArgs};
+use crate::output::{self, Progress};
+use crate::text::{grouped, milliseconds};
+use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
+use olbvh::mesh::Mesh;
+use serde_json::json;
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Find the cell that each point lies in, and the value of a field there.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh locate bracket.vtu points.csv -o values.csv
+  olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
+  olbvh locate bracket.vtu points.csv -o cells.csv --all      every cell, for points on faces, edges and vertices
+
+Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it; ids count the cells of
+the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order.
+A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json.
+With --all the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
+pub struct Args {
+    /// Mesh file, or kuhn:NX,NY,NZ.
+    mesh: PathBuf,
+    /// Points: .npy (n×3) or .csv (x,y,z).
+    points: PathBuf,
+    /// Where the result goes; the ending says how: .npy, .npz, .csv, .vtu, .json.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Field to interpolate; by default the first field of points.
+    #[arg(long)]
+    field: Option<String>,
+    /// Every cell that contains a point, not just its owner.
+    #[arg(long, conflicts_with = "field")]
+    all: bool,
+    /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
+    #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T")]
+    tolerance: f32,
+    #[command(flatten)]
+    tree: TreeArgs,
+}
+
+/// What is said in the end.
+struct Done {
+    found: usize,
+    seconds: f64,
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    if !(0.0..=1.0).contains(&args.tolerance) {
+        return Err(Failure::Usage(format!("a tolerance of {}; it lies between 0 and 1", args.tolerance)));
+    }
+    let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
+    let format = output::announce(&args.output, formats)?;
+    let options = args.tree.options(false)?;
+    let engine = engine::open(common.device.as_deref())?;
+    let loaded = input::mesh(&args.mesh, common)?;
+    let mesh = &loaded.mesh;
+    let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
+    let points = load_points(&args.points).map_err(Failure::input)?;
+    // The difference in double precision: that is what the mesh's origin is for.
+    let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
+    let built = engine.build(mesh, &options)?;
+    let progress = Progress::new(common, "locating");
+    let report = |done: u64, total: u64| progress.set(done, total);
+    let start = Instant::now();
+    let done = if args.all {
+        every_owner(args, format, mesh, &*built, &local, &report)?
+    } else {
+        let located = built.locate(&local, field, args.tolerance, &report)?;
+        let seconds = start.elapsed().as_secs_f64();
+        let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();
+        let bary: Vec<[f32; 4]> = located.iter().map(|l| l.bary).collect();
+        let value: Vec<f32> = located.iter().map(|l| l.value).collect();
+        write_located(&args.output, &Located { points: &points, owner: &owner, bary: &bary, value: field.map(|_| &value[..]) })?;
+        Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), seconds }
+    };
+    drop(progress);
+    let per_second = if done.seconds > 0.0 { points.len() as f64 / done.seconds } else { 0.0 };
+    let json = json!({
+        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": done.seconds,
+        "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
+        "build_ms": built.summary().build_ms, "device": engine.name(),
+    });
+    let text = format!(
+        "{}: {} points, {} of them in the mesh; {} on {}, {} points a second\n",
+        args.output.display(),
+        grouped(points.len() as u64),
+        grouped(done.found as u64),
+        milliseconds(done.seconds * 1e3),
+        engine.name(),
+        grouped(per_second as u64)
+    );
+    output::summary(common, &json, &text)
+}
+
+/// Every owner of every point, written as rows (point, cell).
+fn every_owner(
+    args: &Args,
+    format: OutputFormat,
+    mesh: &Mesh,
+    built: &dyn Built,
+    points: &[[f32; 3]],
+    report: engine::Report<'_>,
+) -> Outcome<Done> {
+    let start = Instant::now();
+    let owners = built.locate_all(points, args.tolerance, report)?;
+    let seconds = start.elapsed().as_secs_f64();
+    let rows: Vec<[u32; 2]> = (0..).zip(&owners).flat_map(|(i, owners)| owners.iter().map(move |&tet| [i, mesh.cell_id(tet)])).collect();
+    match format {
+        OutputFormat::Csv => write_rows(&args.output, &rows)?,
+        OutputFormat::Json => {
+            let cells: Vec<Vec<u32>> = owners.iter().map(|owners| owners.iter().map(|&tet| mesh.cell_id(tet)).collect()).collect();
+            write_json(&args.output, &json!({ "owners": cells }))?;
+        }
+        _ => write_npy(&args.output, &[rows.len(), 2], rows.as_flattened())?,
+    }
+    Ok(Done { found: owners.iter().filter(|o| !o.is_empty()).count(), seconds })
+}
+
+/// A table of rows (point, cell).
+fn write_rows(path: &Path, rows: &[[u32; 2]]) -> Outcome {
+    let mut file = OutputFile::create(path)?;
+    let mut write = || {
+        writeln!(file, "point,cell")?;
+        rows.iter().try_for_each(|[point, cell]| writeln!(file, "{point},{cell}"))
+    };
+    write().map_err(|e: std::io::Error| Failure::Failed(format!("{}: {e}", path.display())))?;
+    Ok(file.commit()?)
+}

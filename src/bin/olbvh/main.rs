@@ -1,0 +1,70 @@
+//! The command line: one file per subcommand, [`engine`] between them and the devices.
+
+mod common;
+mod conformance;
+mod devices;
+mod engine;
+mod info;
+mod input;
+mod locate;
+mod output;
+mod overlap;
+mod render;
+mod slice;
+mod slice_output;
+mod text;
+
+use clap::{Parser, Subcommand};
+use common::{Common, Failure};
+use std::process::ExitCode;
+
+const AFTER_HELP: &str = "\
+MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh (Medit), .node or .ele (TetGen); or kuhn:NX,NY,NZ, a procedural grid of
+NX×NY×NZ unit cubes, six tetrahedra each, with a scalar field. Lengths are in the units of the mesh.
+
+Examples:
+  olbvh info bracket.vtu                        what is in a mesh, and what its tree is like
+  olbvh render bracket.vtu -o bracket.png       a picture of its first field
+  olbvh locate bracket.vtu points.csv -o out.csv   in which cell each point lies, and the field there
+  olbvh slice bracket.vtu -o bracket.npy --layers 100   voxels, none of them empty that the mesh touches
+  olbvh overlap a.vtu b.vtu -o cells.json       which cells of two meshes intersect
+  olbvh render kuhn:32,32,32 -o jet.png --device cpu
+
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device.";
+
+/// Builds octree bounding volume hierarchies over tetrahedral meshes on the GPU, and answers with them: pictures, values at points.
+#[derive(Parser)]
+#[command(name = "olbvh", version, after_help = AFTER_HELP, propagate_version = true, max_term_width = 120)]
+struct Cli {
+    #[command(flatten)]
+    common: Common,
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    Conformance(conformance::Args),
+    Devices(devices::Args),
+    Info(info::Args),
+    Locate(locate::Args),
+    Render(Box<render::Args>),
+    Slice(Box<slice::Args>),
+    Overlap(overlap::Args),
+}
+
+fn main() -> ExitCode {
+    let Cli { common, command } = Cli::parse();
+    common.start_log();
+    output::clean_up_on_interrupt();
+    let done = match command {
+        Command::Conformance(args) => conformance::run(&args, &common),
+        Command::Devices(args) => devices::run(&args, &common),
+        Command::Info(args) => info::run(&args, &common),
+        Command::Locate(args) => locate::run(&args, &common),
+        Command::Render(args) => render::run(&args, &common),
+        Command::Slice(args) => slice::run(&args, &common),
+        Command::Overlap(args) => overlap::run(&args, &common),
+    };
+    done.map_or_else(Failure::report, |()| ExitCode::SUCCESS)
+}

@@ -1,0 +1,100 @@
+//! Results: standard output, files, progress.
+
+use crate::common::{Common, Failure, Outcome};
+use indicatif::{ProgressBar, ProgressStyle};
+use olbvh::formats::OutputFormat;
+use std::io::{IsTerminal as _, Write as _};
+use std::path::{Path, PathBuf};
+use std::sync::{Mutex, PoisonError};
+
+/// Prints text (with its last newline) on standard output.
+pub fn print(text: &str) -> Outcome {
+    let mut out = std::io::stdout().lock();
+    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+        std::io::ErrorKind::BrokenPipe => Failure::Closed,
+        _ => Failure::Failed(format!("standard output: {e}")),
+    })
+}
+
+/// Prints the JSON object with `--json`, else the text.
+pub fn result(common: &Common, json: &serde_json::Value, text: &str) -> Outcome {
+    if common.json { print(&format!("{json:#}\n")) } else { print(text) }
+}
+
+/// Results that are being written.
+static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+
+/// After Ctrl-C: nothing of an unfinished result stays behind, exit code 130 as shells have it.
+pub fn clean_up_on_interrupt() {
+    let handler = || {
+        for path in PENDING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+            remove_parts(path);
+        }
+        let _ = writeln!(std::io::stderr(), "olbvh: interrupted");
+        std::process::exit(130);
+    };
+    if let Err(e) = ctrlc::set_handler(handler) {
+        log::warn!("no handler for interrupts: {e}");
+    }
+}
+
+/// Removes the files that stand for `path` until it is complete, `.NAME.*.part` beside it.
+fn remove_parts(path: &Path) {
+    let name = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
+    for entry in std::fs::read_dir(folder(path)).into_iter().flatten().flatten() {
+        let part = entry.path();
+        if part.extension().is_some_and(|e| e == "part") && entry.file_name().to_string_lossy().starts_with(&name) {
+            let _ = std::fs::remove_file(part);
+        }
+    }
+}
+
+fn folder(path: &Path) -> &Path {
+    path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
+}
+
+/// Announces a result, before long work: its ending must be one of `formats`, and its folder must exist.
+pub fn announce(path: &Path, formats: &[OutputFormat]) -> Outcome<OutputFormat> {
+    let format = OutputFormat::of(path, formats)?;
+    if !folder(path).is_dir() {
+        return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(path).display())));
+    }
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
+    Ok(format)
+}
+
+/// A progress bar on standard error, if that is a terminal; it appears once work takes long.
+pub struct Progress(Option<ProgressBar>);
+
+impl Progress {
+    /// For work called `label`.
+    pub fn new(common: &Common, label: &'static str) -> Self {
+        let shown = !common.quiet && std::io::stderr().is_terminal();
+        Self(shown.then(|| {
+            let style = ProgressStyle::with_template("{msg:10} {wide_bar} {percent:>3} % {eta:>5}");
+            let bar = ProgressBar::new(0).with_message(label);
+            if let Ok(style) = style { bar.with_style(style) } else { bar }
+        }))
+    }
+
+    /// So much of the work is done.
+    pub fn set(&self, done: u64, total: u64) {
+        if let Some(bar) = &self.0 {
+            bar.set_length(total);
+            bar.set_position(done);
+        }
+    }
+}
+
+impl Drop for Progress {
+    fn drop(&mut self) {
+        if let Some(bar) = &self.0 {
+            bar.finish_and_clear();
+        }
+    }
+}
+
+/// As [`result`], but with `--quiet` the text is left out: the result itself is in a file.
+pub fn summary(common: &Common, json: &serde_json::Value, text: &str) -> Outcome {
+    if common.quiet && !common.json { Ok(()) } else { result(common, json, text) }
+}

@@ -1,0 +1,153 @@
+//! `olbvh overlap`.
+
+use crate::common::{Common, Outcome};
+use crate::engine;
+use crate::input::{self, TreeArgs};
+use crate::output::{self, Progress};
+use crate::slice::vector;
+use crate::text::{grouped, milliseconds};
+use glam::{DQuat, DVec3};
+use olbvh::error::Error;
+use olbvh::formats::{OutputFormat, write_json, write_mesh};
+use olbvh::mesh::{Mesh, On};
+use serde_json::json;
+use std::path::PathBuf;
+
+/// Find the cells of two meshes that intersect the other mesh.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh overlap die.vtu box.vtu -o cells.json
+  olbvh overlap a.vtu b.vtu -o cells.json --pairs              every pair of intersecting cells
+  olbvh overlap a.vtu b.vtu -o cells.json --move-b 0,0,3.5 --rotate-b z,30
+  olbvh overlap a.vtu b.vtu -o a.vtu                           the cells of A that intersect B, as a mesh
+
+The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascending by a then b. Ids count the cells of a file from 0. Touching counts.
+B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not,
+but the same on every device.")]
+pub struct Args {
+    /// Mesh A: a file, or kuhn:NX,NY,NZ.
+    a: PathBuf,
+    /// Mesh B.
+    b: PathBuf,
+    /// Where the result goes: .json, or .vtu for the cells of A that intersect B.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Find all pairs of intersecting cells.
+    #[arg(long)]
+    pairs: bool,
+    /// Move B.
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
+    move_b: Option<[f64; 3]>,
+    /// Turn B about an axis (x, y, z or a direction) by an angle in degrees, counter-clockwise.
+    #[arg(long, value_name = "AXIS,DEGREES", value_parser = rotation, allow_hyphen_values = true)]
+    rotate_b: Option<(DVec3, f64)>,
+    #[command(flatten)]
+    tree: TreeArgs,
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu])?;
+    let options = args.tree.options(false)?;
+    let engine = engine::open(common.device.as_deref())?;
+    let a = input::mesh(&args.a, common)?.mesh;
+    let mut b = input::mesh(&args.b, common)?.mesh;
+    pose(&mut b, &a, args)?;
+    let progress = Progress::new(common, "overlap");
+    let found = engine.overlap(&a, &b, &options, args.pairs, &|done, total| progress.set(done, total))?;
+    drop(progress);
+    let overlap = &found.overlap;
+    let cells = |mesh: &Mesh, tets: &[u32]| {
+        let mut ids: Vec<u32> = tets.iter().map(|&t| mesh.cell_id(t)).collect();
+        ids.sort_unstable();
+        ids.dedup();
+        ids
+    };
+    let (ids_a, ids_b) = (cells(&a, &overlap.a), cells(&b, &overlap.b));
+    let pairs = overlap.pairs.as_ref().map(|pairs| {
+        let mut pairs: Vec<[u32; 2]> = pairs.iter().map(|p| [a.cell_id(p[0]), b.cell_id(p[1])]).collect();
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs
+    });
+    let narrow: u64 = overlap.effort.iter().map(|e| e.narrow).sum();
+    let primitives = (a.tets.len() + b.tets.len()) as u64;
+    let share = narrow as f64 / primitives.max(1) as f64;
+    if format == OutputFormat::Vtu {
+        write_mesh(&args.output, &part(&a, &overlap.a))?;
+    } else {
+        let mut result = json!({ "a": ids_a, "b": ids_b });
+        if let Some(pairs) = &pairs {
+            result["pairs"] = json!(pairs);
+        }
+        write_json(&args.output, &result)?;
+    }
+    let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
+    let json = json!({
+        "file": args.output.display().to_string(), "a": ids_a.len(), "b": ids_b.len(), "pairs": pairs.as_ref().map(Vec::len),
+        "narrow_tests": narrow, "narrow_share": share, "seconds": found.seconds, "build_seconds": found.build_seconds,
+        "a_effort": effort(&overlap.effort[0]), "b_effort": effort(&overlap.effort[1]), "device": engine.name(),
+    });
+    let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
+    let text = format!(
+        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.1} % of the cells; trees {}, overlap {} on {}\n",
+        args.output.display(),
+        grouped(ids_a.len() as u64),
+        grouped(ids_b.len() as u64),
+        grouped(narrow),
+        100.0 * share,
+        milliseconds(found.build_seconds * 1e3),
+        milliseconds(found.seconds * 1e3),
+        engine.name()
+    );
+    output::summary(common, &json, &text)
+}
+
+/// Brings the points of B into the coordinates of A: turned, moved, relative to A's origin.
+fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
+    let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
+    let wide = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
+    let ends = b.points.iter().filter(finite).map(wide).fold((DVec3::MAX, DVec3::MIN), |(lo, hi), p| (lo.min(p), hi.max(p)));
+    let centre = if ends.0.x <= ends.1.x { ends.0.midpoint(ends.1) } else { DVec3::ZERO };
+    let turn = match args.rotate_b {
+        Some((axis, degrees)) => DQuat::from_axis_angle(axis.normalize(), degrees.to_radians()),
+        None => DQuat::IDENTITY,
+    };
+    let shift = DVec3::from_array(args.move_b.unwrap_or_default()) + DVec3::from_array(b.origin) - DVec3::from_array(a.origin);
+    if args.rotate_b.is_none() && shift == DVec3::ZERO {
+        return Ok(());
+    }
+    for p in &mut b.points {
+        let at = wide(p) - centre;
+        let turned = if args.rotate_b.is_some() { turn * at } else { at };
+        *p = (turned + centre + shift).as_vec3().to_array();
+    }
+    b.origin = a.origin;
+    if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("B is moved beyond all bounds".into()).into()) }
+}
+
+/// Some cells of a mesh, with its points and fields.
+fn part(mesh: &Mesh, tets: &[u32]) -> Mesh {
+    let mut part = mesh.clone();
+    part.tets = tets.iter().map(|&t| mesh.tets[t as usize]).collect();
+    part.cell_ids = Some(tets.iter().map(|&t| mesh.cell_id(t)).collect());
+    for field in part.fields.iter_mut().filter(|f| f.on == On::Cells) {
+        field.values = tets.iter().map(|&t| field.values[t as usize]).collect();
+    }
+    part
+}
+
+/// `z,30` or `1,1,0,45`.
+fn rotation(text: &str) -> Result<(DVec3, f64), String> {
+    let wrong = || "an axis and an angle in degrees, such as z,30 or 1,1,0,45".to_owned();
+    let (axis, degrees) = text.rsplit_once(',').ok_or_else(wrong)?;
+    let degrees: f64 = degrees.trim().parse().ok().filter(|d: &f64| d.is_finite()).ok_or_else(wrong)?;
+    let axis = match axis.trim() {
+        "x" => DVec3::X,
+        "y" => DVec3::Y,
+        "z" => DVec3::Z,
+        other => DVec3::from_array(vector(other).map_err(|_| wrong())?),
+    };
+    if axis.try_normalize().is_some() { Ok((axis, degrees)) } else { Err(wrong()) }
+}

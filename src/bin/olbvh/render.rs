@@ -1,0 +1,191 @@
+//! `olbvh render`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::engine::{self, Drawn};
+use crate::input::{self, TreeArgs};
+use crate::output::{self, Progress};
+use crate::text::{grouped, milliseconds};
+use olbvh::error::{Error, Result};
+use olbvh::formats::{OutputFormat, write_png};
+use olbvh::mesh::{Field, Mesh, On};
+use olbvh::render::camera::CameraSpec;
+use olbvh::render::maps::MAPS;
+use olbvh::render::{Background, RenderSettings, TransferFunction, transfer};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Instant;
+
+const EXAMPLES: &str = "\
+Examples:
+  olbvh render bracket.vtu -o bracket.png
+  olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
+  olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900
+  olbvh render bracket.vtu -o shell.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   only values around 70 % of the range
+  olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
+
+The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the
+mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step.";
+
+/// Draw a field of a mesh as a volume, into a PNG file.
+#[derive(clap::Args)]
+#[command(after_help = EXAMPLES, after_long_help = long_help())]
+pub struct Args {
+    /// Mesh file, or kuhn:NX,NY,NZ.
+    mesh: PathBuf,
+    /// The picture, a .png file.
+    #[arg(short, long, value_name = "OUT.png")]
+    output: PathBuf,
+    /// Field to draw; by default the first field of points.
+    #[arg(long)]
+    field: Option<String>,
+    /// Width and height in pixels; one number for a square.
+    #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size)]
+    size: [u32; 2],
+    /// Distance of two samples on a ray, in units of the mesh; by default 1/512 of its diagonal.
+    #[arg(long)]
+    step: Option<f64>,
+    /// View and settings separated by commas, such as `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (--help tells all).
+    #[arg(long, default_value = "iso", allow_hyphen_values = true, long_help = olbvh::render::camera::HELP)]
+    camera: CameraSpec,
+    /// Colours and opacities: a colour map or a .json file (--help tells the maps and the form of the file).
+    #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP|FILE.json")]
+    tf: String,
+    /// Opacity: one number, or PLACE:OPACITY pairs over the field's range (0 to 1); by default what
+    /// fits the field, so that rare values show through common ones.
+    #[arg(long, value_name = "A|P:A,P:A,…", value_parser = |text: &str| TransferFunction::parse_opacity(text).map(Opacity))]
+    opacity: Option<Opacity>,
+    /// The field's values at the two ends of the transfer function; by default the smallest and largest there are.
+    #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
+    range: Option<[f32; 2]>,
+    /// Factor on the opacity: 2 is as opaque as a mesh of twice the size.
+    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    opacity_scale: f32,
+    /// white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM.
+    #[arg(long, value_name = "COLOR")]
+    background: Option<Background>,
+    /// Colours as they are, without light.
+    #[arg(long)]
+    no_shading: bool,
+    /// Opacity of surfaces seen from the side, 0 to 1: outlines stay crisp where the field is faint.
+    #[arg(long, default_value_t = 0.35, value_name = "A")]
+    outline: f32,
+    /// Direction to the light: right, up, towards the viewer.
+    #[arg(long, value_name = "R,U,T", value_parser = vector, allow_hyphen_values = true)]
+    light: Option<[f32; 3]>,
+    /// A ray ends once it is this opaque.
+    #[arg(long, default_value_t = 0.99, value_name = "A")]
+    termination: f32,
+    #[command(flatten)]
+    tree: TreeArgs,
+}
+
+/// Opacity points (a type of its own, lest a list be taken for repeated arguments).
+#[derive(Clone)]
+struct Opacity(Vec<(f32, f32)>);
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    output::announce(&args.output, &[OutputFormat::Png])?;
+    let options = args.tree.options(false)?;
+    let settings = args.settings()?;
+    settings.check()?;
+    let engine = engine::open(common.device.as_deref())?;
+    let loaded = input::mesh(&args.mesh, common)?;
+    let field = args.field(&loaded.mesh, common)?;
+    let built = engine.build(&loaded.mesh, &options)?;
+    let start = Instant::now();
+    let progress = Progress::new(common, "rendering");
+    let Drawn { picture, range: [lo, hi], step } = built.render(&field, &settings, &|done, total| progress.set(done, total))?;
+    drop(progress);
+    let seconds = start.elapsed().as_secs_f64();
+    write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
+    let json = json!({
+        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi],
+        "step": step, "samples": picture.samples, "found_samples": picture.found_samples, "interval_ms": picture.interval_ms,
+        "march_ms": picture.march_ms, "build_ms": built.summary().build_ms, "seconds": seconds, "device": engine.name(),
+    });
+    let text = format!(
+        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh; ray intervals {}, marching {} on {}\n",
+        args.output.display(),
+        field.name,
+        settings.size[0],
+        settings.size[1],
+        grouped(picture.samples),
+        grouped(picture.found_samples),
+        milliseconds(picture.interval_ms),
+        milliseconds(picture.march_ms),
+        engine.name()
+    );
+    output::summary(common, &json, &text)
+}
+
+impl Args {
+    fn settings(&self) -> Outcome<RenderSettings> {
+        let mut transfer = if self.tf.to_ascii_lowercase().ends_with(".json") {
+            let path = PathBuf::from(&self.tf);
+            let text = std::fs::read_to_string(&path).map_err(|source| Failure::input(Error::Io { path, source }))?;
+            TransferFunction::from_json(&text).map_err(|e| Failure::Input(format!("{}: {e}", self.tf)))?
+        } else {
+            TransferFunction::named(&self.tf)?
+        };
+        if let Some(Opacity(points)) = &self.opacity {
+            transfer = transfer.with_opacity(points.clone())?;
+        }
+        let defaults = RenderSettings::default();
+        Ok(RenderSettings {
+            size: self.size,
+            camera: self.camera,
+            transfer,
+            range: self.range,
+            step: self.step,
+            background: self.background.unwrap_or(defaults.background),
+            opacity_scale: self.opacity_scale,
+            termination: self.termination,
+            shading: !self.no_shading,
+            outline: self.outline,
+            light: self.light.unwrap_or(defaults.light),
+        })
+    }
+
+    /// The field to draw. A mesh without fields is drawn by height, so that there is something to see.
+    fn field(&self, mesh: &Mesh, common: &Common) -> Outcome<Field> {
+        if let Some(field) = input::field(mesh, self.field.as_deref())? {
+            return Ok(field.clone());
+        }
+        common.remark("the mesh has no fields; drawing the height z");
+        Ok(Field { name: "z".into(), on: On::Points, values: mesh.points.iter().map(|p| p[2]).collect() })
+    }
+}
+
+/// `WxH` or `N`.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let (w, h) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
+    match (w.trim().parse(), h.trim().parse()) {
+        (Ok(w), Ok(h)) => Ok([w, h]),
+        _ => Err("a size is WxH in pixels, such as 1600x900".into()),
+    }
+}
+
+/// `LO:HI`.
+fn range(text: &str) -> Result<[f32; 2], String> {
+    let numbers = text.split_once(':').map(|(lo, hi)| (lo.trim().parse::<f32>(), hi.trim().parse::<f32>()));
+    match numbers {
+        Some((Ok(lo), Ok(hi))) if lo <= hi && lo.is_finite() && hi.is_finite() => Ok([lo, hi]),
+        _ => Err("a range is LO:HI, such as 20:350".into()),
+    }
+}
+
+/// Three numbers.
+fn vector(text: &str) -> Result<[f32; 3], String> {
+    let numbers: Vec<f32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
+    numbers.try_into().map_err(|_| "a direction is three numbers, such as -0.5,0.7,1".to_owned())
+}
+
+/// Examples, colour maps, the form of a transfer function in a file.
+fn long_help() -> String {
+    let mut maps = crate::text::Page::default();
+    for map in MAPS {
+        maps.row(map.name, map.about);
+    }
+    format!("{EXAMPLES}\n\nColour maps (with _r behind the name: reversed):\n{maps}\nTransfer function in a file:\n{}", transfer::JSON_HELP)
+}

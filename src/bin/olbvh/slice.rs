@@ -1,0 +1,183 @@
+//! `olbvh slice`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::engine;
+use crate::input::{self, TreeArgs};
+use crate::output::{self, Progress};
+use crate::slice_output::{Layers, Look};
+use crate::text::{grouped, milliseconds};
+use olbvh::formats::OutputFormat;
+use olbvh::mesh::On;
+use olbvh::render::{TransferFunction, transfer};
+use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
+use serde_json::json;
+use std::path::PathBuf;
+use std::time::Instant;
+
+/// Cut a mesh into layers of voxels; no voxel that the mesh touches is left empty.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh slice bracket.vtu -o middle.png                       one slice through the middle
+  olbvh slice bracket.vtu -o bracket.npy --layers 200         the whole mesh: bracket.npy (values) and bracket.kind.npy
+  olbvh slice bracket.vtu -o layer.png --axis x --at 12.5 --layers 10 --thickness 0.2
+  olbvh slice bracket.vtu -o cut.vti --normal 1,1,0.5 --size 800
+  olbvh slice bracket.vtu -o print.svx --size 400             voxel package for printers, cubes all over
+
+A voxel's kind is 2 where its centre lies in the mesh, 1 where only its box touches the mesh, else 0. A touched voxel gets the value at the closest point
+of the mesh's closest boundary cell (or, with --extrapolate linear, that cell's field continued to the centre). Empty voxels are NaN, in pictures
+transparent. Rows and layers run upwards; pictures show the highest row on top. More than one layer makes pictures NAME-0000.png, NAME-0001.png, …
+An .svx package has its origin and voxels in metres (see --unit); its x and y are those of the layers.")]
+pub struct Args {
+    /// Mesh file, or kuhn:NX,NY,NZ.
+    mesh: PathBuf,
+    /// Where the result goes; the ending says how: .npy, .vti, .png, .svx.
+    #[arg(short, long, value_name = "OUT")]
+    output: PathBuf,
+    /// Axis perpendicular to the layers.
+    #[arg(long, default_value = "z", value_name = "x|y|z", value_parser = axis)]
+    axis: usize,
+    /// Direction perpendicular to the layers, instead of an axis.
+    #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, conflicts_with = "axis")]
+    normal: Option<[f64; 3]>,
+    /// Place of the first layer along the axis (or unit normal); by default the layers are centred on the mesh.
+    #[arg(long, value_name = "V", allow_hyphen_values = true)]
+    at: Option<f64>,
+    /// Number of layers; by default one, for .svx as many as fill the mesh.
+    #[arg(long, value_name = "N")]
+    layers: Option<u32>,
+    /// Voxels per row and rows over the bounds of the mesh; one number: that many per row, square ones.
+    #[arg(long, default_value = "512", value_name = "WxH|W", value_parser = size)]
+    size: [u32; 2],
+    /// Height of a voxel perpendicular to the layers; by default what fills the mesh, with one layer the width of a voxel.
+    #[arg(long, value_name = "T")]
+    thickness: Option<f64>,
+    /// Distance of the layers' centres; by default the thickness.
+    #[arg(long, value_name = "D", allow_hyphen_values = true)]
+    spacing: Option<f64>,
+    /// Field to slice, per point or per cell; by default the first field of points.
+    #[arg(long)]
+    field: Option<String>,
+    /// What touched voxels get: the value at the closest point, or the closest cell's field continued to their centre.
+    #[arg(long, default_value = "nearest", value_name = "nearest|linear", value_parser = extrapolate)]
+    extrapolate: Extrapolate,
+    /// Also write each voxel's cell, NAME.owner.npy or an array of the .vti.
+    #[arg(long)]
+    owners: bool,
+    /// Colour map of pictures, as for `render`.
+    #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP")]
+    tf: String,
+    /// Values at the two ends of the colour map (and of an .svx value channel); by default the field's.
+    #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
+    range: Option<[f32; 2]>,
+    /// Metres per unit of the mesh, for .svx.
+    #[arg(long, default_value_t = 0.001, value_name = "M")]
+    unit: f64,
+    #[command(flatten)]
+    tree: TreeArgs,
+}
+
+const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, OutputFormat::Png, OutputFormat::Svx];
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    let format = output::announce(&args.output, &FORMATS)?;
+    if format == OutputFormat::Npy {
+        for beside in ["kind.npy", "owner.npy"] {
+            output::announce(&args.output.with_extension(beside), &FORMATS)?;
+        }
+    }
+    if args.owners && !matches!(format, OutputFormat::Npy | OutputFormat::Vti) {
+        return Err(Failure::Usage("--owners goes with .npy and .vti".into()));
+    }
+    let colors = TransferFunction::named(&args.tf)?;
+    let options = args.tree.options(false)?;
+    let engine = engine::open(common.device.as_deref())?;
+    let loaded = input::mesh(&args.mesh, common)?;
+    let mesh = &loaded.mesh;
+    let field = input::field(mesh, args.field.as_deref())?;
+    let built = engine.build(mesh, &options)?;
+    let bounds = &built.summary().bounds;
+    let mut settings = SliceSettings {
+        plane: args.normal.map_or(Plane::Axis(args.axis), Plane::Normal),
+        at: args.at,
+        layers: args.layers.unwrap_or(1),
+        size: args.size,
+        thickness: args.thickness,
+        spacing: args.spacing,
+    };
+    if format == OutputFormat::Svx {
+        settings = settings.cubes(bounds.lo, bounds.hi, mesh.origin, args.layers.is_none())?;
+    }
+    let voxels = settings.voxels(bounds.lo, bounds.hi, mesh.origin)?;
+    let range = args.range.or_else(|| field.and_then(olbvh::mesh::Field::range)).unwrap_or([0.0, 1.0]);
+    let look = Look { colors, range, unit: args.unit, field: field.map(|f| (f.name.clone(), f.on)) };
+    let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
+    let progress = Progress::new(common, "slicing");
+    let mut tally = Tally::default();
+    let start = Instant::now();
+    let mut sink = |band: Band| {
+        tally.add(&band.kinds);
+        layers.band(band)
+    };
+    built.slice(field, &voxels, args.extrapolate, &|done, total| progress.set(done, total), &mut sink)?;
+    layers.finish()?;
+    drop(progress);
+    let seconds = start.elapsed().as_secs_f64();
+    let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
+    let json = json!({
+        "file": args.output.display().to_string(), "layers": voxels.layers, "width": voxels.size[0], "height": voxels.size[1],
+        "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
+        "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": built.summary().build_ms, "device": engine.name(),
+    });
+    let text = format!(
+        "{}: {} layers of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}\n",
+        args.output.display(),
+        voxels.layers,
+        voxels.size[0],
+        voxels.size[1],
+        grouped(tally.inside),
+        grouped(tally.touched),
+        grouped(tally.empty),
+        milliseconds(seconds * 1e3),
+        engine.name()
+    );
+    output::summary(common, &json, &text)
+}
+
+fn axis(text: &str) -> Result<usize, String> {
+    ["x", "y", "z"].iter().position(|a| a.eq_ignore_ascii_case(text)).ok_or_else(|| "an axis is x, y or z".into())
+}
+
+fn extrapolate(text: &str) -> Result<Extrapolate, String> {
+    match text {
+        "nearest" => Ok(Extrapolate::Nearest),
+        "linear" => Ok(Extrapolate::Linear),
+        _ => Err("nearest or linear".into()),
+    }
+}
+
+/// `WxH`, or `W` for square voxels.
+fn size(text: &str) -> Result<[u32; 2], String> {
+    let parts: Vec<Option<u32>> = text.split(['x', 'X', '×']).map(|n| n.trim().parse().ok().filter(|&n| n > 0)).collect();
+    match parts[..] {
+        [Some(w)] => Ok([w, 0]),
+        [Some(w), Some(h)] => Ok([w, h]),
+        _ => Err("a size is WxH or W in voxels, such as 800x600".into()),
+    }
+}
+
+/// Three numbers.
+pub fn vector(text: &str) -> Result<[f64; 3], String> {
+    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
+    numbers.try_into().map_err(|_| "three numbers, such as 1,0,0.5".into())
+}
+
+/// `LO:HI`.
+fn range(text: &str) -> Result<[f32; 2], String> {
+    let numbers = text.split_once(':').map(|(lo, hi)| (lo.trim().parse::<f32>(), hi.trim().parse::<f32>()));
+    match numbers {
+        Some((Ok(lo), Ok(hi))) if lo <= hi && lo.is_finite() && hi.is_finite() => Ok([lo, hi]),
+        _ => Err("a range is LO:HI, such as 20:350".into()),
+    }
+}

@@ -1,0 +1,169 @@
+//! Where the layers of `olbvh slice` go: arrays, an image for `ParaView`, pictures, a package of voxels.
+
+use olbvh::error::{Error, Result};
+use olbvh::formats::{Channel, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, write_png};
+use olbvh::mesh::{Mesh, On};
+use olbvh::render::TransferFunction;
+use olbvh::slicing::{Band, EMPTY, VoxelGrid};
+use std::path::{Path, PathBuf};
+
+/// How values are shown.
+pub struct Look {
+    /// Colours over the range.
+    pub colors: TransferFunction,
+    /// Values at the ends.
+    pub range: [f32; 2],
+    /// Metres per unit.
+    pub unit: f64,
+    /// The field, if there is one.
+    pub field: Option<(String, On)>,
+}
+
+impl Look {
+    /// Place of a value in the range, 0…1.
+    fn place(&self, value: f32) -> f32 {
+        let [lo, hi] = self.range;
+        if hi > lo && value.is_finite() { ((value - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.5 }
+    }
+}
+
+enum Target {
+    Arrays(Box<SliceWriter>),
+    Pictures(PathBuf),
+    Package(Box<VoxelWriter>),
+}
+
+/// Gathers bands into layers and writes them one by one.
+pub struct Layers<'a> {
+    target: Target,
+    mesh: &'a Mesh,
+    size: [u32; 2],
+    count: u32,
+    done: u32,
+    owners: bool,
+    look: Look,
+    pending: Band,
+}
+
+impl<'a> Layers<'a> {
+    /// Begins the result.
+    pub fn create(path: &Path, format: OutputFormat, voxels: &VoxelGrid, mesh: &'a Mesh, owners: bool, look: Look) -> Result<Self> {
+        let [w, h] = voxels.size;
+        let size = [w, h, voxels.layers];
+        let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
+        let origin = [0, 1, 2].map(|c| mesh.origin[c] + f64::from(voxels.origin[c]));
+        let steps = [voxels.across, voxels.down, voxels.up];
+        // The layers' direction is that of the half axis, where there is no distance of layers.
+        let axes = [voxels.half[0], voxels.half[1], voxels.half[2]].map(|v| v.map(|x| f64::from(x) / length(v)));
+        let upside = steps[2].iter().zip(&axes[2]).map(|(&a, b)| f64::from(a) * b).sum::<f64>() < 0.0;
+        let spacing = [length(steps[0]), length(steps[1]), if upside { -length(steps[2]) } else { length(steps[2]) }];
+        let target = match format {
+            OutputFormat::Png => Target::Pictures(path.into()),
+            OutputFormat::Svx => {
+                let along = |axis: [f64; 3]| (0..3).map(|c| axis[c] * origin[c]).sum::<f64>();
+                let corner = [0, 1, 2].map(|i| (along(axes[i]) - spacing[0] * 0.5) * look.unit);
+                let channel = look
+                    .field
+                    .as_ref()
+                    .map(|(_, on)| if *on == On::Cells { Channel::Material((1..=255).collect()) } else { Channel::Custom });
+                let mut metadata = vec![("creator".into(), concat!("olbvh ", env!("CARGO_PKG_VERSION")).into())];
+                if let Some((name, on)) = &look.field {
+                    metadata.push(("field".into(), name.clone()));
+                    if *on == On::Points {
+                        metadata.push(("range".into(), format!("{} {}", look.range[0], look.range[1])));
+                    }
+                }
+                let package = VoxelPackage { size, origin: corner, voxel: spacing[0] * look.unit, channel, metadata };
+                Target::Package(Box::new(VoxelWriter::create(path, package)?))
+            }
+            _ => Target::Arrays(Box::new(SliceWriter::create(path, SliceGrid { size, origin, spacing, axes }, owners)?)),
+        };
+        Ok(Self { target, mesh, size: [w, h], count: voxels.layers, done: 0, owners, look, pending: Band::default() })
+    }
+
+    /// Takes a band; writes the layers that are complete.
+    pub fn band(&mut self, band: Band) -> Result<()> {
+        let all = &mut self.pending;
+        if all.kinds.is_empty() {
+            *all = band;
+        } else {
+            all.values.extend(band.values);
+            all.kinds.extend(band.kinds);
+            all.owners.extend(band.owners);
+        }
+        let voxels = self.size[0] as usize * self.size[1] as usize;
+        let whole = self.pending.kinds.len() / voxels;
+        let all = std::mem::take(&mut self.pending);
+        for i in 0..whole {
+            let part = i * voxels..(i + 1) * voxels;
+            self.layer(&all.values[part.clone()], &all.kinds[part.clone()], &all.owners[part])?;
+        }
+        let rest = whole * voxels;
+        if rest < all.kinds.len() {
+            self.pending = if rest == 0 {
+                all
+            } else {
+                Band { values: all.values[rest..].to_vec(), kinds: all.kinds[rest..].to_vec(), owners: all.owners[rest..].to_vec(), ..all }
+            };
+        }
+        Ok(())
+    }
+
+    fn layer(&mut self, values: &[f32], kinds: &[u8], owners: &[u32]) -> Result<()> {
+        let [w, h] = self.size;
+        match &mut self.target {
+            Target::Arrays(writer) => {
+                let cells: Option<Vec<u32>> =
+                    self.owners.then(|| owners.iter().map(|&t| if t == u32::MAX { t } else { self.mesh.cell_id(t) }).collect());
+                writer.layer(values, kinds, cells.as_deref())?;
+            }
+            Target::Pictures(path) => {
+                let path = if self.count == 1 { path.clone() } else { numbered(path, self.done) };
+                let pixel = |i: usize| -> [u8; 4] {
+                    if kinds[i] == EMPTY {
+                        return [0; 4];
+                    }
+                    let color = if self.look.field.is_some() { self.look.colors.at(self.look.place(values[i])) } else { [0.6; 4] };
+                    let byte = |c: f32| (c.clamp(0.0, 1.0) * 255.0).round() as u8;
+                    [byte(color[0]), byte(color[1]), byte(color[2]), 255]
+                };
+                let (w, h) = (w as usize, h as usize);
+                let pixels: Vec<u8> = (0..h).rev().flat_map(|y| (0..w).flat_map(move |x| pixel(y * w + x))).collect();
+                write_png(path, w as u32, h as u32, &pixels)?;
+            }
+            Target::Package(writer) => {
+                let density: Vec<u8> = kinds.iter().map(|&k| if k == EMPTY { 0 } else { 255 }).collect();
+                let look = &self.look;
+                let second = look.field.as_ref().map(|(_, on)| -> Vec<u8> {
+                    let byte = |(&k, &v): (&u8, &f32)| match (k, on) {
+                        (EMPTY, _) => 0,
+                        (_, On::Cells) => v.round().clamp(0.0, 255.0) as u8,
+                        _ => (look.place(v) * 255.0).round() as u8,
+                    };
+                    kinds.iter().zip(values).map(byte).collect()
+                });
+                writer.layer(&density, second.as_deref())?;
+            }
+        }
+        self.done += 1;
+        Ok(())
+    }
+
+    /// Completes the result.
+    pub fn finish(self) -> Result<()> {
+        if self.done != self.count {
+            return Err(Error::Invalid(format!("{} of {} layers were sliced", self.done, self.count)));
+        }
+        match self.target {
+            Target::Arrays(writer) => writer.finish(),
+            Target::Pictures(_) => Ok(()),
+            Target::Package(writer) => writer.finish(),
+        }
+    }
+}
+
+/// `NAME-0007.png`.
+fn numbered(path: &Path, i: u32) -> PathBuf {
+    let stem = path.file_stem().unwrap_or_default().to_string_lossy();
+    path.with_file_name(format!("{stem}-{i:04}.png"))
+}

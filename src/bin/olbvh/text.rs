@@ -1,0 +1,87 @@
+//! Aligned text for people.
+
+use std::fmt::Write as _;
+
+/// Sections of labelled values, aligned.
+#[derive(Default)]
+pub struct Page {
+    rows: Vec<(String, String)>,
+}
+
+impl Page {
+    /// A heading.
+    pub fn section(&mut self, title: &str) {
+        self.rows.push((title.to_owned(), String::new()));
+    }
+
+    /// A labelled value.
+    pub fn row(&mut self, label: impl std::fmt::Display, value: impl std::fmt::Display) {
+        self.rows.push((format!("  {label}"), value.to_string()));
+    }
+}
+
+impl std::fmt::Display for Page {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let valued = self.rows.iter().filter(|row| !row.1.is_empty());
+        let width = valued.map(|row| row.0.chars().count()).max().unwrap_or(0) + 2;
+        for (label, value) in &self.rows {
+            if value.is_empty() { writeln!(f, "{label}")? } else { writeln!(f, "{label:width$}{value}")? }
+        }
+        Ok(())
+    }
+}
+
+/// 12290298 as 12,290,298.
+pub fn grouped(n: impl Into<u64>) -> String {
+    let digits = n.into().to_string();
+    let mut text = String::new();
+    for (i, digit) in digits.chars().enumerate() {
+        if i > 0 && (digits.len() - i) % 3 == 0 {
+            text.push(',');
+        }
+        text.push(digit);
+    }
+    text
+}
+
+/// Bytes in the largest binary unit below.
+pub fn bytes(n: u64) -> String {
+    let units = ["B", "KiB", "MiB", "GiB", "TiB"];
+    let mut value = n as f64;
+    let mut unit = 0;
+    while value >= 1024.0 && unit + 1 < units.len() {
+        value /= 1024.0;
+        unit += 1;
+    }
+    if unit == 0 { format!("{n} B") } else { format!("{value:.2} {}", units[unit]) }
+}
+
+/// A duration in a readable unit.
+pub fn milliseconds(ms: f64) -> String {
+    match ms {
+        _ if ms >= 60_000.0 => format!("{:.1} min", ms / 60_000.0),
+        _ if ms >= 1000.0 => format!("{:.2} s", ms / 1000.0),
+        _ => format!("{ms:.1} ms"),
+    }
+}
+
+/// Numbers separated by ` × ` or the like.
+pub fn joined<T: std::fmt::Display>(values: &[T], separator: &str) -> String {
+    let mut text = String::new();
+    for (i, value) in values.iter().enumerate() {
+        let _ = write!(text, "{}{value}", if i == 0 { "" } else { separator });
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_read_well() {
+        assert_eq!([grouped(0u32), grouped(999u32), grouped(1000u32), grouped(12_290_298u32)], ["0", "999", "1,000", "12,290,298"]);
+        assert_eq!([bytes(12), bytes(1536), bytes(3 << 30)], ["12 B", "1.50 KiB", "3.00 GiB"]);
+        assert_eq!([milliseconds(1.26), milliseconds(2345.0), milliseconds(90_000.0)], ["1.3 ms", "2.35 s", "1.5 min"]);
+    }
+}

@@ -1,0 +1,260 @@
+//! Stage 0: a mesh on the device — bad cells, bounds and grid, normalised vertices, neighbours and boundary bits (SPEC 2.1, 2.3).
+
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
+use crate::kernels::{
+    CheckCells, CheckCellsSpec, FindNeighbours, FindNeighboursSpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, NormaliseVertices,
+    NormaliseVerticesSpec,
+};
+use crate::layout::{Grid, MeshStatus};
+use crate::mesh::Mesh;
+use crate::primitives::Arena;
+use crate::reference::boundary::fault_of;
+
+/// Most tetrahedra of one mesh: faces are numbered in 31 bits.
+pub const MAX_TETS: u32 = (1 << 29) - 2;
+/// Workgroups of kernels whose invocations take every n-th cell.
+pub(crate) const STRIDED_GROUPS: u32 = 256;
+
+/// A mesh as it lies in device memory, the caller's or ours.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshInput {
+    /// 32-bit floats; point i begins at float `i * stride`.
+    pub positions: BufferRef,
+    /// Floats from one point to the next, at least 3.
+    pub stride: u32,
+    /// Number of points.
+    pub points: u32,
+    /// Four 32-bit vertex indices per tetrahedron, at an address that is a multiple of 16.
+    pub cells: BufferRef,
+    /// Number of tetrahedra.
+    pub tets: u32,
+}
+
+/// What stage 0 makes of a mesh: parts of one range of memory, kept as long as trees and queries use the mesh.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshArrays {
+    /// Counters: [`MeshStatus`].
+    pub status: BufferRef,
+    /// [`Grid`] at the finest level.
+    pub grid: BufferRef,
+    /// One bit per tetrahedron: left out.
+    pub bad: BufferRef,
+    /// One bit per tetrahedron: boundary primitive.
+    pub boundary: BufferRef,
+    /// 16 bytes per point: normalised coordinates.
+    pub vertices: BufferRef,
+    /// 16 bytes per tetrahedron: the neighbour across the face opposite to each vertex, or all ones.
+    pub neighbours: BufferRef,
+}
+
+impl MeshArrays {
+    /// Takes the arrays of a mesh of this size from an arena.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, points: u32, tets: u32) -> Result<Self> {
+        let bits = u64::from(tets).div_ceil(32);
+        Ok(Self {
+            status: arena.take(size_of::<MeshStatus>() as u64)?,
+            grid: arena.take(size_of::<Grid>() as u64)?,
+            bad: arena.words(bits)?,
+            boundary: arena.words(bits)?,
+            vertices: arena.take(16 * u64::from(points))?,
+            neighbours: arena.take(16 * u64::from(tets))?,
+        })
+    }
+}
+
+/// Scratch memory of stage 0: 36 bytes per tetrahedron.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshScratch {
+    table: BufferRef,
+    mates: BufferRef,
+}
+
+impl MeshScratch {
+    /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a face.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
+        Ok(Self { table: arena.words(5 * u64::from(tets) + 16)?, mates: arena.words(4 * u64::from(tets))? })
+    }
+}
+
+/// Records stage 0. Reads `input` in compute shaders; writes `arrays` and `scratch` in transfers and compute shaders. The caller makes
+/// `input` visible before and ends with a barrier after.
+///
+/// # Errors
+/// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra; [`Error::Invalid`] for a stride below 3.
+pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
+    let MeshInput { positions, stride, points, cells, tets } = *input;
+    if tets > MAX_TETS {
+        return Err(Error::TooLarge(format!("{tets} tetrahedra; one mesh holds {MAX_TETS} at most, build it in blocks")));
+    }
+    if stride < 3 {
+        return Err(Error::Invalid(format!("positions {stride} floats apart; a point has three")));
+    }
+    let MeshArrays { status, grid, bad, boundary, vertices, neighbours } = *arrays;
+    let workgroup = r.gpu().target().each;
+    let once = r.gpu().subgroup_size();
+    let all_tets = Groups::Count(tets.div_ceil(workgroup));
+    r.stage("mesh.bounds", |r| {
+        r.fill(status, 0);
+        r.fill(bad, 0);
+        r.fill(boundary, 0);
+        r.fill(scratch.table, u32::MAX);
+        r.fill(scratch.mates, u32::MAX);
+        r.barrier("mesh.clear → mesh.check_cells");
+        let groups = tets.div_ceil(workgroup).clamp(1, STRIDED_GROUPS);
+        let spec = CheckCellsSpec { workgroup, ..Default::default() };
+        r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, groups }, spec, Groups::Count(groups))?;
+        r.barrier("mesh.check_cells → mesh.make_grid");
+        r.dispatch(&MakeGrid { status, grid, unused: 0 }, MakeGridSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
+        r.barrier("mesh.make_grid → mesh.normalise_vertices");
+        let spec = NormaliseVerticesSpec { workgroup, ..Default::default() };
+        let groups = Groups::Count(points.div_ceil(workgroup));
+        r.dispatch(&NormaliseVertices { grid, positions, vertices, points, stride }, spec, groups)
+    })?;
+    r.barrier("mesh.normalise_vertices → mesh.match_faces");
+    r.stage("mesh.boundary", |r| {
+        let MeshScratch { table, mates } = *scratch;
+        let slots = (table.size / 4) as u32;
+        let spec = MatchFacesSpec { workgroup, ..Default::default() };
+        r.dispatch(&MatchFaces { vertices, cells, bad, table, mates, status, tets, points: points.max(1), slots }, spec, all_tets)?;
+        r.barrier("mesh.match_faces → mesh.find_neighbours");
+        let spec = FindNeighboursSpec { workgroup, ..Default::default() };
+        r.dispatch(&FindNeighbours { vertices, cells, bad, mates, neighbours, boundary, status, tets }, spec, all_tets)
+    })
+}
+
+/// What to do with bad cells (SPEC 2.3).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum BadCells {
+    /// Leave them out, count them.
+    #[default]
+    Skip,
+    /// An error that names the first few.
+    Reject,
+}
+
+/// A mesh in device memory of our own, prepared for trees and queries.
+#[derive(Debug)]
+pub struct DeviceMesh {
+    gpu: Gpu,
+    input: MeshInput,
+    arrays: MeshArrays,
+    grid: Grid,
+    status: MeshStatus,
+    time: Readback,
+    _positions: Buffer,
+    _cells: Buffer,
+    memory: Buffer,
+}
+
+impl DeviceMesh {
+    /// Uploads a mesh and prepares it.
+    ///
+    /// # Errors
+    /// [`Error::Memory`], [`Error::TooLarge`], or [`Error::BadCells`] if the policy rejects them.
+    pub fn upload(gpu: &Gpu, mesh: &Mesh, policy: BadCells) -> Result<Self> {
+        let positions = gpu.upload("olbvh.mesh.positions", &mesh.points)?;
+        let cells = gpu.upload("olbvh.mesh.cells", &mesh.tets)?;
+        let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+        let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
+        let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
+        let memory = gpu.buffer("olbvh.mesh.arrays", Arena::measure(carve)?)?;
+        let arrays = carve(&mut Arena::new(memory.all()))?;
+        let carve = |a: &mut Arena| MeshScratch::carve(a, tets);
+        let scratch_memory = gpu.buffer("olbvh.mesh.scratch", Arena::measure(carve)?)?;
+        let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
+        let ((), time) = gpu.run("olbvh.mesh", |r| cmd_prepare_mesh(r, &input, &arrays, &scratch))?;
+        let one = |v: Vec<MeshStatus>| v.first().copied().unwrap_or_default();
+        let status = one(gpu.download(&memory, arrays.status.part(0, size_of::<MeshStatus>() as u64))?);
+        let grid = gpu.download::<Grid>(&memory, arrays.grid.part(0, size_of::<Grid>() as u64))?.first().copied().unwrap_or_default();
+        if status.overflow != 0 {
+            return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
+        }
+        let made = Self { gpu: gpu.clone(), input, arrays, grid, status, time, _positions: positions, _cells: cells, memory };
+        if policy == BadCells::Reject && status.bad > 0 {
+            let list = made.bad_cells()?;
+            let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
+            let first = list.iter().take(5).filter_map(named).collect::<Vec<_>>().join(", ");
+            return Err(Error::BadCells { count: list.len() as u64, first });
+        }
+        Ok(made)
+    }
+
+    /// The tetrahedra that were left out, ascending.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn bad_cells(&self) -> Result<Vec<u32>> {
+        let words = self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?;
+        Ok((0..self.input.tets).filter(|t| words[(t / 32) as usize] >> (t % 32) & 1 != 0).collect())
+    }
+
+    /// Boundary bits, one per tetrahedron.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn boundary_bits(&self) -> Result<Vec<u32>> {
+        self.download(self.arrays.boundary, u64::from(self.input.tets).div_ceil(32))
+    }
+
+    /// The neighbours of every tetrahedron, four each.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn neighbours(&self) -> Result<Vec<[u32; 4]>> {
+        self.gpu.download(&self.memory, self.arrays.neighbours.part(0, 16 * u64::from(self.input.tets)))
+    }
+
+    /// Normalised coordinates of every point, x, y, z and 0.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn vertices(&self) -> Result<Vec<[f32; 4]>> {
+        self.gpu.download(&self.memory, self.arrays.vertices.part(0, 16 * u64::from(self.input.points)))
+    }
+
+    fn download(&self, array: BufferRef, words: u64) -> Result<Vec<u32>> {
+        self.gpu.download(&self.memory, array.part(0, 4 * words))
+    }
+
+    /// The device it lies on.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Where points and cells lie.
+    pub fn input(&self) -> &MeshInput {
+        &self.input
+    }
+
+    /// Where stage 0 left its arrays.
+    pub fn arrays(&self) -> &MeshArrays {
+        &self.arrays
+    }
+
+    /// The grid over the bounds, at the finest level.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// Counts of bad, boundary, flat and negative cells.
+    pub fn status(&self) -> &MeshStatus {
+        &self.status
+    }
+
+    /// Device time of stage 0.
+    pub fn time(&self) -> &Readback {
+        &self.time
+    }
+
+    /// Bytes of the neighbour table, counted apart from the tree.
+    pub fn neighbour_bytes(&self) -> u64 {
+        16 * u64::from(self.input.tets)
+    }
+}

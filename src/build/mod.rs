@@ -1,0 +1,80 @@
+//! Construction of the tree on the device (the paper's §3.2), as a pipeline of recorded stages.
+//!
+//! ```text
+//! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits   (once per mesh)
+//! 1 depth    estimate per tetrahedron → level l                                                            Eq. 11–12
+//! 2 codes    count cells per tetrahedron · scan · [filter] · emit (code, primitive) · stable radix sort    Eq. 1–6
+//! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
+//! 4 leaves   boundary flags, boxes                                                                         Alg. 1
+//!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
+//! ```
+//! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole pipeline within given capacities;
+//! [`Tree::build`] records the same stages in three submissions, and reads two counts back to allocate exactly.
+
+mod mesh;
+mod plan;
+mod stages;
+mod tree;
+
+pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
+pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+pub use stages::MeshView;
+pub use tree::Tree;
+
+use crate::error::Result;
+use crate::gpu::{Gpu, Recorder};
+use crate::options::BuildOptions;
+use crate::primitives::Arena;
+use stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+
+/// Scratch memory of a whole build.
+#[derive(Clone, Copy, Debug)]
+pub struct BuildScratch {
+    pub(crate) counts: CountScratch,
+    pub(crate) filter: Option<FilterScratch>,
+    pub(crate) sorted: SortedScratch,
+}
+
+impl BuildScratch {
+    /// For a mesh of `tets` tetrahedra within `capacity`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
+        Ok(Self {
+            counts: CountScratch::carve(gpu, arena, tets)?,
+            filter: FilterScratch::carve(gpu, arena, options.assign, capacity.candidates)?,
+            sorted: SortedScratch::carve(gpu, arena, capacity)?,
+        })
+    }
+}
+
+/// Records a whole build within `capacity`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
+/// more entries, a coarser one is built; `tree.status` says what was.
+///
+/// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
+/// write, behind it stands a barrier to compute, transfer and indirect reads.
+///
+/// # Errors
+/// [`crate::Error::Invalid`] for α outside 0…10.
+pub fn cmd_build(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    tree: &TreeMemory,
+    capacity: &Capacity,
+    options: &BuildOptions,
+    scratch: &BuildScratch,
+) -> Result<()> {
+    let BuildScratch { counts, filter, sorted } = scratch;
+    cmd_depth(r, mesh, tree.status, tree.grid, options, (capacity.candidates, capacity.level), counts)?;
+    cmd_count(r, mesh, tree.grid, counts)?;
+    if let Some(filter) = filter {
+        cmd_filter(r, mesh, tree.grid, options, capacity.candidates, counts, filter)?;
+    }
+    cmd_codes(r, mesh, tree, capacity, counts, filter.as_ref(), sorted)?;
+    let entries = entries(capacity, counts, filter.as_ref());
+    cmd_count_splits(r, tree.status, tree.grid, capacity, entries, sorted)?;
+    cmd_splits(r, tree, capacity, entries, sorted)?;
+    cmd_leaves(r, mesh, tree, capacity, entries, sorted)?;
+    cmd_levels(r, tree, capacity, sorted)
+}

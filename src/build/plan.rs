@@ -1,0 +1,174 @@
+//! Memory of a build: what the tree keeps, and what is scratch.
+
+use crate::error::Result;
+use crate::gpu::{BufferRef, Gpu};
+use crate::layout::{BuildStatus, Grid};
+use crate::options::{Assign, BuildOptions};
+use crate::primitives::{Arena, ScanScratch, SortScratch};
+
+/// Sizes that bound a build.
+#[derive(Clone, Copy, Debug)]
+pub struct Capacity {
+    /// Cells in the quantized boxes of all tetrahedra, the entries of `Aabb`.
+    pub candidates: u32,
+    /// Entries of the assignment chosen.
+    pub entries: u32,
+    /// Nodes.
+    pub nodes: u32,
+    /// Deepest level.
+    pub level: u32,
+}
+
+impl Capacity {
+    /// Bounds for at most `entries` entries down to `level`: `n_n ≤ 1 + Σ min(n_m, 8^k)` (SPEC 2.4).
+    pub fn for_entries(entries: u32, level: u32) -> Self {
+        let nodes = (1..=level).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
+        Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
+    }
+}
+
+/// The arrays of a tree in device memory (SPEC 2.5), parts of one range.
+#[derive(Clone, Copy, Debug)]
+pub struct TreeMemory {
+    /// [`BuildStatus`]: what was built.
+    pub status: BufferRef,
+    /// [`Grid`] with the level of the leaves.
+    pub grid: BufferRef,
+    /// Primitive ids by Morton code.
+    pub p: BufferRef,
+    /// Ends of the nodes in `p`.
+    pub po: BufferRef,
+    /// Last children of the internal nodes.
+    pub co: BufferRef,
+    /// Boundary flags, one bit per node.
+    pub flags: BufferRef,
+    /// Child masks, one byte per internal node.
+    pub masks: BufferRef,
+    /// Boxes, 24 bytes per node, where they are stored.
+    pub boxes: Option<BufferRef>,
+}
+
+impl TreeMemory {
+    /// Takes status and grid, which are needed before the sizes of the rest are known.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve_head(arena: &mut Arena) -> Result<(BufferRef, BufferRef)> {
+        Ok((arena.take(size_of::<BuildStatus>() as u64)?, arena.take(size_of::<Grid>() as u64)?))
+    }
+
+    /// Takes all arrays.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
+        let (status, grid) = Self::carve_head(arena)?;
+        let nodes = u64::from(capacity.nodes);
+        // Leaves are not internal: what is left of the nodes bounds CO and the masks.
+        let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
+        Ok(Self {
+            status,
+            grid,
+            p: arena.words(u64::from(capacity.entries))?,
+            po: arena.words(nodes + 1)?,
+            co: arena.words(internal + 1)?,
+            flags: arena.words(nodes.div_ceil(32))?,
+            masks: arena.words(internal.div_ceil(4))?,
+            boxes: if options.boxes { Some(arena.words(6 * nodes)?) } else { None },
+        })
+    }
+}
+
+/// Scratch memory of the first half of a build: depth, counts, filter.
+#[derive(Clone, Copy, Debug)]
+pub struct CountScratch {
+    pub(crate) offsets: BufferRef,
+    pub(crate) total: BufferRef,
+    pub(crate) candidates: BufferRef,
+    pub(crate) scan: ScanScratch,
+}
+
+impl CountScratch {
+    /// For a mesh of this many tetrahedra.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32) -> Result<Self> {
+        Ok(Self {
+            offsets: arena.words(u64::from(tets) + 1)?,
+            total: arena.words(1)?,
+            candidates: arena.words(1)?,
+            scan: ScanScratch::carve(gpu, arena, tets + 1)?,
+        })
+    }
+}
+
+/// Scratch memory of the filter of `Planes` and `Exact`: two words per 32 candidates.
+#[derive(Clone, Copy, Debug)]
+pub struct FilterScratch {
+    pub(crate) hits: BufferRef,
+    pub(crate) counts: BufferRef,
+    pub(crate) entries: BufferRef,
+    pub(crate) words: BufferRef,
+    pub(crate) arguments: BufferRef,
+    pub(crate) scan: ScanScratch,
+}
+
+impl FilterScratch {
+    /// For this many candidates; nothing for `Aabb`.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, assign: Assign, candidates: u32) -> Result<Option<Self>> {
+        if assign == Assign::Aabb {
+            return Ok(None);
+        }
+        let words = candidates.div_ceil(32);
+        Ok(Some(Self {
+            hits: arena.words(u64::from(words))?,
+            counts: arena.words(u64::from(words))?,
+            entries: arena.words(1)?,
+            words: arena.words(1)?,
+            arguments: arena.words(3)?,
+            scan: ScanScratch::carve(gpu, arena, words)?,
+        }))
+    }
+}
+
+/// Scratch memory of the second half: codes, sort, splits.
+#[derive(Clone, Copy, Debug)]
+pub struct SortedScratch {
+    pub(crate) codes: BufferRef,
+    pub(crate) sort: SortScratch,
+    pub(crate) splits: BufferRef,
+    /// Length of the table of splits, and the total of its scan.
+    pub(crate) table_length: BufferRef,
+    pub(crate) node_total: BufferRef,
+    pub(crate) groups: BufferRef,
+    /// Of the dispatch that emits codes; of those over sorted entries.
+    pub(crate) emit_arguments: BufferRef,
+    pub(crate) arguments: BufferRef,
+    pub(crate) scan: ScanScratch,
+}
+
+impl SortedScratch {
+    /// For this many entries and levels.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, capacity: &Capacity) -> Result<Self> {
+        let runs = capacity.entries.div_ceil(gpu.target().run.rows);
+        let table = runs * (capacity.level + 1);
+        Ok(Self {
+            codes: arena.words(u64::from(capacity.entries))?,
+            sort: SortScratch::carve(gpu, arena, capacity.entries, 3 * capacity.level)?,
+            splits: arena.words(u64::from(table) + 1)?,
+            table_length: arena.words(1)?,
+            node_total: arena.words(1)?,
+            groups: arena.words(36)?,
+            emit_arguments: arena.words(3)?,
+            arguments: arena.words(3)?,
+            scan: ScanScratch::carve(gpu, arena, table)?,
+        })
+    }
+}

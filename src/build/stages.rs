@@ -1,0 +1,285 @@
+//! The stages of a build as functions that append to a recorder; [`super`] puts them in order.
+
+use super::mesh::{MeshArrays, MeshInput, STRIDED_GROUPS};
+use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use crate::error::Result;
+use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::kernels::{
+    ChooseDepth, ChooseDepthSpec, Count as CountCells, CountSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec,
+    EmitSplits, EmitSplitsSpec, EstimateDepth, EstimateDepthSpec, Filter, FilterSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves,
+    FlagLeavesSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, WordsOf, WordsOfSpec,
+};
+use crate::layout::{BuildStatus, Grid};
+use crate::options::BuildOptions;
+use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
+
+/// A mesh as the stages see it.
+#[derive(Clone, Copy, Debug)]
+pub struct MeshView {
+    /// Points and cells.
+    pub input: MeshInput,
+    /// What stage 0 made of them.
+    pub arrays: MeshArrays,
+}
+
+/// Stage 1: the level of the leaves (§3.2; SPEC 2.4), into `grid` and `status`.
+pub(crate) fn cmd_depth(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    status: BufferRef,
+    grid: BufferRef,
+    options: &BuildOptions,
+    (max_entries, deepest): (u32, u32),
+    scratch: &CountScratch,
+) -> Result<()> {
+    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let workgroup = r.gpu().target().each;
+    let alpha = options.alpha_fixed()?;
+    let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
+    r.stage("build.depth", |r| {
+        r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
+        r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
+        r.barrier("depth.clear → depth.estimate");
+        let groups = tets.div_ceil(workgroup).clamp(1, STRIDED_GROUPS);
+        let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, groups };
+        r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(groups))?;
+        r.barrier("depth.estimate → depth.choose");
+        let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
+        let choose = ChooseDepth { mesh: mesh.arrays.status, grid, status, candidates: scratch.candidates, tets, alpha, capacity, deepest };
+        r.dispatch(&choose, once, Groups::Count(1))?;
+        r.barrier("depth.choose → codes.count");
+        Ok(())
+    })
+}
+
+/// Stage 2, first part: how many entries every tetrahedron has, and where they begin.
+pub(crate) fn cmd_count(r: &mut Recorder<'_>, mesh: &MeshView, grid: BufferRef, scratch: &CountScratch) -> Result<()> {
+    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let workgroup = r.gpu().target().each;
+    r.stage("build.count", |r| {
+        let count = CountCells { grid, positions, cells, bad: mesh.arrays.bad, counts: scratch.offsets, tets, stride };
+        r.dispatch(&count, CountSpec { workgroup, ..Default::default() }, Groups::Count((tets + 1).div_ceil(workgroup)))?;
+        cmd_exclusive_scan(r, scratch.offsets, scratch.offsets, scratch.total, Count::host(tets + 1), &scratch.scan)
+    })
+}
+
+/// Stage 2 of `Planes` and `Exact`: which candidates are entries; their number goes to `filter.entries`.
+pub(crate) fn cmd_filter(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    max_candidates: u32,
+    scratch: &CountScratch,
+    filter: &FilterScratch,
+) -> Result<()> {
+    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let workgroup = r.gpu().target().each;
+    let candidates = scratch.candidates;
+    r.stage("build.filter", |r| {
+        let once = r.gpu().subgroup_size();
+        let words = WordsOf { bits: candidates, words: filter.words, most: max_candidates };
+        r.dispatch(&words, WordsOfSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
+        r.barrier("filter.words → filter");
+        let count = Count::device(max_candidates.div_ceil(32), filter.words);
+        let groups = count.groups(r, workgroup, filter.arguments, "codes.scan → codes.filter")?;
+        let arguments = Filter {
+            grid,
+            positions,
+            cells,
+            bad: mesh.arrays.bad,
+            vertices: mesh.arrays.vertices,
+            offsets: scratch.offsets,
+            candidates,
+            hits: filter.hits,
+            counts: filter.counts,
+            tets,
+            stride,
+            capacity: max_candidates,
+        };
+        r.dispatch(&arguments, FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() }, groups)?;
+        cmd_exclusive_scan(r, filter.counts, filter.counts, filter.entries, count, &filter.scan)
+    })
+}
+
+/// Stage 2, second part: codes and primitive ids of all entries, sorted by code.
+pub(crate) fn cmd_codes(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    tree: &TreeMemory,
+    capacity: &Capacity,
+    counts: &CountScratch,
+    filter: Option<&FilterScratch>,
+    scratch: &SortedScratch,
+) -> Result<()> {
+    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let (grid, bad, offsets, candidates, codes, ids) =
+        (tree.grid, mesh.arrays.bad, counts.offsets, counts.candidates, scratch.codes, tree.p);
+    let target = *r.gpu().target();
+    r.stage("build.emit", |r| {
+        if let Some(filter) = filter {
+            let words = Count::device(capacity.candidates.div_ceil(32), filter.words);
+            let groups = words.groups(r, target.each, filter.arguments, "codes.filter → codes.emit")?;
+            let (hits, places) = (filter.hits, filter.counts);
+            let emit = EmitHits {
+                grid,
+                positions,
+                cells,
+                bad,
+                offsets,
+                candidates,
+                hits,
+                places,
+                codes,
+                ids,
+                tets,
+                stride,
+                capacity: capacity.candidates,
+                room: capacity.entries,
+            };
+            r.dispatch(&emit, EmitHitsSpec { workgroup: target.each, ..Default::default() }, groups)?;
+        } else {
+            let groups = Count::device(capacity.entries, candidates).groups(
+                r,
+                target.run.tile(),
+                scratch.emit_arguments,
+                "codes.scan → codes.emit",
+            )?;
+            let emit = Emit { grid, positions, cells, bad, offsets, candidates, codes, ids, tets, stride, capacity: capacity.entries };
+            r.dispatch(&emit, EmitSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
+        }
+        Ok(())
+    })?;
+    let entries = entries(capacity, counts, filter);
+    r.stage("build.sort", |r| cmd_sort_pairs(r, codes, ids, 3 * capacity.level, entries, &scratch.sort))
+}
+
+/// The number of entries as the device knows it.
+pub(crate) fn entries(capacity: &Capacity, counts: &CountScratch, filter: Option<&FilterScratch>) -> Count {
+    Count::device(capacity.entries, filter.map_or(counts.candidates, |f| f.entries))
+}
+
+/// Stage 3, first part: how many nodes end where on each level; `NO` and the number of nodes, into `status`.
+pub(crate) fn cmd_count_splits(
+    r: &mut Recorder<'_>,
+    status: BufferRef,
+    grid: BufferRef,
+    capacity: &Capacity,
+    entries: Count,
+    scratch: &SortedScratch,
+) -> Result<()> {
+    let target = *r.gpu().target();
+    let (live, codes, splits, table_length) = (entries.word(r.gpu()), scratch.codes, scratch.splits, scratch.table_length);
+    let once = r.gpu().subgroup_size();
+    let run = target.run.rows;
+    r.stage("build.count_splits", |r| {
+        let plan = PlanNodes {
+            grid,
+            entries: live,
+            places: splits,
+            table_length,
+            node_total: scratch.node_total,
+            status,
+            groups: scratch.groups,
+            capacity: capacity.entries,
+            nodes: capacity.nodes,
+            run,
+        };
+        r.dispatch(&plan, PlanNodesSpec { workgroup: once, stage: 0, each: target.each, ..Default::default() }, Groups::Count(1))?;
+        // The words serve the splits and the leaves too.
+        let groups = entries.groups(r, target.run.tile(), scratch.arguments, "codes.sort → splits.count")?;
+        let count = CountSplits { grid, entries: live, codes, counts: splits, capacity: capacity.entries };
+        r.dispatch(&count, CountSplitsSpec { workgroup: target.run.workgroup, rows: run }, groups)?;
+        let runs = capacity.entries.div_ceil(run);
+        let table = Count::device(runs * (capacity.level + 1), table_length);
+        cmd_exclusive_scan(r, splits, splits, scratch.node_total, table, &scratch.scan)?;
+        r.barrier("splits.scan → splits.plan");
+        r.dispatch(&plan, PlanNodesSpec { workgroup: once, stage: 1, each: target.each, ..Default::default() }, Groups::Count(1))?;
+        r.barrier("splits.plan → splits.emit");
+        Ok(())
+    })
+}
+
+/// Stage 3, second part: `PO` and `CO`.
+pub(crate) fn cmd_splits(
+    r: &mut Recorder<'_>,
+    tree: &TreeMemory,
+    capacity: &Capacity,
+    entries: Count,
+    scratch: &SortedScratch,
+) -> Result<()> {
+    let target = r.gpu().target().run;
+    let TreeMemory { status, grid, po, co, .. } = *tree;
+    r.stage("build.splits", |r| {
+        r.fill(tree.flags, 0);
+        r.fill(tree.masks, 0);
+        let arguments = EmitSplits {
+            grid,
+            entries: entries.word(r.gpu()),
+            codes: scratch.codes,
+            places: scratch.splits,
+            status,
+            po,
+            co,
+            capacity: capacity.entries,
+            nodes: capacity.nodes,
+        };
+        r.dispatch(
+            &arguments,
+            EmitSplitsSpec { workgroup: target.workgroup, rows: target.rows },
+            Groups::Indirect(scratch.arguments.part(0, 12)),
+        )?;
+        r.barrier("splits.emit → leaves");
+        Ok(())
+    })
+}
+
+/// Stage 4, first part: leaves (Alg. 1).
+pub(crate) fn cmd_leaves(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    tree: &TreeMemory,
+    capacity: &Capacity,
+    entries: Count,
+    scratch: &SortedScratch,
+) -> Result<()> {
+    let target = *r.gpu().target();
+    let TreeMemory { status, grid, p, po, flags, .. } = *tree;
+    r.stage("build.leaves", |r| {
+        let groups = Groups::Indirect(scratch.arguments.part(0, 12));
+        let flag = FlagLeaves {
+            entries: entries.word(r.gpu()),
+            p,
+            po,
+            boundary_cells: mesh.arrays.boundary,
+            status,
+            flags,
+            capacity: capacity.entries,
+        };
+        r.dispatch(&flag, FlagLeavesSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
+        r.barrier("leaves.flag → leaves.finish");
+        let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
+        let (cells, vertices) = (mesh.input.cells, mesh.arrays.vertices);
+        let finish = FinishLeaves { grid, codes: scratch.codes, po, flags, status, boxes, p, cells, vertices, unused: 0 };
+        let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), ..Default::default() };
+        r.dispatch(&finish, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
+        r.barrier("leaves.finish → levels");
+        Ok(())
+    })
+}
+
+/// Stage 4, second part: internal nodes, level by level upwards (Alg. 2).
+pub(crate) fn cmd_levels(r: &mut Recorder<'_>, tree: &TreeMemory, capacity: &Capacity, scratch: &SortedScratch) -> Result<()> {
+    let workgroup = r.gpu().target().each;
+    let TreeMemory { status, grid, po, co, flags, masks, .. } = *tree;
+    let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
+    let spec = MergeLevelSpec { workgroup, boxes: u32::from(tree.boxes.is_some()), ..Default::default() };
+    r.stage("build.levels", |r| {
+        for level in (0..capacity.level).rev() {
+            let merge = MergeLevel { grid, status, codes: scratch.codes, po, co, flags, masks, boxes, level };
+            r.dispatch(&merge, spec, Groups::Indirect(scratch.groups.part(u64::from(12 * level), 12)))?;
+            r.barrier("levels.lower → levels.upper");
+        }
+        Ok(())
+    })
+}

@@ -1,0 +1,201 @@
+//! A tree in device memory of our own.
+
+use super::mesh::DeviceMesh;
+use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
+use crate::layout::{BuildStatus, Grid};
+use crate::options::BuildOptions;
+use crate::primitives::Arena;
+use crate::reference::grid::MAX_LEVEL;
+use crate::tree::TreeArrays;
+use bytemuck::Pod;
+
+/// An OLBVH in device memory.
+#[derive(Debug)]
+pub struct Tree {
+    gpu: Gpu,
+    options: BuildOptions,
+    memory: TreeMemory,
+    status: BuildStatus,
+    grid: Grid,
+    stages: Vec<StageTime>,
+    scratch_bytes: u64,
+    entry_buffer: Buffer,
+    node_buffer: Buffer,
+}
+
+/// Scratch or tree memory carved to measure.
+fn reserve<T>(gpu: &Gpu, name: &str, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<(Buffer, T)> {
+    let buffer = gpu.buffer(name, Arena::measure(&carve)?)?;
+    let parts = carve(&mut Arena::new(buffer.all()))?;
+    Ok((buffer, parts))
+}
+
+fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Result<T> {
+    Ok(gpu.download::<T>(buffer, part.part(0, size_of::<T>() as u64))?.first().copied().unwrap_or_default())
+}
+
+impl Tree {
+    /// Builds a tree over a mesh: three submissions, between them the numbers of entries and nodes are read back, so that
+    /// exactly what is needed is allocated.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for α outside 0…10, [`Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
+    /// [`Error::Memory`] if it does not fit the device.
+    pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
+        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let tets = view.input.tets;
+        let mut stages = Vec::new();
+
+        // Depth and counts: the level, and the number of candidates.
+        let (head, (status, grid)) = reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
+        let (counts_buffer, counts) = reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
+        let ((), time) = gpu.run("olbvh.build.counts", |r| {
+            cmd_depth(r, &view, status, grid, options, (u32::MAX, MAX_LEVEL), &counts)?;
+            cmd_count(r, &view, grid, &counts)
+        })?;
+        stages.extend(time.stages);
+        let measured: BuildStatus = first(gpu, &head, status)?;
+        refuse_overflow(&measured, options)?;
+        let level = measured.level;
+        let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
+
+        // Which candidates are entries.
+        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, options.assign, capacity.candidates))?;
+        let (filter_buffer, filter) = filter_buffer;
+        if let Some(filter) = &filter {
+            let ((), time) =
+                gpu.run("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, capacity.candidates, &counts, filter))?;
+            stages.extend(time.stages);
+            capacity.entries = first(gpu, &filter_buffer, filter.entries)?;
+        }
+
+        // Codes and the number of nodes. P is the tree's; the rest is scratch.
+        capacity.nodes = Capacity::for_entries(capacity.entries, level).nodes;
+        let entry_buffer = gpu.buffer("olbvh.tree.p", 4 * u64::from(capacity.entries.max(4)))?;
+        let (sorted_buffer, sorted) = reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
+        let entries = entries(&capacity, &counts, filter.as_ref());
+        let nothing = gpu.nothing();
+        let mut memory =
+            TreeMemory { status, grid, p: entry_buffer.all(), po: nothing, co: nothing, flags: nothing, masks: nothing, boxes: None };
+        let ((), time) = gpu.run("olbvh.build.codes", |r| {
+            cmd_codes(r, &view, &memory, &capacity, &counts, filter.as_ref(), &sorted)?;
+            cmd_count_splits(r, status, grid, &capacity, entries, &sorted)
+        })?;
+        stages.extend(time.stages);
+        let planned: BuildStatus = first(gpu, &head, status)?;
+        refuse_overflow(&planned, options)?;
+        capacity.nodes = planned.nodes;
+
+        // Nodes.
+        let carve_nodes = |a: &mut Arena| {
+            let (status, grid) = TreeMemory::carve_head(a)?;
+            let (nodes, internal) = (u64::from(planned.nodes), u64::from(planned.internal));
+            Ok(TreeMemory {
+                status,
+                grid,
+                p: entry_buffer.all(),
+                po: a.words(nodes + 1)?,
+                co: a.words(internal + 1)?,
+                flags: a.words(nodes.div_ceil(32))?,
+                masks: a.words(internal.div_ceil(4))?,
+                boxes: if options.boxes { Some(a.words(6 * nodes)?) } else { None },
+            })
+        };
+        let (node_buffer, nodes) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
+        let head_memory = memory;
+        memory = nodes;
+        let ((), time) = gpu.run("olbvh.build.nodes", |r| {
+            r.copy(head_memory.status.part(0, size_of::<BuildStatus>() as u64), memory.status);
+            r.copy(head_memory.grid.part(0, size_of::<Grid>() as u64), memory.grid);
+            r.barrier("head → splits");
+            cmd_splits(r, &memory, &capacity, entries, &sorted)?;
+            cmd_leaves(r, &view, &memory, &capacity, entries, &sorted)?;
+            cmd_levels(r, &memory, &capacity, &sorted)
+        })?;
+        stages.extend(time.stages);
+        let status: BuildStatus = first(gpu, &node_buffer, memory.status)?;
+        refuse_overflow(&status, options)?;
+        let grid: Grid = first(gpu, &node_buffer, memory.grid)?;
+        let scratch_bytes = head.size() + counts_buffer.size() + filter_buffer.size() + sorted_buffer.size();
+        Ok(Self { gpu: gpu.clone(), options: *options, memory, status, grid, stages, scratch_bytes, entry_buffer, node_buffer })
+    }
+
+    /// The arrays in host memory.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn download(&self) -> Result<TreeArrays> {
+        let words = |part: BufferRef, n: u64| self.gpu.download::<u32>(&self.node_buffer, part.part(0, 4 * n));
+        let (nodes, internal) = (u64::from(self.status.nodes), u64::from(self.status.internal));
+        let boxes = match self.memory.boxes {
+            Some(part) => Some(self.gpu.download(&self.node_buffer, part.part(0, 24 * nodes))?),
+            None => None,
+        };
+        Ok(TreeArrays {
+            assign: self.options.assign,
+            grid: self.grid,
+            p: self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?,
+            po: words(self.memory.po, nodes + 1)?,
+            co: words(self.memory.co, internal + 1)?,
+            no: self.status.levels[..=self.status.level as usize].to_vec(),
+            boundary: words(self.memory.flags, nodes.div_ceil(32))?,
+            mask: words(self.memory.masks, internal.div_ceil(4))?,
+            boxes,
+        })
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Where the arrays lie.
+    pub fn memory(&self) -> &TreeMemory {
+        &self.memory
+    }
+
+    /// What was built.
+    pub fn status(&self) -> &BuildStatus {
+        &self.status
+    }
+
+    /// The grid with the level of the leaves.
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+
+    /// The options it was built with.
+    pub fn options(&self) -> &BuildOptions {
+        &self.options
+    }
+
+    /// Device time of every stage, in order.
+    pub fn stages(&self) -> &[StageTime] {
+        &self.stages
+    }
+
+    /// Bytes of scratch memory that the build used beside the tree.
+    pub fn scratch_bytes(&self) -> u64 {
+        self.scratch_bytes
+    }
+}
+
+/// A caller who named a capacity gets the coarser tree; one who did not gets the figures.
+fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
+    let at = |k: u32| u64::from(status.total[2 * k as usize]) | u64::from(status.total[2 * k as usize + 1]) << 32;
+    let wanted = status.heuristic_level;
+    match options.capacity {
+        None if wanted > status.level || status.overflow != 0 => {
+            let text =
+                format!("{} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity", at(wanted), u32::MAX);
+            Err(Error::TooLarge(text))
+        }
+        Some(capacity) if status.overflow != 0 => {
+            Err(Error::TooLarge(format!("a tree of a single node has {} entries, the capacity is {capacity}", at(0))))
+        }
+        _ => Ok(()),
+    }
+}

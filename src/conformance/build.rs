@@ -1,0 +1,226 @@
+//! Construction against the reference, stage by stage.
+
+use super::TargetKind;
+use super::buffers::{Guarded, part as part_of};
+use super::build_expected::Expected;
+use super::failure::{Stop, Verdict, compare, compare_one};
+use super::meshes::MeshRecipe;
+use crate::build::{BadCells, BuildScratch, Capacity, DeviceMesh, MeshView, Tree, TreeMemory, cmd_build};
+use crate::gpu::{BufferRef, Gpu};
+use crate::layout::{BuildStatus, Grid};
+use crate::mesh::Mesh;
+use crate::options::{Assign, BuildOptions};
+use crate::primitives::Arena;
+use crate::reference::boundary::{Topology, topology};
+use crate::tree::TreeArrays;
+
+/// Which interface builds, within what.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Way {
+    /// [`Tree::build`]: counts are read back, exactly what is needed is allocated.
+    Owned,
+    /// [`cmd_build`] with room to spare.
+    Recorded,
+    /// [`cmd_build`] with room for exactly this tree.
+    Tight,
+    /// [`cmd_build`] with room for one entry less than the heuristic's level needs.
+    Clipped,
+    /// [`cmd_build`] with room for level 0 only.
+    Root,
+    /// [`cmd_build`] with room for less than level 0: nothing is built, and the status says so.
+    Nothing,
+    /// [`cmd_build`] with room for levels 0 to 2 only.
+    Shallow,
+}
+
+impl Way {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Owned => "owned",
+            Self::Recorded => "recorded",
+            Self::Tight => "tight",
+            Self::Clipped => "clipped",
+            Self::Root => "root",
+            Self::Nothing => "nothing",
+            Self::Shallow => "shallow",
+        }
+    }
+}
+
+/// A tree to build.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct BuildCase {
+    pub mesh: MeshRecipe,
+    pub alpha: f32,
+    pub assign: Assign,
+    pub boxes: bool,
+    pub way: Way,
+    pub target: TargetKind,
+}
+
+pub(crate) fn check(gpu: &Gpu, case: &BuildCase) -> Verdict {
+    let mesh = case.mesh.mesh()?;
+    let topology = topology(&mesh)?;
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, boxes: case.boxes, capacity: None };
+    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+    let expected = Expected::new(&mesh, &topology, &options, u32::MAX, 10)?;
+    match case.way {
+        Way::Owned => owned(gpu, &mesh, &topology, &device, &options, &expected),
+        way => {
+            let (capacity, expected) = within(way, &mesh, &topology, &options, expected)?;
+            recorded(gpu, &mesh, &topology, &device, &options, &capacity, &expected)
+        }
+    }
+}
+
+/// The capacity of a way of building, and what is built within it.
+fn within(way: Way, mesh: &Mesh, topology: &Topology, options: &BuildOptions, ample: Expected) -> Verdict<(Capacity, Expected)> {
+    let limit = |entries: u64| u32::try_from(entries).unwrap_or(u32::MAX);
+    let sizes = ample.sizes.entries;
+    let room = limit(sizes[ample.heuristic as usize]);
+    let (entries, level) = match way {
+        Way::Clipped => (room.saturating_sub(1).max(limit(sizes[0])), 10),
+        Way::Root => (limit(sizes[0]), 10),
+        Way::Nothing => (limit(sizes[0]).saturating_sub(1), 10),
+        Way::Shallow => (room, 2),
+        Way::Owned | Way::Recorded | Way::Tight => (room, 10),
+    };
+    let expected = if way == Way::Recorded || way == Way::Tight { ample } else { Expected::new(mesh, topology, options, entries, level)? };
+    let capacity = match way {
+        Way::Tight => Capacity {
+            candidates: expected.status.candidates,
+            entries: expected.status.entries,
+            nodes: expected.status.nodes,
+            level: expected.status.level,
+        },
+        Way::Recorded => Capacity::for_entries(entries + entries / 2 + 100, level),
+        _ => Capacity::for_entries(entries, level),
+    };
+    Ok((capacity, expected))
+}
+
+fn owned(gpu: &Gpu, mesh: &Mesh, topology: &Topology, device: &DeviceMesh, options: &BuildOptions, expected: &Expected) -> Verdict {
+    let tree = Tree::build(gpu, device, options)?;
+    compare_status(&expected.status, tree.status())?;
+    compare_arrays(expected, &tree.download()?)?;
+    // Exactly the plan, nothing more (arrays have 16 bytes at least).
+    let (s, memory) = (&expected.status, tree.memory());
+    let size = |name: &str, words: u32, part: BufferRef| compare_one("build.plan", name, &(4 * u64::from(words)).max(16), &part.size);
+    size("P (bytes)", s.entries, memory.p)?;
+    size("PO (bytes)", s.nodes + 1, memory.po)?;
+    size("CO (bytes)", s.internal + 1, memory.co)?;
+    size("flags (bytes)", s.nodes.div_ceil(32), memory.flags)?;
+    size("masks (bytes)", s.internal.div_ceil(4), memory.masks)?;
+    match memory.boxes {
+        Some(boxes) => size("boxes (bytes)", 6 * s.nodes, boxes)?,
+        None => compare_one("build.plan", "boxes", &false, &options.boxes)?,
+    }
+    tree.download()?.validate(mesh, topology)?;
+    Ok(())
+}
+
+fn recorded(
+    gpu: &Gpu,
+    mesh: &Mesh,
+    topology: &Topology,
+    device: &DeviceMesh,
+    options: &BuildOptions,
+    capacity: &Capacity,
+    expected: &Expected,
+) -> Verdict {
+    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let carve_tree = |a: &mut Arena| TreeMemory::carve(a, capacity, options);
+    let tree_memory = Guarded::scratch(gpu, "olbvh.conformance.tree", Arena::measure(carve_tree)?)?;
+    let tree = carve_tree(&mut Arena::new(tree_memory.all()))?;
+    let carve = |a: &mut Arena| BuildScratch::carve(gpu, a, view.input.tets, capacity, options);
+    let scratch_memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
+    let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
+    gpu.run("olbvh.conformance.build", |r| cmd_build(r, &view, &tree, capacity, options, &scratch))?;
+
+    let content = tree_memory.read(gpu, "build")?;
+    let scratch_content = scratch_memory.read(gpu, "build")?;
+    let words = |part: BufferRef, n: usize| part_of(&content, part, n).to_vec();
+    let in_scratch = |part: BufferRef, n: usize| part_of(&scratch_content, part, n);
+    let status: BuildStatus = one(&words(tree.status, size_of::<BuildStatus>() / 4))?;
+    compare_one("build.estimate_depth", "status.sum", &expected.status.sum, &status.sum)?;
+    compare("build.estimate_depth", "status.total", &expected.status.total, &status.total)?;
+    compare_one("build.choose_depth", "status.heuristic_level", &expected.status.heuristic_level, &status.heuristic_level)?;
+    compare_one("build.choose_depth", "status.level", &expected.status.level, &status.level)?;
+    compare_one("build.choose_depth", "status.candidates", &expected.status.candidates, &status.candidates)?;
+    compare_one("build.choose_depth", "status.overflow", &expected.status.overflow, &status.overflow)?;
+    if expected.status.overflow != 0 {
+        return Ok(());
+    }
+    compare("build.count", "offsets", &expected.offsets, in_scratch(scratch.counts.offsets, expected.offsets.len()))?;
+    if let Some(filter) = &scratch.filter {
+        compare("build.filter", "entries", &[expected.status.entries], in_scratch(filter.entries, 1))?;
+    }
+    let n = expected.codes.len();
+    compare("build.sort", "codes", &expected.codes, in_scratch(scratch.sorted.codes, n))?;
+    compare("build.sort", "P", &expected.tree.p, &words(tree.p, n))?;
+    compare_status(&expected.status, &status)?;
+    let (nodes, internal) = (status.nodes as usize, status.internal as usize);
+    let boxes =
+        tree.boxes.map(|part| words(part, 6 * nodes).chunks_exact(6).map(|b| [0, 1, 2, 3, 4, 5].map(|i| f32::from_bits(b[i]))).collect());
+    let found = TreeArrays {
+        assign: options.assign,
+        grid: one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?,
+        p: words(tree.p, n),
+        po: words(tree.po, nodes + 1),
+        co: words(tree.co, internal + 1),
+        no: status.levels[..=status.level as usize].to_vec(),
+        boundary: words(tree.flags, nodes.div_ceil(32)),
+        mask: words(tree.masks, internal.div_ceil(4)),
+        boxes,
+    };
+    compare_arrays(expected, &found)?;
+    found.validate(mesh, topology)?;
+    Ok(())
+}
+
+fn one<T: bytemuck::Pod>(words: &[u32]) -> Verdict<T> {
+    bytemuck::try_pod_read_unaligned(bytemuck::cast_slice(words))
+        .map_err(|e| super::failure::fail("build", "status", None, "bytes", &e.to_string()))
+}
+
+/// Counters, those first that are written first.
+fn compare_status(expected: &BuildStatus, found: &BuildStatus) -> Result<(), Stop> {
+    compare_one("build.choose_depth", "status.level", &expected.level, &found.level)?;
+    compare_one("build.plan_nodes", "status.entries", &expected.entries, &found.entries)?;
+    compare("build.plan_nodes", "NO (status.levels)", &expected.levels, &found.levels)?;
+    compare_one("build.plan_nodes", "status.nodes", &expected.nodes, &found.nodes)?;
+    compare_one("build.plan_nodes", "status.internal", &expected.internal, &found.internal)?;
+    compare_one("build.plan_nodes", "status.leaves", &expected.leaves, &found.leaves)?;
+    compare_one("build.finish_leaves", "status.longest_leaf", &expected.longest_leaf, &found.longest_leaf)?;
+    compare_one("build.finish_leaves", "status.boundary_leaves", &expected.boundary_leaves, &found.boundary_leaves)?;
+    compare(
+        "build",
+        "status",
+        bytemuck::cast_slice::<_, u32>(std::slice::from_ref(expected)),
+        bytemuck::cast_slice(std::slice::from_ref(found)),
+    )
+}
+
+/// The arrays of the tree, those first that are written first.
+fn compare_arrays(expected: &Expected, found: &TreeArrays) -> Verdict {
+    let (e, f) = (&expected.tree, found);
+    let words = |grid| bytemuck::cast_slice::<Grid, u32>(std::slice::from_ref(grid)).to_vec();
+    compare("build.choose_depth", "grid", &words(&e.grid), &words(&f.grid))?;
+    compare("build.sort", "P", &e.p, &f.p)?;
+    compare("build.emit_splits", "NO", &e.no, &f.no)?;
+    compare("build.emit_splits", "PO", &e.po, &f.po)?;
+    compare("build.emit_splits", "CO", &e.co, &f.co)?;
+    let flags = |t: &TreeArrays| t.leaves().map(|j| (j, t.is_boundary(j))).collect::<Vec<_>>();
+    compare("build.flag_leaves", "boundary of the leaves (node, flag)", &flags(e), &flags(f))?;
+    compare("build.merge_level", "boundary", &e.boundary, &f.boundary)?;
+    compare("build.merge_level", "masks", &e.mask, &f.mask)?;
+    compare_one("build.finish_leaves", "boxes.is_some()", &e.boxes.is_some(), &f.boxes.is_some())?;
+    if let (Some(a), Some(b)) = (&e.boxes, &f.boxes) {
+        let bits = |b: &[[f32; 6]]| b.iter().map(|b| b.map(f32::to_bits)).collect::<Vec<_>>();
+        let (a, b) = (bits(a), bits(b));
+        let first = e.internal_nodes() as usize;
+        compare("build.finish_leaves", "boxes of the leaves", &a[first..], b.get(first..).unwrap_or_default())?;
+        compare("build.merge_level", "boxes", &a, &b)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,105 @@
+//! Runs cases on a device.
+
+use super::failure::Stop;
+use super::{Case, Failure, TargetKind, Work, build, locate, picture, primitives, topology};
+use crate::error::Result;
+use crate::gpu::{Gpu, GpuOptions};
+use std::collections::HashMap;
+use std::time::{Duration, Instant};
+
+/// How a case ended.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Device and reference agree.
+    Passed,
+    /// They do not.
+    Failed(Failure),
+    /// The device cannot hold the case; the text says why.
+    Skipped(String),
+}
+
+/// A case that was run.
+#[derive(Clone, Debug)]
+pub struct Report {
+    /// Name of the case.
+    pub name: String,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// How long it took.
+    pub time: Duration,
+}
+
+/// A device to run cases on, opened once per shape of the kernels.
+#[derive(Debug)]
+pub struct Lab {
+    options: GpuOptions,
+    device: Gpu,
+    gpus: HashMap<TargetKind, Gpu>,
+    messages: usize,
+}
+
+impl Lab {
+    /// A lab on the device and binding that `options` name. The self-test is left to the case `device/self-test`, so that a device that fails it
+    /// can still be looked into.
+    ///
+    /// # Errors
+    /// As [`Gpu::new`].
+    pub fn new(options: &GpuOptions) -> Result<Self> {
+        let options = GpuOptions { trust: true, ..options.clone() };
+        let device = Gpu::new(&options)?;
+        Ok(Self { options, device, gpus: HashMap::new(), messages: 0 })
+    }
+
+    /// The device as it chose its shapes itself.
+    pub fn device(&self) -> &Gpu {
+        &self.device
+    }
+
+    /// The device under a shape.
+    fn gpu(&mut self, kind: TargetKind) -> Result<Gpu> {
+        let Some(target) = kind.target(self.device.subgroup_size()) else { return Ok(self.device.clone()) };
+        if let Some(gpu) = self.gpus.get(&kind) {
+            return Ok(gpu.clone());
+        }
+        let gpu = Gpu::new(&GpuOptions { target: Some(target), ..self.options.clone() })?;
+        self.gpus.insert(kind, gpu.clone());
+        Ok(gpu)
+    }
+
+    /// Runs a case. A message of a validation layer fails it.
+    pub fn run(&mut self, case: &Case) -> Report {
+        let begin = Instant::now();
+        let outcome = match self.work(&case.work) {
+            Ok(()) => Outcome::Passed,
+            Err(Stop::Failed(failure)) => Outcome::Failed(failure),
+            Err(Stop::Skipped(why)) => Outcome::Skipped(why),
+        };
+        let messages: Vec<String> = std::iter::once(&self.device).chain(self.gpus.values()).flat_map(Gpu::validation_messages).collect();
+        let fresh = messages.len().saturating_sub(self.messages);
+        self.messages = messages.len();
+        let outcome = match (outcome, messages.last()) {
+            (Outcome::Passed | Outcome::Skipped(_), Some(last)) if fresh > 0 => Outcome::Failed(Failure {
+                stage: "validation".into(),
+                array: "messages".into(),
+                index: None,
+                expected: "none".into(),
+                found: format!("{fresh}: {last}"),
+            }),
+            (outcome, _) => outcome,
+        };
+        Report { name: case.name.clone(), outcome, time: begin.elapsed() }
+    }
+
+    fn work(&mut self, work: &Work) -> std::result::Result<(), Stop> {
+        match work {
+            Work::SelfTest => Ok(crate::primitives::self_test(&self.device)?),
+            Work::Reduce(case) => primitives::reduce(&self.gpu(case.target)?, *case),
+            Work::Scan(case) => primitives::scan(&self.gpu(case.target)?, *case),
+            Work::Sort(case) => primitives::sort(&self.gpu(case.target)?, *case),
+            Work::Topology(recipe) => topology::check(&self.device, recipe),
+            Work::Build(case) => build::check(&self.gpu(case.target)?, case),
+            Work::Locate(case) => locate::check(&self.device, case),
+            Work::Picture(case) => picture::check(&self.device, case),
+        }
+    }
+}

@@ -1,0 +1,193 @@
+//! Point location against the reference: owners and barycentric coordinates to the bit.
+
+use super::buffers::Guarded;
+use super::data::Random;
+use super::failure::{Verdict, compare, fail};
+use super::meshes::MeshRecipe;
+use crate::build::{BadCells, DeviceMesh, Tree};
+use crate::gpu::Gpu;
+use crate::mesh::{Mesh, On};
+use crate::options::{Assign, BuildOptions};
+use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
+use crate::reference::boundary::{NONE, topology};
+use crate::reference::build::build;
+use crate::reference::locate::{Location, Locator};
+
+/// How points are located.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum How {
+    /// By descent, the convenient way.
+    Descent,
+    /// By the paper's traversal with a short stack of that many nodes.
+    Traversal(u32),
+    /// Recorded, with the right owner, a wrong one or none as a hint.
+    Hints,
+    /// All owners.
+    All,
+    /// With the values of a field.
+    Values,
+    /// Trees of every α and assignment name the same owners, and lose no point of the mesh.
+    Same,
+}
+
+impl How {
+    pub(crate) fn name(self) -> String {
+        match self {
+            Self::Descent => "descent".into(),
+            Self::Traversal(stack) => format!("stack-{stack}"),
+            Self::Hints => "hints".into(),
+            Self::All => "all-owners".into(),
+            Self::Values => "values".into(),
+            Self::Same => "same-owners".into(),
+        }
+    }
+}
+
+/// Points to locate.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct LocateCase {
+    pub mesh: MeshRecipe,
+    pub alpha: f32,
+    pub assign: Assign,
+    pub how: How,
+}
+
+/// Points at every kind of place. Those that `inside` counts, from the first, lie in the closed cells as far as single precision can tell.
+pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
+    let mut random = Random::new(mesh.tets.len() as u32);
+    let mut points = Vec::new();
+    let used = |ids: &[u32; 4]| ids.map(|v| mesh.points.get(v as usize).copied());
+    let cells: Vec<[[f32; 3]; 4]> = mesh.tets.iter().map(|t| used(t).map(|p| p.unwrap_or([f32::NAN; 3]))).collect();
+    let finite: Vec<_> = cells.into_iter().filter(|c| c.iter().flatten().all(|x| x.abs() < 1e37)).collect();
+    for _ in 0..if finite.is_empty() { 0 } else { 600 } {
+        let v = finite[random.below(finite.len() as u32) as usize];
+        let [a, b, c] = [random.unit(), random.unit(), random.unit()];
+        let mix = |weights: [f32; 4]| {
+            let sum: f32 = weights.iter().sum();
+            [0, 1, 2].map(|i| {
+                let x = (0..4).map(|k| v[k][i] * (weights[k] / sum)).sum::<f32>();
+                let least = v.iter().fold(f32::MAX, |m, p| m.min(p[i]));
+                let most = v.iter().fold(f32::MIN, |m, p| m.max(p[i]));
+                x.clamp(least, most)
+            })
+        };
+        points.push(v[0]);
+        points.push(mix([1.0, 1.0, 0.0, 0.0]));
+        points.push(mix([0.0, a, 1.0 - a, 0.0]));
+        points.push(mix([0.0, 1.0, 1.0, 1.0]));
+        points.push(mix([a + 0.01, b, c, 0.0]));
+        points.push(mix([a, b, c, 1.0]));
+    }
+    let inside = points.len();
+    let (lo, hi) = points
+        .iter()
+        .fold(([0.0f32; 3], [1.0f32; 3]), |(lo, hi), p| ([0, 1, 2].map(|i| lo[i].min(p[i])), [0, 1, 2].map(|i| hi[i].max(p[i]))));
+    points.extend((0..1000).map(|_| [0, 1, 2].map(|i| lo[i] + (random.unit() * 1.3 - 0.15) * (hi[i] - lo[i]))));
+    points.extend([lo, hi, [lo[0], hi[1], lo[2]], [hi[0].next_up(), hi[1], hi[2]], lo.map(f32::next_down), hi.map(f32::next_up)]);
+    points.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, -0.0, 1e-40, 1e30].map(|x| [x; 3]));
+    for axis in 0..3 {
+        for x in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, 1e-42] {
+            let mut p = [0, 1, 2].map(|i| f32::midpoint(lo[i], hi[i]));
+            p[axis] = x;
+            points.push(p);
+        }
+    }
+    (points, inside)
+}
+
+pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
+    let mesh = case.mesh.mesh()?;
+    let topology = topology(&mesh)?;
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() };
+    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+    let tree = Tree::build(gpu, &device, &options)?;
+    let host = build(&mesh, &topology, &options)?;
+    let locator = Locator::new(&mesh, &host);
+    let (points, inside) = points(&mesh);
+    let expected = locator.locate_all(&points);
+    let quiet: &dyn Fn(u64, u64) = &|_, _| {};
+    match case.how {
+        How::Descent | How::Traversal(_) => {
+            let path = if let How::Traversal(stack) = case.how { Path::Traversal(stack) } else { Path::Descent };
+            let found = locate(&device, &tree, &points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
+            compare_locations(&expected, &found.owners, &found.barycentrics, &points)
+        }
+        How::Hints => hints(gpu, &mesh, &device, &tree, &locator, &points),
+        How::All => {
+            let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
+            compare("query.locate_all", "owners", &lists, &locate_all(&device, &tree, &points, &LocateOptions::default(), quiet)?)
+        }
+        How::Values => {
+            // Whole numbers below 2^12: products and sums differ by the rounding of the barycentrics' division at most.
+            for (on, n) in [(On::Points, mesh.points.len()), (On::Cells, mesh.tets.len())] {
+                let field = crate::mesh::Field {
+                    name: "test".into(),
+                    on,
+                    values: (0..n).map(|i| (super::data::mix(i as u32) % 4096) as f32).collect(),
+                };
+                let found = locate(&device, &tree, &points, Some((&field.values, on)), &LocateOptions::default(), quiet)?;
+                let near = |a: f32, b: f32| (a.is_nan() && b.is_nan()) || (a - b).abs() <= 4096.0 * 1e-6;
+                let values: Vec<f32> = expected.iter().map(|e| locator.value(&field, e)).collect();
+                if let Some(i) = (0..points.len()).find(|&i| !found.values.get(i).is_some_and(|v| near(*v, values[i]))) {
+                    return Err(fail(
+                        "query.interpolate",
+                        "values",
+                        Some(i),
+                        &format!("{}", values[i]),
+                        &format!("{:?}", found.values.get(i)),
+                    ));
+                }
+            }
+            Ok(())
+        }
+        How::Same => {
+            let first = locate(&device, &tree, &points, None, &LocateOptions::default(), quiet)?;
+            if let Some(i) = first.owners[..inside].iter().position(|&o| o == NONE) {
+                return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
+            }
+            for alpha in [0.0, 1.0, 2.0, 4.0] {
+                for assign in Assign::ALL {
+                    let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, ..options })?;
+                    let found = locate(&device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
+                    compare(&format!("query.locate (alpha {alpha}, {assign})"), "owners", &first.owners[..inside], &found.owners)?;
+                }
+            }
+            Ok(())
+        }
+    }
+}
+
+fn compare_locations(expected: &[Location], owners: &[u32], barycentrics: &[[f32; 4]], points: &[[f32; 3]]) -> Verdict {
+    let place = |i: usize| format!("owners (point {:?})", points.get(i));
+    let first = expected.iter().zip(owners).position(|(e, o)| e.owner != *o).unwrap_or(0);
+    compare("query.locate", &place(first), &expected.iter().map(|e| e.owner).collect::<Vec<_>>(), owners)?;
+    let bits = |b: &[f32; 4]| b.map(f32::to_bits);
+    let wanted: Vec<_> = expected.iter().map(|e| bits(&e.barycentric)).collect();
+    compare("query.locate", "barycentrics (bits)", &wanted, &barycentrics.iter().map(bits).collect::<Vec<_>>())
+}
+
+/// Hints: the owner, another valid cell, or none; the reference gets the same.
+fn hints(gpu: &Gpu, mesh: &Mesh, device: &DeviceMesh, tree: &Tree, locator: &Locator<'_>, points: &[[f32; 3]]) -> Verdict {
+    let bad = device.bad_cells()?;
+    let valid: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| bad.binary_search(t).is_err()).collect();
+    let mut random = Random::new(77);
+    let hint = |p: &[f32; 3]| match random.below(3) {
+        0 => locator.locate(*p).owner,
+        1 if !valid.is_empty() => valid[random.below(valid.len() as u32) as usize],
+        _ => NONE,
+    };
+    let hints: Vec<u32> = points.iter().map(hint).collect();
+    let expected: Vec<_> = points.iter().zip(&hints).map(|(p, h)| locator.locate_near(*p, *h)).collect();
+    let n = points.len();
+    let input = gpu.upload("olbvh.conformance.points", points)?;
+    let hint_buffer = gpu.upload("olbvh.conformance.hints", &hints)?;
+    let owners = Guarded::new(gpu, "olbvh.conformance.owners", &[], n)?;
+    let barycentrics = Guarded::new(gpu, "olbvh.conformance.barycentrics", &[], 4 * n)?;
+    let scene = Scene::new(device, tree);
+    let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: Some(hint_buffer.all()) };
+    let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
+    gpu.run("olbvh.conformance.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default()))?;
+    let words = barycentrics.read(gpu, "query.locate")?;
+    let found: Vec<_> = words.chunks_exact(4).map(|w| [0, 1, 2, 3].map(|i| f32::from_bits(w[i]))).collect();
+    compare_locations(&expected, &owners.read(gpu, "query.locate")?, &found, points)
+}

@@ -1,0 +1,142 @@
+//! The conformance suite: every primitive, stage and query of the device compared with the plain reference in [`crate::reference`].
+//!
+//! Cases are data ([`cases`]): a name, a group, and what is computed from which seeded input. One runner ([`Lab`]) serves the tests and the
+//! command line; it needs a device and nothing else. A case that fails says which kernel or stage, which array, the first index that differs,
+//! what was expected and what was found ([`Failure`]).
+//!
+//! ```text
+//! reduce/add/65537/host                    operation, length, where the count is known [, keys] [, target]
+//! scan/100003/indirect-below/narrow        length, count [, target]
+//! sort/21-bits/100000/indirect/reversed    bits of the keys, length, count [, keys] [, target]
+//! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
+//! build/slivers/exact/alpha-1.5/recorded   mesh, assignment, α [, boxes], how it is built [, target]
+//! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment, α, path
+//! render/one-tet/iso/points/shaded         mesh, camera, field [, light]
+//! ```
+
+mod buffers;
+mod build;
+mod build_cases;
+mod build_expected;
+mod data;
+mod failure;
+mod lab;
+mod locate;
+mod meshes;
+mod picture;
+mod primitive_cases;
+mod primitives;
+mod query_cases;
+mod topology;
+
+pub use failure::Failure;
+pub use lab::{Lab, Outcome, Report};
+pub use primitives::TargetKind;
+
+use build::BuildCase;
+use locate::LocateCase;
+use meshes::MeshRecipe;
+use picture::PictureCase;
+use primitives::{ReduceCase, ScanCase, SortCase};
+
+/// How often a case is worth its time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Group {
+    /// Under two minutes for all of them on two cores with lavapipe.
+    Quick,
+    /// Everything but `Large`.
+    Full,
+    /// Buffers past 2^26 words; only where they are asked for.
+    Large,
+}
+
+impl Group {
+    /// Name for filters and reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Quick => "quick",
+            Self::Full => "full",
+            Self::Large => "large",
+        }
+    }
+}
+
+/// One comparison.
+#[derive(Clone, Debug)]
+pub struct Case {
+    /// Parts separated by `/`, from the general to the particular.
+    pub name: String,
+    /// When to run it.
+    pub group: Group,
+    work: Work,
+}
+
+/// What a case computes.
+#[derive(Clone, Debug)]
+enum Work {
+    SelfTest,
+    Reduce(ReduceCase),
+    Scan(ScanCase),
+    Sort(SortCase),
+    Topology(MeshRecipe),
+    Build(BuildCase),
+    Locate(LocateCase),
+    Picture(PictureCase),
+}
+
+impl Case {
+    /// Whether a filter means this case: the name of a group (`quick`; `full` holds `quick` as well), or a part of the case's name. Without a
+    /// filter all cases are meant that are not `large`.
+    pub fn matches(&self, filter: Option<&str>) -> bool {
+        match filter {
+            None | Some("full") => self.group <= Group::Full,
+            Some("quick") => self.group == Group::Quick,
+            Some("large") => self.group == Group::Large,
+            Some(part) => self.name.contains(part),
+        }
+    }
+
+    /// What belongs together: the first two parts of the name, or the first where the second is a length.
+    pub fn family(&self) -> &str {
+        let parts = usize::from(!matches!(self.work, Work::Scan(_)));
+        let end = self.name.match_indices('/').nth(parts).map_or(self.name.len(), |(at, _)| at);
+        &self.name[..end]
+    }
+}
+
+/// All cases, in the order in which a device is built up: primitives, meshes, trees.
+pub fn cases() -> Vec<Case> {
+    let mut cases = vec![Case { name: "device/self-test".into(), group: Group::Quick, work: Work::SelfTest }];
+    primitive_cases::add(&mut cases);
+    build_cases::add(&mut cases);
+    query_cases::add(&mut cases);
+    cases
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::collections::HashSet;
+
+    #[test]
+    fn names_are_unique_and_well_formed() {
+        let cases = cases();
+        let names: HashSet<_> = cases.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names.len(), cases.len());
+        for case in &cases {
+            assert!(case.name.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || "/-.".contains(c)), "{}", case.name);
+        }
+    }
+
+    #[test]
+    fn filters_choose() {
+        let cases = cases();
+        let count = |f: Option<&str>| cases.iter().filter(|c| c.matches(f)).count();
+        assert!(count(Some("quick")) > 100 && count(Some("quick")) < count(None));
+        assert!(count(Some("large")) > 0);
+        assert_eq!(count(Some("large")) + count(None), cases.len());
+        assert_eq!(count(Some("no such case")), 0);
+        let case = cases.iter().find(|c| c.name.starts_with("sort/21-bits/")).unwrap();
+        assert_eq!(case.family(), "sort/21-bits");
+    }
+}

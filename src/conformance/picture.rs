@@ -1,0 +1,78 @@
+//! Volume rendering against the reference renderer (SPEC 3.3).
+
+use super::failure::{Verdict, compare_one, fail};
+use super::meshes::MeshRecipe;
+use crate::build::{BadCells, DeviceMesh, Tree};
+use crate::gpu::Gpu;
+use crate::mesh::{Field, Mesh, On};
+use crate::options::{Assign, BuildOptions};
+use crate::query::render;
+use crate::reference::boundary::topology;
+use crate::reference::build::build;
+use crate::reference::volume::{Scene, render as draw};
+use crate::render::RenderSettings;
+
+/// A small picture.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct PictureCase {
+    pub mesh: MeshRecipe,
+    pub camera: &'static str,
+    pub on: On,
+    pub shading: bool,
+}
+
+/// A wave through the mesh.
+fn field(mesh: &Mesh, on: On) -> Field {
+    let wave = |p: &[f32; 3]| (p[0] * 0.9 + p[1] * 0.4).sin() + p[2] * 0.1;
+    let values = match on {
+        On::Points => mesh.points.iter().map(wave).collect(),
+        On::Cells => mesh.tets.iter().map(|t| mesh.points.get(t[0] as usize).map_or(0.0, wave)).collect(),
+    };
+    Field { name: "wave".into(), on, values }
+}
+
+pub(crate) fn check(gpu: &Gpu, case: &PictureCase) -> Verdict {
+    let mesh = case.mesh.mesh()?;
+    let topology = topology(&mesh)?;
+    let field = field(&mesh, case.on);
+    let settings = RenderSettings { size: [50, 42], camera: case.camera.parse()?, shading: case.shading, ..RenderSettings::default() };
+    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+    let mut first: Option<Vec<u8>> = None;
+    for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact), (4.0, Assign::Aabb)] {
+        let options = BuildOptions { alpha, assign, ..BuildOptions::default() };
+        let host = build(&mesh, &topology, &options)?;
+        let scene = Scene::new(&mesh, &topology, &host, &field, &settings)?;
+        let plan = scene.plan();
+        let tree = Tree::build(gpu, &device, &options)?;
+        let normals = &scene.prepared.normals;
+        let normals = (!normals.is_empty()).then_some(normals.as_slice());
+        let drawn = render(&device, &tree, plan, (&field.values, field.on), normals, &|_, _| {})?;
+        let [width, height] = plan.size;
+        let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
+        let pixels: Vec<u8> =
+            rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
+        let expected = draw(&scene, &|_, _| {});
+        let stage = format!("query.volume_march (alpha {alpha}, {assign})");
+        // The intervals follow the tree's leaves, the picture does not.
+        compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
+        near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
+        match &first {
+            Some(first) => near(&stage, "pixels beside those of alpha 0", first, &pixels, 1, 0)?,
+            None => first = Some(pixels),
+        }
+    }
+    Ok(())
+}
+
+/// Pictures are alike: no more than `of_thousand` thousandths of the channels differ by more than `most`.
+fn near(stage: &str, what: &str, expected: &[u8], found: &[u8], most: u8, of_thousand: usize) -> Verdict {
+    compare_one(stage, "pixels.len()", &expected.len(), &found.len())?;
+    let far: Vec<usize> = (0..expected.len()).filter(|&i| expected[i].abs_diff(found[i]) > most).collect();
+    match far.first() {
+        Some(&i) if far.len() * 1000 > expected.len() * of_thousand => {
+            let found = format!("{} ({} of {} differ by more than {most})", found[i], far.len(), expected.len());
+            Err(fail(stage, what, Some(i), &expected[i].to_string(), &found))
+        }
+        _ => Ok(()),
+    }
+}

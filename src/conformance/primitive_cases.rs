@@ -1,0 +1,108 @@
+//! The cases of the primitives.
+
+use super::data::Keys;
+use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
+use super::{Case, Group, Work};
+use crate::primitives::Reduction;
+
+/// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
+const LENGTHS: [u32; 40] = [
+    0, 1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 511, 1023, 1025, 2047, 2049, 4095, 4096,
+    4097, 8191, 8192, 8193, 10_007, 65_535, 65_536, 65_537, 100_003,
+];
+/// Some of them.
+const FEW: [u32; 9] = [0, 1, 33, 255, 4096, 4097, 8193, 65_537, 100_000];
+/// Enough workgroups that they are folded into two dimensions under the narrow target.
+const LONG: [u32; 3] = [1_048_576, 1_000_003, 4_194_305];
+/// Past 2^26 words.
+const LARGE: u32 = (1 << 26) + 12_347;
+const COUNTS: [Live; 5] = [Live::Host, Live::All, Live::Below, Live::Zero, Live::Above];
+const TARGETS: [TargetKind; 3] = [TargetKind::Serial, TargetKind::Ballot, TargetKind::Narrow];
+
+fn is_few(n: u32) -> bool {
+    FEW.contains(&n)
+}
+
+pub(super) fn add(cases: &mut Vec<Case>) {
+    let lengths = || LENGTHS.into_iter().chain([100_000]).chain(LONG);
+    let group = |n: u32, quick: bool| if quick && n < 1 << 20 { Group::Quick } else { Group::Full };
+    for operation in [Reduction::Add, Reduction::Min, Reduction::Max] {
+        let keys = if operation == Reduction::Add { Keys::Random } else { Keys::Reversed };
+        for target in TARGETS {
+            for n in lengths() {
+                let quick = target != TargetKind::Narrow && (is_few(n) || operation == Reduction::Add);
+                reduce(cases, group(n, quick), ReduceCase { operation, n, live: Live::Host, keys, target });
+            }
+            for live in COUNTS {
+                reduce(cases, Group::Quick, ReduceCase { operation, n: 10_000, live, keys, target });
+            }
+        }
+        reduce(cases, Group::Large, ReduceCase { operation, n: LARGE, live: Live::Host, keys, target: TargetKind::Device });
+    }
+    for target in TARGETS {
+        for n in lengths() {
+            scan(cases, group(n, true), ScanCase { n, live: Live::Host, in_place: false, target });
+        }
+        for live in COUNTS {
+            for n in [1, 10_000, 100_003] {
+                scan(cases, Group::Quick, ScanCase { n, live, in_place: true, target });
+            }
+        }
+    }
+    scan(cases, Group::Large, ScanCase { n: LARGE, live: Live::Host, in_place: true, target: TargetKind::Device });
+    scan(cases, Group::Large, ScanCase { n: LARGE, live: Live::Below, in_place: true, target: TargetKind::Device });
+    for target in TARGETS {
+        for bits in 1..=32 {
+            sort(
+                cases,
+                group(bits, matches!(bits, 1 | 3 | 8 | 11 | 21 | 30 | 31 | 32)),
+                SortCase { bits, n: 20_011, live: Live::All, keys: Keys::Random, target },
+            );
+            sort(cases, Group::Full, SortCase { bits, n: 4097, live: Live::Host, keys: Keys::Dirty, target });
+        }
+        for n in lengths() {
+            sort(cases, group(n, is_few(n)), SortCase { bits: 21, n, live: Live::Host, keys: Keys::Random, target });
+            sort(cases, Group::Full, SortCase { bits: 30, n, live: Live::All, keys: Keys::Random, target });
+        }
+        for live in COUNTS {
+            for bits in [15, 30] {
+                sort(cases, Group::Quick, SortCase { bits, n: 10_000, live, keys: Keys::Random, target });
+            }
+        }
+        for keys in [Keys::Sorted, Keys::Reversed, Keys::Equal, Keys::Few, Keys::Ones, Keys::Dirty] {
+            sort(cases, Group::Quick, SortCase { bits: 12, n: 33_333, live: Live::All, keys, target });
+            sort(cases, Group::Full, SortCase { bits: 32, n: 100_000, live: Live::Host, keys, target });
+        }
+    }
+    sort(cases, Group::Large, SortCase { bits: 21, n: LARGE, live: Live::Host, keys: Keys::Random, target: TargetKind::Device });
+    sort(cases, Group::Large, SortCase { bits: 30, n: LARGE, live: Live::All, keys: Keys::Random, target: TargetKind::Device });
+}
+
+fn reduce(cases: &mut Vec<Case>, group: Group, case: ReduceCase) {
+    let operation = match case.operation {
+        Reduction::Add => "add",
+        Reduction::Min => "min",
+        Reduction::Max => "max",
+    };
+    let name = format!("reduce/{operation}/{}/{}{}", case.n, case.live.name(), case.target.suffix());
+    push(cases, name, group, Work::Reduce(case));
+}
+
+fn scan(cases: &mut Vec<Case>, group: Group, case: ScanCase) {
+    let place = if case.in_place { "/in-place" } else { "" };
+    let name = format!("scan/{}/{}{place}{}", case.n, case.live.name(), case.target.suffix());
+    push(cases, name, group, Work::Scan(case));
+}
+
+fn sort(cases: &mut Vec<Case>, group: Group, case: SortCase) {
+    let keys = if case.keys == Keys::Random { String::new() } else { format!("/{}", case.keys.name()) };
+    let name = format!("sort/{}-bits/{}/{}{keys}{}", case.bits, case.n, case.live.name(), case.target.suffix());
+    push(cases, name, group, Work::Sort(case));
+}
+
+/// Adds a case unless one of that name is there.
+pub(super) fn push(cases: &mut Vec<Case>, name: String, group: Group, work: Work) {
+    if cases.iter().all(|c| c.name != name) {
+        cases.push(Case { name, group, work });
+    }
+}

@@ -1,0 +1,195 @@
+//! Reduce, scan and sort against their definitions.
+
+use super::buffers::{FILL, Guarded};
+use super::data::Keys;
+use super::failure::{Verdict, compare};
+use crate::gpu::Gpu;
+use crate::kernels::{SortTarget, Target, TileTarget};
+use crate::primitives::{
+    Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
+};
+
+/// Shapes of kernels that a case runs under; a device's own is one of the first two.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TargetKind {
+    /// Whatever the device would choose, or the caller did.
+    Device,
+    /// Serial tiles, as for processors.
+    Serial,
+    /// Tiles of a workgroup ranked by ballots, as for GPUs.
+    Ballot,
+    /// Ballots with tiny tiles and digits: many tiles, many passes.
+    Narrow,
+}
+
+impl TargetKind {
+    /// Name in cases; the device's own has none.
+    pub(crate) fn suffix(self) -> &'static str {
+        match self {
+            Self::Device => "",
+            Self::Serial => "/serial",
+            Self::Ballot => "/ballot",
+            Self::Narrow => "/narrow",
+        }
+    }
+
+    /// The target for a subgroup size; `None`: the device's own.
+    pub(crate) fn target(self, subgroup: u32) -> Option<Target> {
+        match self {
+            Self::Device => None,
+            Self::Serial => Some(Target::select(subgroup, true)),
+            Self::Ballot => Some(Target::select(subgroup, false)),
+            Self::Narrow => Some(Target {
+                name: "narrow",
+                scan: TileTarget { workgroup: 2 * subgroup, rows: 3 },
+                sort: SortTarget { serial: false, workgroup: 2 * subgroup, rows: 5, digit_bits: 3 },
+                each: 2 * subgroup,
+                run: TileTarget { workgroup: subgroup, rows: 3 },
+            }),
+        }
+    }
+}
+
+/// Where the number of items is known, and what the device says it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Live {
+    /// On the host.
+    Host,
+    /// On the device: all of them.
+    All,
+    /// On the device: fewer.
+    Below,
+    /// On the device: none.
+    Zero,
+    /// On the device: more than there is room for; only those that fit count.
+    Above,
+}
+
+impl Live {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Host => "host",
+            Self::All => "indirect",
+            Self::Below => "indirect-below",
+            Self::Zero => "indirect-zero",
+            Self::Above => "indirect-above",
+        }
+    }
+
+    /// What the device's word says, and how many items that means.
+    fn numbers(self, n: u32) -> (u32, u32) {
+        match self {
+            Self::Host | Self::All => (n, n),
+            Self::Below => (n - n / 3, n - n / 3),
+            Self::Zero => (0, 0),
+            Self::Above => (n.saturating_add(100_001), n),
+        }
+    }
+
+    /// The count for up to `n` items, the memory that holds it, and how many items it means.
+    fn count(self, gpu: &Gpu, n: u32) -> Verdict<(Count, Guarded, usize)> {
+        let (word, items) = self.numbers(n);
+        let memory = Guarded::new(gpu, "olbvh.conformance.count", &[word], 1)?;
+        let count = if self == Self::Host { Count::host(n) } else { Count::device(n, memory.all()) };
+        Ok((count, memory, items as usize))
+    }
+}
+
+/// A reduction.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ReduceCase {
+    pub operation: Reduction,
+    pub n: u32,
+    pub live: Live,
+    pub keys: Keys,
+    pub target: TargetKind,
+}
+
+/// An exclusive scan.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ScanCase {
+    pub n: u32,
+    pub live: Live,
+    /// Whether the output is the input.
+    pub in_place: bool,
+    pub target: TargetKind,
+}
+
+/// A sort.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SortCase {
+    pub bits: u32,
+    pub n: u32,
+    pub live: Live,
+    pub keys: Keys,
+    pub target: TargetKind,
+}
+
+pub(crate) fn reduce(gpu: &Gpu, case: ReduceCase) -> Verdict {
+    let data = case.keys.make(case.n, 32);
+    let (count, _word, items) = case.live.count(gpu, case.n)?;
+    let values = Guarded::new(gpu, "olbvh.conformance.values", &data, 0)?;
+    let result = Guarded::new(gpu, "olbvh.conformance.result", &[], 1)?;
+    let scratch = Guarded::scratch(gpu, "olbvh.conformance.scratch", REDUCE_SCRATCH)?;
+    gpu.run("olbvh.conformance.reduce", |r| cmd_reduce(r, case.operation, values.all(), result.all(), count, scratch.all()))?;
+    let live = data[..items].iter().copied();
+    let expected = match case.operation {
+        Reduction::Add => live.fold(0, u32::wrapping_add),
+        Reduction::Min => live.fold(u32::MAX, u32::min),
+        Reduction::Max => live.fold(0, u32::max),
+    };
+    let stage = "primitives.reduce";
+    scratch.read(gpu, stage)?;
+    compare(stage, "values", &data, &values.read(gpu, stage)?)?;
+    compare(stage, "result", &[expected], &result.read(gpu, stage)?)
+}
+
+pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {
+    let data = Keys::Random.make(case.n, 32);
+    let (count, _word, items) = case.live.count(gpu, case.n)?;
+    let values = Guarded::new(gpu, "olbvh.conformance.values", &data, 0)?;
+    let output = Guarded::new(gpu, "olbvh.conformance.scanned", &[], if case.in_place { 0 } else { data.len() })?;
+    let scanned = if case.in_place { &values } else { &output };
+    let total = Guarded::new(gpu, "olbvh.conformance.total", &[], 1)?;
+    let carve = |a: &mut Arena| ScanScratch::carve(gpu, a, case.n);
+    let memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
+    let scratch = carve(&mut Arena::new(memory.all()))?;
+    gpu.run("olbvh.conformance.scan", |r| cmd_exclusive_scan(r, values.all(), scanned.all(), total.all(), count, &scratch))?;
+    let mut sum = 0u32;
+    let mut expected = Vec::with_capacity(data.len());
+    for v in &data[..items] {
+        expected.push(sum);
+        sum = sum.wrapping_add(*v);
+    }
+    // What is not counted is not touched.
+    expected.extend(data[items..].iter().map(|&v| if case.in_place { v } else { FILL }));
+    let stage = "primitives.scan";
+    memory.read(gpu, stage)?;
+    compare(stage, "scanned", &expected, &scanned.read(gpu, stage)?)?;
+    if !case.in_place {
+        compare(stage, "values", &data, &values.read(gpu, stage)?)?;
+    }
+    compare(stage, "total", &[sum], &total.read(gpu, stage)?)
+}
+
+pub(crate) fn sort(gpu: &Gpu, case: SortCase) -> Verdict {
+    let data = case.keys.make(case.n, case.bits);
+    let ids: Vec<u32> = (0..case.n).collect();
+    let (count, _word, items) = case.live.count(gpu, case.n)?;
+    let keys = Guarded::new(gpu, "olbvh.conformance.keys", &data, 0)?;
+    let values = Guarded::new(gpu, "olbvh.conformance.ids", &ids, 0)?;
+    let carve = |a: &mut Arena| SortScratch::carve(gpu, a, case.n, case.bits);
+    let memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
+    let scratch = carve(&mut Arena::new(memory.all()))?;
+    gpu.run("olbvh.conformance.sort", |r| cmd_sort_pairs(r, keys.all(), values.all(), case.bits, count, &scratch))?;
+    let mask = u32::MAX.checked_shr(32 - case.bits).unwrap_or(0);
+    let mut order = ids;
+    order.truncate(items);
+    order.sort_by_key(|&i| data[i as usize] & mask);
+    let expected: Vec<u32> = order.iter().map(|&i| data[i as usize]).collect();
+    let stage = "primitives.sort";
+    memory.read(gpu, stage)?;
+    // Behind the pairs that count the order is left open.
+    compare(stage, "keys", &expected, &keys.read(gpu, stage)?[..items])?;
+    compare(stage, "values", &order, &values.read(gpu, stage)?[..items])
+}

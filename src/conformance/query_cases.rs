@@ -1,0 +1,59 @@
+//! The cases of the queries.
+
+use super::locate::{How, LocateCase};
+use super::meshes::{MeshRecipe, recipes};
+use super::picture::PictureCase;
+use super::primitive_cases::push;
+use super::{Case, Group, Work};
+use crate::mesh::On;
+use crate::options::Assign;
+
+/// Meshes that fill their space without overlap: every point of a cell has an owner, the same whatever the tree.
+const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
+/// Meshes that are drawn.
+const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
+
+pub(super) fn add(cases: &mut Vec<Case>) {
+    for mesh in recipes() {
+        for assign in Assign::ALL {
+            for alpha in [0.0, 1.0, 3.0] {
+                let quick = assign == Assign::Exact && alpha == 0.0;
+                add_location(cases, quick, LocateCase { mesh, alpha, assign, how: How::Descent });
+            }
+        }
+        for how in [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Hints, How::All, How::Values] {
+            add_location(
+                cases,
+                matches!(how, How::Traversal(3) | How::Hints | How::All),
+                LocateCase { mesh, alpha: 0.5, assign: Assign::Aabb, how },
+            );
+        }
+        if CLOSED.contains(&mesh.name) {
+            add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, how: How::Same });
+        }
+        if DRAWN.contains(&mesh.name) {
+            add_pictures(cases, mesh);
+        }
+    }
+}
+
+fn add_location(cases: &mut Vec<Case>, quick: bool, case: LocateCase) {
+    let group = if quick { case.mesh.group } else { Group::Full };
+    let name = format!("locate/{}/{}/alpha-{}/{}", case.mesh.name, case.assign, case.alpha, case.how.name());
+    push(cases, name, group, Work::Locate(case));
+}
+
+fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    for (name, camera) in [("iso", "iso"), ("top", "top,ortho")] {
+        for (on, shading) in [(On::Points, true), (On::Points, false), (On::Cells, false)] {
+            let (values, light) = (if on == On::Points { "points" } else { "cells" }, if shading { "/shaded" } else { "" });
+            let group = if name == "iso" && shading { mesh.group } else { Group::Full };
+            push(
+                cases,
+                format!("render/{}/{name}/{values}{light}", mesh.name),
+                group,
+                Work::Picture(PictureCase { mesh, camera, on, shading }),
+            );
+        }
+    }
+}

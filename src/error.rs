@@ -1,0 +1,83 @@
+//! The one error type of the crate.
+
+use std::path::PathBuf;
+
+/// Result of every fallible call of this crate.
+pub type Result<T, E = Error> = std::result::Result<T, E>;
+
+/// What went wrong, where, and what to do about it.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// No Vulkan implementation could be loaded on this machine.
+    #[error("no Vulkan loader on this machine ({0}); install libvulkan1 and a driver, or use the CPU (--device cpu)")]
+    NoVulkan(String),
+    /// No physical device meets the requirements, or the one asked for does not exist.
+    #[error("no suitable Vulkan device: {0}")]
+    NoDevice(String),
+    /// The device computes wrong results in the start-up self-test.
+    #[error("device {device} failed the self-test `{test}`: {detail}; its driver cannot be trusted with this work")]
+    SelfTest {
+        /// Device name as the driver reports it.
+        device: String,
+        /// Name of the failing test.
+        test: &'static str,
+        /// First wrong value, expected and found.
+        detail: String,
+    },
+    /// A Vulkan call returned an error.
+    #[error("{call} failed: {result:?}{hint}")]
+    Vulkan {
+        /// The call that failed.
+        call: &'static str,
+        /// What it returned.
+        result: ash::vk::Result,
+        /// The remedy, or empty; begins with a separator.
+        hint: String,
+    },
+    /// Device memory could not be had.
+    #[error("cannot allocate {bytes} bytes for {name}: {reason}")]
+    Memory {
+        /// Name of the allocation, `olbvh.<stage>.<thing>`.
+        name: String,
+        /// Bytes asked for.
+        bytes: u64,
+        /// What the allocator said.
+        reason: String,
+    },
+    /// A problem is larger than the device or the 32-bit indices of the tree can hold.
+    #[error("too large: {0}")]
+    TooLarge(String),
+    /// An argument contradicts another one or lies outside its range.
+    #[error("invalid argument: {0}")]
+    Invalid(String),
+    /// The mesh has bad cells and the caller's policy is to reject them.
+    #[error("{count} bad cells (index out of range, repeated vertex, or coordinate not finite); the first: {first}")]
+    BadCells {
+        /// How many.
+        count: u64,
+        /// The first few, each with its reason.
+        first: String,
+    },
+    /// A tree breaks one of its rules (see [`crate::tree::TreeArrays::validate`]).
+    #[error("the tree breaks a rule: {0}")]
+    BrokenTree(String),
+    /// A file cannot be read as what it should be.
+    #[error("{}: {place}{message}", path.display())]
+    File {
+        /// The file.
+        path: PathBuf,
+        /// Line, byte, array or cell; ends with a separator, or is empty.
+        place: String,
+        /// What is wrong and what to do.
+        message: String,
+    },
+    /// Reading or writing failed.
+    #[error("{}: {source}", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

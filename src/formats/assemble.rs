@@ -1,0 +1,350 @@
+//! From the points, cells and arrays of a file to a [`Mesh`] and its [`Report`]: what all formats share.
+
+use std::collections::HashMap;
+
+use super::cells::{CellType, Shape, split};
+use super::report::{CellCount, Fate, Report};
+use super::source::{Source, printable};
+use crate::error::{Error, Result};
+use crate::mesh::{Field, Mesh, On};
+use crate::reference::grid::COORDINATE_LIMIT;
+
+/// An array of a file: `components` values per point or per cell of the file.
+pub(crate) struct Array {
+    pub name: String,
+    pub on: On,
+    pub components: usize,
+    pub values: Vec<f32>,
+}
+
+/// A mesh under construction. Set the points, push the cells in file order, add the arrays, [`finish`](Assembly::finish).
+pub(crate) struct Assembly<'a> {
+    source: &'a Source,
+    pub format: String,
+    /// Size of all files read.
+    pub bytes: u64,
+    pub points: Vec<[f64; 3]>,
+    /// What the format calls its first point, for messages.
+    pub first_point: i64,
+    pub arrays: Vec<Array>,
+    pub warnings: Vec<String>,
+    tets: Vec<[u32; 4]>,
+    /// Cell of each tetrahedron.
+    ids: Vec<u32>,
+    n_cells: usize,
+    counts: Vec<CellCount>,
+    negative: u64,
+    flat: u64,
+    tangled: u64,
+    corners: Vec<u32>,
+}
+
+impl<'a> Assembly<'a> {
+    pub fn new(source: &'a Source, format: String) -> Self {
+        Self {
+            source,
+            format,
+            bytes: source.bytes.len() as u64,
+            points: Vec::new(),
+            first_point: 0,
+            arrays: Vec::new(),
+            warnings: Vec::new(),
+            tets: Vec::new(),
+            ids: Vec::new(),
+            n_cells: 0,
+            counts: Vec::new(),
+            negative: 0,
+            flat: 0,
+            tangled: 0,
+            corners: Vec::new(),
+        }
+    }
+
+    /// Cells pushed so far.
+    pub fn cells(&self) -> usize {
+        self.n_cells
+    }
+
+    /// Room for cells that are expected.
+    pub fn reserve(&mut self, cells: usize) {
+        self.tets.reserve(cells);
+        self.ids.reserve(cells);
+    }
+
+    /// Adds the next cell of the file. `nodes` are indices into the points, `offset` is added to each.
+    pub fn push(&mut self, kind: CellType, nodes: &[i64], offset: usize) -> Result<()> {
+        let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
+        let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.source.path.display())))?;
+        let place = |cell: u32| format!("cell {cell} ({})", kind.name);
+        let corners = kind.shape.corners();
+        if kind.nodes.map_or(nodes.len() < corners, |n| n != nodes.len()) {
+            let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
+            return Err(self.source.error_in(place(id), format!("{} points, but this type has {wanted}", nodes.len())));
+        }
+        let n_points = self.points.len() - offset;
+        if let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) {
+            let shown = bad.saturating_add(self.first_point);
+            let last = n_points as i64 - 1 + self.first_point;
+            let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
+            return Err(self.source.error_in(place(id), format!("names point {shown}, but {range}")));
+        }
+        let before = self.tets.len();
+        let fate = match kind.shape {
+            Shape::Flat => Fate::Boundary,
+            Shape::Other => Fate::Unsupported,
+            Shape::Tetrahedron => {
+                let tet = [0, 1, 2, 3].map(|i| (nodes[i] as usize + offset) as u32);
+                let volume = self.volume(tet);
+                self.negative += u64::from(volume < 0.0);
+                self.flat += u64::from(volume == 0.0);
+                self.tets.push(tet);
+                if nodes.len() == 4 { Fate::Kept } else { Fate::Straightened }
+            }
+            shape => {
+                let mut vertices = std::mem::take(&mut self.corners);
+                vertices.clear();
+                vertices.extend(nodes[..corners].iter().map(|&v| (v as usize + offset) as u32));
+                let tets = &mut self.tets;
+                split(shape, &vertices, |tet| tets.push(tet));
+                self.corners = vertices;
+                self.orient(before);
+                Fate::Split
+            }
+        };
+        let pieces = self.tets.len() - before;
+        self.ids.resize(self.tets.len(), id);
+        self.count(kind.name, fate, pieces as u64);
+        Ok(())
+    }
+
+    /// Turns the pieces of a cell from tetrahedron `start` on so that its volume is positive, and counts what is odd.
+    fn orient(&mut self, start: usize) {
+        let volumes = || self.tets[start..].iter().map(|&tet| self.volume(tet));
+        let turn = volumes().sum::<f64>() < 0.0;
+        let flat = volumes().filter(|&v| v == 0.0).count();
+        let tangled = volumes().any(|v| if turn { v > 0.0 } else { v < 0.0 });
+        self.flat += flat as u64;
+        self.tangled += u64::from(tangled);
+        if turn {
+            for tet in &mut self.tets[start..] {
+                tet.swap(2, 3);
+            }
+        }
+    }
+
+    /// Counts the next cell of the file without looking at its nodes.
+    pub fn skip(&mut self, name: &str, fate: Fate) {
+        self.count(name, fate, 0);
+    }
+
+    fn count(&mut self, name: &str, fate: Fate, tetrahedra: u64) {
+        self.n_cells += 1;
+        let found = self.counts.iter().rposition(|c| c.fate == fate && c.name == name);
+        let i = found.unwrap_or_else(|| {
+            self.counts.push(CellCount { name: name.into(), count: 0, fate, tetrahedra: 0 });
+            self.counts.len() - 1
+        });
+        self.counts[i].count += 1;
+        self.counts[i].tetrahedra += tetrahedra;
+    }
+
+    /// Six times the signed volume.
+    fn volume(&self, tet: [u32; 4]) -> f64 {
+        let [a, b, c, d] = tet.map(|v| self.points[v as usize]);
+        let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+        u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+    }
+
+    /// Checks the whole and converts it to single precision.
+    pub fn finish(mut self) -> Result<(Mesh, Report)> {
+        if self.tets.is_empty() {
+            let found: Vec<String> = self.counts.iter().map(|c| format!("{} {}", c.count, c.name)).collect();
+            let found = if found.is_empty() { "no cells at all".into() } else { found.join(", ") };
+            let also = self.warnings.join("; ");
+            let also = if also.is_empty() { also } else { format!(" ({also})") };
+            return Err(self.source.error(format!("no tetrahedra, hexahedra, wedges or pyramids in it: {found}{also}")));
+        }
+        if self.points.len() >= u32::MAX as usize || self.tets.len() >= (u32::MAX / 4) as usize {
+            let message = format!("{}: {} points and {} tetrahedra", self.source.path.display(), self.points.len(), self.tets.len());
+            return Err(Error::TooLarge(message));
+        }
+        let used = self.used()?;
+        let (lo, hi) = bounds(&self.points, &used);
+        let origin = self.origin(&used, lo, hi);
+        let points = self.convert(&used, origin)?;
+        let fields = self.fields();
+        let unused = used.iter().filter(|&&u| !u).count();
+        let unsupported: u64 = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| c.count).sum();
+        if unsupported > 0 {
+            self.warnings.push(format!("{unsupported} volume cells are of types that cannot be read; they are missing in the mesh"));
+        }
+        let report = Report {
+            format: self.format,
+            bytes: self.bytes,
+            seconds: 0.0,
+            points: points.len() as u64,
+            unused_points: unused as u64,
+            cells: self.counts,
+            tetrahedra: self.tets.len() as u64,
+            negative: self.negative,
+            flat: self.flat,
+            tangled: self.tangled,
+            bounds: [lo, hi],
+            origin,
+            warnings: self.warnings,
+        };
+        let plain = self.n_cells == self.tets.len() && self.ids.iter().enumerate().all(|(i, &id)| i == id as usize);
+        let cell_ids = (!plain).then_some(self.ids);
+        Ok((Mesh { points, tets: self.tets, cell_ids, source_cells: self.n_cells as u32, fields, origin }, report))
+    }
+
+    /// Which points a tetrahedron uses; an error if one of them is not finite.
+    fn used(&self) -> Result<Vec<bool>> {
+        let mut used = vec![false; self.points.len()];
+        for (tet, id) in self.tets.iter().zip(&self.ids) {
+            for &v in tet {
+                if !used[v as usize] && self.points[v as usize].iter().any(|x| !x.is_finite()) {
+                    return Err(self.bad_point(v as usize, *id, "its coordinates must be finite"));
+                }
+                used[v as usize] = true;
+            }
+        }
+        Ok(used)
+    }
+
+    fn bad_point(&self, point: usize, cell: u32, why: &str) -> Error {
+        let [x, y, z] = self.points[point];
+        let place = format!("point {} (of cell {cell})", point as i64 + self.first_point);
+        self.source.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
+    }
+
+    /// What to subtract on each axis: the lower bound where the mesh is small against its distance from 0 and single precision
+    /// cannot hold the coordinates as they are. Up to 16 extents away 20 bits are left for the shape.
+    fn origin(&self, used: &[bool], lo: [f64; 3], hi: [f64; 3]) -> [f64; 3] {
+        [0, 1, 2].map(|c| {
+            let extent = hi[c] - lo[c];
+            let far = lo[c].abs().max(hi[c].abs()) > 16.0 * extent && extent > 0.0;
+            let inexact = || self.points.iter().zip(used).any(|(p, &u)| u && f64::from(p[c] as f32) != p[c]);
+            if far && inexact() { lo[c] } else { 0.0 }
+        })
+    }
+
+    fn convert(&self, used: &[bool], origin: [f64; 3]) -> Result<Vec<[f32; 3]>> {
+        let limit = f64::from(COORDINATE_LIMIT);
+        let moved = |p: &[f64; 3]| [0, 1, 2].map(|c| p[c] - origin[c]);
+        let too_far = |(p, &u): (&[f64; 3], &bool)| u && moved(p).iter().any(|x| x.abs() >= limit);
+        if let Some(point) = self.points.iter().zip(used).position(too_far) {
+            let owner = self.tets.iter().position(|t| t.contains(&(point as u32)));
+            let cell = owner.map_or(0, |t| self.ids[t]);
+            return Err(self.bad_point(point, cell, "beyond the range of single precision (2^125); scale the mesh"));
+        }
+        Ok(self.points.iter().map(|p| moved(p).map(|x| x as f32)).collect())
+    }
+
+    /// Arrays become scalar fields; those of cells get one value per tetrahedron.
+    fn fields(&mut self) -> Vec<Field> {
+        let mut fields = Vec::new();
+        for mut array in std::mem::take(&mut self.arrays) {
+            let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
+            let shown = printable(array.name.as_bytes());
+            if array.components == 0 || array.components > 9 || array.values.len() != count * array.components {
+                self.warnings.push(format!("array `{shown}` is left out: {} components", array.components));
+                continue;
+            }
+            let odd = array.values.iter().filter(|v| !v.is_finite()).count();
+            if odd > 0 {
+                array.values.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = f32::NAN);
+                self.warnings.push(format!("array `{shown}`: {odd} of {} values are not finite in single precision", array.values.len()));
+            }
+            if fields.iter().any(|f: &Field| f.name == array.name) {
+                let taken = array.name.clone();
+                array.name.push_str(if array.on == On::Cells { " (cells)" } else { " (again)" });
+                self.warnings.push(format!(
+                    "a second array `{}` is called `{}`",
+                    printable(taken.as_bytes()),
+                    printable(array.name.as_bytes())
+                ));
+            }
+            let ids = self.ids.iter().map(|&id| id as usize);
+            let spread = |values: Vec<f32>| if array.on == On::Cells { ids.clone().map(|id| values[id]).collect() } else { values };
+            if array.components == 1 {
+                fields.push(Field { name: array.name, on: array.on, values: spread(array.values) });
+                continue;
+            }
+            let tuples = || array.values.chunks_exact(array.components);
+            if array.components == 3 {
+                let length = |v: &[f32]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt() as f32;
+                fields.push(Field { name: array.name.clone(), on: array.on, values: spread(tuples().map(length).collect()) });
+            }
+            for c in 0..array.components {
+                let suffix = if array.components == 3 { ["x", "y", "z"][c].to_owned() } else { c.to_string() };
+                let values = spread(tuples().map(|v| v[c]).collect());
+                fields.push(Field { name: format!("{}.{suffix}", array.name), on: array.on, values });
+            }
+        }
+        fields
+    }
+}
+
+fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
+    let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    points
+        .iter()
+        .zip(used)
+        .filter(|(_, u)| **u)
+        .fold(start, |(lo, hi), (p, _)| ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))))
+}
+
+/// Meshes of several pieces.
+impl Assembly<'_> {
+    /// Arrays that the piece read last does not have get NaN there.
+    pub fn complete_arrays(&mut self) {
+        for array in &mut self.arrays {
+            let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
+            array.values.resize(count * array.components, f32::NAN);
+        }
+    }
+
+    /// Lets the cells of later pieces use the points of earlier ones where coordinates are equal, so that the seam between pieces
+    /// is no boundary. Points that coincide within a piece stay apart. `starts`: first point of each piece.
+    pub fn merge_pieces(&mut self, starts: &[usize]) {
+        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.points.len());
+        let mut to: Vec<u32> = Vec::with_capacity(self.points.len());
+        let mut merged = 0;
+        for (i, p) in self.points.iter().enumerate() {
+            let piece_start = starts[starts.partition_point(|&s| s <= i).saturating_sub(1)];
+            // Adding 0 makes -0 equal to 0.
+            let target = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32);
+            let earlier = (target as usize) < piece_start;
+            merged += usize::from(earlier);
+            to.push(if earlier { target } else { i as u32 });
+        }
+        if merged == 0 {
+            return;
+        }
+        // Kept points move together.
+        let mut kept = 0;
+        let mut new = vec![0; to.len()];
+        for (i, &target) in to.iter().enumerate() {
+            if target as usize == i {
+                new[i] = kept as u32;
+                self.points[kept] = self.points[i];
+                kept += 1;
+            } else {
+                new[i] = new[target as usize];
+            }
+        }
+        self.points.truncate(kept);
+        for array in self.arrays.iter_mut().filter(|a| a.on == On::Points) {
+            let n = array.components;
+            let mut at = 0;
+            for (i, _) in to.iter().enumerate().filter(|&(i, &t)| t as usize == i) {
+                array.values.copy_within(i * n..(i + 1) * n, at);
+                at += n;
+            }
+            array.values.truncate(at);
+        }
+        self.tets.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
+        self.warnings.push(format!("{} pieces; {merged} points they share are joined", starts.len()));
+    }
+}

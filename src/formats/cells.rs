@@ -1,0 +1,195 @@
+//! Cell types of the formats, and the split of cells into tetrahedra.
+
+/// Shape of a cell, by its corners.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Shape {
+    /// Points, lines and surfaces: boundary elements.
+    Flat,
+    Tetrahedron,
+    Hexahedron,
+    /// A hexahedron whose corners are numbered x fastest.
+    Voxel,
+    Wedge,
+    Pyramid,
+    /// A volume that cannot be split here.
+    Other,
+}
+
+/// A cell type of a format.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct CellType {
+    pub name: &'static str,
+    pub shape: Shape,
+    /// Number of nodes, corners first; `None`: any number of at least the corners.
+    pub nodes: Option<usize>,
+}
+
+impl Shape {
+    /// Number of corners of a volume that can be split.
+    pub const fn corners(self) -> usize {
+        match self {
+            Shape::Tetrahedron => 4,
+            Shape::Pyramid => 5,
+            Shape::Wedge => 6,
+            Shape::Hexahedron | Shape::Voxel => 8,
+            Shape::Flat | Shape::Other => 0,
+        }
+    }
+
+    /// Faces as corner numbers, counter-clockwise from outside (in VTK's numbering); a triangle has its last corner twice.
+    const fn faces(self) -> &'static [[u8; 4]] {
+        match self {
+            Shape::Pyramid => &[[0, 3, 2, 1], [0, 1, 4, 4], [1, 2, 4, 4], [2, 3, 4, 4], [3, 0, 4, 4]],
+            Shape::Wedge => &[[0, 2, 1, 1], [3, 4, 5, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
+            Shape::Hexahedron => &[[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
+            Shape::Voxel => &[[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]],
+            Shape::Tetrahedron | Shape::Flat | Shape::Other => &[],
+        }
+    }
+}
+
+/// Splits a hexahedron, voxel, wedge or pyramid into tetrahedra and hands each to `emit`.
+///
+/// A quadrilateral is cut by the diagonal through its smallest vertex id, so two cells that share one cut it alike, whatever their
+/// types. The tetrahedra are the cones from the cell's smallest vertex over the triangles of the faces that do not hold it. The
+/// numbering's orientation does not matter (files disagree about wedges). In a hexahedron whose far corner ends no diagonal,
+/// the three tetrahedra around that corner become two: five instead of six. Collapsed cells (repeated vertices) give fewer.
+/// The tetrahedra of a convex cell all have the same sign.
+pub(crate) fn split(shape: Shape, corners: &[u32], mut emit: impl FnMut([u32; 4])) {
+    let Some(&apex) = corners.iter().min() else { return };
+    let mut triangles = [[0; 3]; 12];
+    let mut n = 0;
+    for face in shape.faces() {
+        let mut quad = face.map(|c| corners[c as usize]);
+        if quad.contains(&apex) {
+            continue;
+        }
+        let smallest = (0..4).min_by_key(|&i| quad[i]).unwrap_or(0);
+        quad.rotate_left(smallest);
+        for triangle in [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]] {
+            if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
+                triangles[n] = triangle;
+                n += 1;
+            }
+        }
+    }
+    let triangles = &triangles[..n];
+    let far = far_corner(shape, corners, apex).filter(|_| n == 6);
+    let around: Vec<[u32; 2]> = far.map_or_else(Vec::new, |far| triangles.iter().filter_map(|&t| after(t, far)).collect());
+    let cap = match around.as_slice() {
+        &[[a, b], [c, d], [e, f]] if (b == c && d == e && f == a) || (d == a && f == c && b == e) => {
+            far.map(|far| (far, [a, b, if b == c { d } else { c }]))
+        }
+        _ => None,
+    };
+    if let Some((far, [a, b, c])) = cap {
+        emit([apex, a, b, c]);
+        emit([c, far, a, b]);
+    }
+    for t in triangles.iter().filter(|t| cap.is_none_or(|(far, _)| !t.contains(&far))) {
+        emit([apex, t[0], t[1], t[2]]);
+    }
+}
+
+/// The other two vertices of a triangle with `vertex`, in order.
+fn after([a, b, c]: [u32; 3], vertex: u32) -> Option<[u32; 2]> {
+    match vertex {
+        v if v == a => Some([b, c]),
+        v if v == b => Some([c, a]),
+        v if v == c => Some([a, b]),
+        _ => None,
+    }
+}
+
+/// The corner of a hexahedron opposite to `apex`.
+fn far_corner(shape: Shape, corners: &[u32], apex: u32) -> Option<u32> {
+    let at = corners.iter().position(|&v| v == apex)?;
+    match shape {
+        Shape::Hexahedron => corners.get([6, 7, 4, 5, 2, 3, 0, 1][at]).copied(),
+        Shape::Voxel => corners.get(7 - at).copied(),
+        _ => None,
+    }
+}
+
+const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
+    CellType { name, shape, nodes: if nodes == 0 { None } else { Some(nodes) } }
+}
+
+/// The cell type of a VTK number.
+pub(crate) fn vtk(number: i64) -> Option<CellType> {
+    use Shape::{Flat, Hexahedron, Other, Pyramid, Tetrahedron, Voxel, Wedge};
+    Some(match number {
+        0 => cell("empty cell", Flat, 0),
+        1 => cell("vertex", Flat, 1),
+        2 => cell("poly-vertex", Flat, 0),
+        3 => cell("line", Flat, 2),
+        4 => cell("poly-line", Flat, 0),
+        5 => cell("triangle", Flat, 3),
+        6 => cell("triangle strip", Flat, 0),
+        7 => cell("polygon", Flat, 0),
+        8 => cell("pixel", Flat, 4),
+        9 => cell("quad", Flat, 4),
+        10 => cell("tetrahedron", Tetrahedron, 4),
+        11 => cell("voxel", Voxel, 8),
+        12 => cell("hexahedron", Hexahedron, 8),
+        13 => cell("wedge", Wedge, 6),
+        14 => cell("pyramid", Pyramid, 5),
+        15 => cell("pentagonal prism", Other, 10),
+        16 => cell("hexagonal prism", Other, 12),
+        21 => cell("quadratic edge", Flat, 3),
+        22 => cell("quadratic triangle", Flat, 6),
+        23 => cell("quadratic quad", Flat, 8),
+        24 => cell("quadratic tetrahedron", Tetrahedron, 10),
+        25 => cell("quadratic hexahedron", Hexahedron, 20),
+        26 => cell("quadratic wedge", Wedge, 15),
+        27 => cell("quadratic pyramid", Pyramid, 13),
+        28 => cell("biquadratic quad", Flat, 9),
+        29 => cell("triquadratic hexahedron", Hexahedron, 27),
+        30 => cell("quadratic linear quad", Flat, 6),
+        31 => cell("quadratic linear wedge", Wedge, 12),
+        32 => cell("biquadratic quadratic wedge", Wedge, 18),
+        33 => cell("biquadratic quadratic hexahedron", Hexahedron, 24),
+        34 => cell("biquadratic triangle", Flat, 7),
+        35 => cell("cubic line", Flat, 4),
+        36 => cell("quadratic polygon", Flat, 0),
+        37 => cell("triquadratic pyramid", Pyramid, 19),
+        41 => cell("convex point set", Other, 0),
+        42 => cell("polyhedron", Other, 0),
+        51..=55 | 60..=63 | 68..=70 | 75..=77 => cell("higher-order line or surface", Flat, 0),
+        56..=59 => cell("parametric volume", Other, 0),
+        64 | 71 | 78 => cell("higher-order tetrahedron", Tetrahedron, 0),
+        65 | 73 | 80 => cell("higher-order wedge", Wedge, 0),
+        66 | 74 | 81 => cell("higher-order pyramid", Pyramid, 0),
+        67 | 72 | 79 => cell("higher-order hexahedron", Hexahedron, 0),
+        _ => return None,
+    })
+}
+
+/// The cell type of a Gmsh element number.
+pub(crate) fn gmsh(number: i64) -> Option<CellType> {
+    use Shape::{Flat, Hexahedron, Other, Pyramid, Tetrahedron, Wedge};
+    let nodes = *GMSH_NODES.get(usize::try_from(number).ok()?)? as usize;
+    let (linear, higher, shape) = match number {
+        1 => ("line", "", Flat),
+        2 => ("triangle", "", Flat),
+        3 => ("quad", "", Flat),
+        15 => ("point", "", Flat),
+        4 | 11 | 29..=33 | 71..=75 | 79..=83 => ("tetrahedron", "higher-order tetrahedron", Tetrahedron),
+        5 | 12 | 17 | 92..=105 => ("hexahedron", "higher-order hexahedron", Hexahedron),
+        6 | 13 | 18 | 90 | 91 | 106..=117 => ("wedge", "higher-order wedge", Wedge),
+        7 | 14 | 19 | 118..=131 => ("pyramid", "higher-order pyramid", Pyramid),
+        87..=89 | 132 => ("cell of one node", "cell of one node", Other),
+        _ => ("", "higher-order line or surface", Flat),
+    };
+    (nodes > 0).then(|| cell(if number <= 7 || number == 15 { linear } else { higher }, shape, nodes))
+}
+
+/// Nodes per Gmsh element type; 0: no such type, or not of a fixed size.
+#[rustfmt::skip]
+const GMSH_NODES: [u16; 133] = [
+    0, 2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56, 22, 28, 0, 0,
+    16, 25, 36, 12, 16, 20, 28, 36, 45, 55, 66, 49, 64, 81, 100, 121, 18, 21, 24, 27, 30, 24, 28, 32, 36, 40, 7, 8, 9, 10, 11,
+    0, 0, 0, 0, 84, 120, 165, 220, 286, 0, 0, 0, 34, 40, 46, 52, 58, 1, 1, 1, 1, 1, 1, 40, 75,
+    64, 125, 216, 343, 512, 729, 1000, 32, 44, 56, 68, 80, 92, 104, 126, 196, 288, 405, 550, 24, 33, 42, 51, 60, 69, 78,
+    30, 55, 91, 140, 204, 285, 385, 21, 29, 37, 45, 53, 61, 69, 1,
+];

@@ -1,0 +1,134 @@
+//! Which format a file is in: by its content, then by its name.
+
+use std::path::Path;
+
+use super::source::Source;
+use crate::error::Result;
+
+/// A format that can be read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Format {
+    VtkXml,
+    VtkLegacy,
+    Gmsh,
+    Medit,
+    MeditBinary,
+    TetGen,
+}
+
+const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
+
+/// The format of a file; an error that names what was found if it cannot be read.
+pub(crate) fn detect(source: &Source) -> Result<Format> {
+    let bytes = source.bytes.as_slice();
+    let ending = ending(&source.path);
+    if bytes.iter().all(u8::is_ascii_whitespace) {
+        return Err(source.error(if bytes.is_empty() { "the file is empty" } else { "nothing but white space in it" }));
+    }
+    if let Some(found) = foreign_binary(bytes, &ending) {
+        return Err(source.error(found));
+    }
+    let start = skip_comments(bytes);
+    let is = |prefix: &[u8]| bytes[start..].get(..prefix.len()).is_some_and(|b| b.eq_ignore_ascii_case(prefix));
+    if bytes.trim_ascii_start().starts_with(b"# vtk DataFile") {
+        return Ok(Format::VtkLegacy);
+    }
+    if bytes[start..].first() == Some(&b'<') {
+        return Ok(Format::VtkXml);
+    }
+    if bytes[start..].first() == Some(&b'$') {
+        return Ok(Format::Gmsh);
+    }
+    if is(b"MeshVersionFormatted") {
+        return Ok(Format::Medit);
+    }
+    if let Some(found) = foreign_text(&is, &ending) {
+        return Err(source.error(format!("{found}; {CONVERT}")));
+    }
+    let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
+    match ending.as_str() {
+        "vtu" => Ok(Format::VtkXml),
+        "vtk" => Ok(Format::VtkLegacy),
+        "msh" => Ok(Format::Gmsh),
+        "mesh" | "meshb" if medit_binary => Ok(Format::MeditBinary),
+        "mesh" | "meshb" => Ok(Format::Medit),
+        "node" | "ele" => Ok(Format::TetGen),
+        "inp" => Err(source.error(format!("looks like AVS UCD, which cannot be read; {CONVERT}"))),
+        "" => Err(source
+            .error("its content is not recognised, and it has no ending; readable are .vtu, .vtk, .msh, .mesh, .meshb, .node with .ele")),
+        other => {
+            let message = format!(
+                "neither its content nor the ending .{other} is one of .vtu, .vtk, .msh, .mesh, .meshb, .node with .ele; {CONVERT}"
+            );
+            Err(source.error(message))
+        }
+    }
+}
+
+/// The ending of a path in lower case, without the dot.
+pub(crate) fn ending(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
+/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus).
+fn skip_comments(bytes: &[u8]) -> usize {
+    let mut at = 0;
+    loop {
+        at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let rest = &bytes[at..];
+        if !(rest.starts_with(b"#") || rest.starts_with(b"**")) {
+            return at;
+        }
+        at += rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
+    }
+}
+
+fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {
+    let is = |magic: &[u8]| bytes.starts_with(magic);
+    let found = if is(b"\xff\xfe") || is(b"\xfe\xff") || bytes.starts_with(b"<\0") || bytes.starts_with(b"\0<") {
+        return Some("text in UTF-16; save it as UTF-8".into());
+    } else if is(b"\x1f\x8b") {
+        return Some("compressed with gzip; unpack it first (gunzip)".into());
+    } else if is(b"\xfd7zXZ") || is(b"BZh") || is(b"\x28\xb5\x2f\xfd") || is(b"PK\x03\x04") || is(b"7z\xbc\xaf") {
+        return Some("a compressed file or archive; unpack it first".into());
+    } else if is(b"\x89PNG") || is(b"\xff\xd8\xff") || is(b"GIF8") || is(b"%PDF") {
+        return Some("an image or document, not a mesh".into());
+    } else if is(b"\x89HDF\r\n") {
+        match ending {
+            "vtkhdf" | "hdf" => "VTKHDF",
+            "e" | "ex2" | "exo" | "exii" => "Exodus II (in HDF5)",
+            "med" | "rmed" => "MED (in HDF5)",
+            "cgns" => "CGNS (in HDF5)",
+            "h5m" => "MOAB (in HDF5)",
+            _ => "HDF5 (Exodus II, VTKHDF, CGNS, MED …)",
+        }
+    } else if is(b"CDF\x01") || is(b"CDF\x02") || is(b"CDF\x05") {
+        "Exodus II (in NetCDF)"
+    } else {
+        return None;
+    };
+    Some(format!("a file in {found}, which cannot be read; {CONVERT}"))
+}
+
+fn foreign_text(is: &dyn Fn(&[u8]) -> bool, ending: &str) -> Option<&'static str> {
+    let any = |prefixes: &[&str]| prefixes.iter().any(|p| is(p.as_bytes()));
+    Some(if any(&["MFEM "]) {
+        "an MFEM mesh, which cannot be read"
+    } else if any(&["*VERTICES", "*ELEMENTS"]) || (ending == "veg" && any(&["*"])) {
+        "a Vega FEM mesh, which cannot be read"
+    } else if any(&["*HEADING", "*NODE", "*PART", "*INCLUDE", "*PREPRINT"]) {
+        "an Abaqus input file, which cannot be read"
+    } else if any(&["*KEYWORD"]) {
+        "an LS-DYNA keyword file, which cannot be read"
+    } else if any(&["FoamFile", "/*--------------------------------*- C++ -*-"]) {
+        "an OpenFOAM file, which cannot be read"
+    } else if any(&["TITLE", "VARIABLES"]) && ["dat", "plt", "tec"].contains(&ending) {
+        "a Tecplot file, which cannot be read"
+    } else if any(&["(0 ", "(1 ", "(2 "]) {
+        "a Fluent mesh, which cannot be read"
+    } else if any(&["solid ", "OFF\n", "ply\n", "ply\r", "v "]) {
+        "a surface or other geometry without volume cells"
+    } else {
+        return None;
+    })
+}

@@ -1,0 +1,87 @@
+//! `$NodeData` and `$ElementData` of Gmsh files.
+
+use super::assemble::Array;
+use super::gmsh::Reader;
+use super::source::printable;
+use super::tags::Tags;
+use crate::error::Result;
+use crate::mesh::On;
+
+/// Values by the numbers of nodes or elements.
+pub(crate) struct View {
+    pub name: String,
+    pub on: On,
+    /// Number of the time step.
+    pub step: i64,
+    components: usize,
+    tags: Vec<i64>,
+    values: Vec<f32>,
+}
+
+impl View {
+    /// One value per point or cell; NaN where the file gives none. `Err` is a warning: values for something that does not exist
+    /// (renumbered meshes have them) are no reason to refuse the mesh.
+    pub fn array(&self, tags: &Tags, count: usize) -> Result<Array, String> {
+        let n = self.components;
+        let mut values = vec![f32::NAN; n * count];
+        for (&tag, tuple) in self.tags.iter().zip(self.values.chunks_exact(n.max(1))) {
+            let found = tags.get(tag).and_then(|i| values.get_mut(i as usize * n..(i as usize + 1) * n));
+            let what = if self.on == On::Points { "node" } else { "element" };
+            let slot = found.ok_or_else(|| {
+                let name = printable(self.name.as_bytes());
+                format!("array `{name}` is left out: it has a value for {what} {tag}, which does not exist")
+            })?;
+            slot.copy_from_slice(tuple);
+        }
+        Ok(Array { name: self.name.clone(), on: self.on, components: n, values })
+    }
+}
+
+impl Reader<'_> {
+    pub(crate) fn view(&mut self, on: On, end: &[u8]) -> Result<View> {
+        let at = self.tokens.at;
+        let strings = self.tokens.count("the number of texts")?;
+        let mut name = None;
+        for _ in 0..strings {
+            self.tokens.skip_space();
+            let (line, _) = self.tokens.line().unwrap_or_default();
+            let text = line.trim_ascii();
+            let text = text.strip_prefix(b"\"").unwrap_or(text);
+            let text = text.strip_suffix(b"\"").unwrap_or(text);
+            name.get_or_insert_with(|| String::from_utf8_lossy(text).into_owned());
+        }
+        for _ in 0..self.tokens.count("the number of real tags")? {
+            self.tokens.float("a real tag")?;
+        }
+        let mut numbers = [0, 1, 0];
+        for i in 0..self.tokens.count("the number of integer tags")? {
+            let number = self.tokens.integer("an integer tag")?;
+            if let Some(slot) = numbers.get_mut(i) {
+                *slot = number;
+            }
+        }
+        if self.binary {
+            self.tokens.line();
+        }
+        let [step, components, count] = numbers;
+        let components = usize::try_from(components).ok().filter(|n| (1..=9).contains(n));
+        let components = components.ok_or_else(|| self.source.error_line(at, format!("{} components, not 1 to 9", numbers[1])))?;
+        let count = self.bounded(count, 4 + 8 * components, "tuples of values")?;
+        let mut view = View {
+            name: name.unwrap_or_else(|| "unnamed".into()),
+            on,
+            step,
+            components,
+            tags: Vec::with_capacity(count),
+            values: Vec::with_capacity(count * components),
+        };
+        for _ in 0..count {
+            view.tags.push(self.int("the number of a node or element")?);
+            for _ in 0..components {
+                view.values.push(self.real("a value")? as f32);
+            }
+        }
+        self.end(end)?;
+        Ok(view)
+    }
+}

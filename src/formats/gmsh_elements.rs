@@ -1,0 +1,167 @@
+//! `$Elements` of Gmsh files.
+
+use super::cells::{self, CellType};
+use super::gmsh::{Reader, Version};
+use super::source::{Source, Tokens, parse_integer, printable};
+use crate::error::Result;
+
+/// The elements as the file has them.
+#[derive(Default)]
+pub(crate) struct Elements {
+    pub tags: Vec<i64>,
+    pub kinds: Vec<CellType>,
+    /// Node tags of all elements.
+    pub nodes: Vec<i64>,
+    pub physical: Vec<i64>,
+    pub entities: Vec<i64>,
+}
+
+impl<'a> Reader<'a> {
+    fn kind(&self, number: i64, at: usize) -> Result<CellType> {
+        cells::gmsh(number).ok_or_else(|| {
+            let message = format!("unknown element type {number}");
+            if self.binary { self.source.error_byte(at, message) } else { self.source.error_line(at, message) }
+        })
+    }
+
+    /// The tokens of the next line that is not empty, so that a short line is noticed where it is.
+    fn line(&mut self, what: &str) -> Result<(Tokens<'a>, usize)> {
+        self.tokens.skip_space();
+        let (line, at) =
+            self.tokens.line().ok_or_else(|| self.source.error_line(self.tokens.at, format!("the file ends where {what} should be")))?;
+        Ok((Tokens::new(self.source, at..at + line.len(), None), at))
+    }
+
+    pub(crate) fn elements_2(&mut self, elements: &mut Elements) -> Result<()> {
+        let n = self.tokens.integer("the number of elements")?;
+        if self.binary {
+            self.tokens.line();
+            let n = self.bounded(n, 8, "elements")?;
+            return self.elements_2_binary(n, elements);
+        }
+        let n = self.bounded(n, 8, "elements")?;
+        for _ in 0..n {
+            let (mut line, at) = self.line("an element")?;
+            let tag = line.integer("the number of an element")?;
+            let number = line.integer("the type of an element")?;
+            let marks = line.count("the number of tags of an element")?;
+            let mut two = [0; 2];
+            for i in 0..marks {
+                let mark = line.integer("a tag of an element")?;
+                if let Some(slot) = two.get_mut(i) {
+                    *slot = mark;
+                }
+            }
+            let mut nodes = Vec::new();
+            while let Some((token, at)) = line.next_token() {
+                let node = parse_integer(token);
+                nodes.push(node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", printable(token))))?);
+            }
+            let kind = self.kind(number, at)?;
+            elements.push(self.source, at, kind, tag, two, &nodes)?;
+        }
+        Ok(())
+    }
+
+    fn elements_2_binary(&mut self, n: usize, elements: &mut Elements) -> Result<()> {
+        while elements.kinds.len() < n {
+            let at = self.tokens.at;
+            let number = self.int("the type of elements")?;
+            let follow = self.int("the number of elements in a block")?;
+            let marks = self.int("the number of tags of elements")?;
+            let kind = self.kind(number, at)?;
+            let width = kind.nodes.unwrap_or(0);
+            let fail = |message: String| self.source.error_byte(at, message);
+            let follow = usize::try_from(follow).ok().filter(|&f| f > 0 && f <= n - elements.kinds.len());
+            let follow =
+                follow.ok_or_else(|| fail(format!("a block of elements that goes past the {n} that are announced, or is empty")))?;
+            let marks = usize::try_from(marks).ok().filter(|&m| m <= self.tokens.left() / 4);
+            let marks = marks.ok_or_else(|| fail("more tags than the rest of the file can hold".into()))?;
+            for _ in 0..follow {
+                let tag = self.int("the number of an element")?;
+                let mut two = [0; 2];
+                for i in 0..marks {
+                    let mark = self.int("a tag of an element")?;
+                    if let Some(slot) = two.get_mut(i) {
+                        *slot = mark;
+                    }
+                }
+                for _ in 0..width {
+                    let node = self.int("a node of an element")?;
+                    elements.nodes.push(node);
+                }
+                elements.mark(kind, tag, two);
+            }
+        }
+        Ok(())
+    }
+
+    pub(crate) fn elements_4(&mut self, version: Version, elements: &mut Elements) -> Result<()> {
+        if self.binary {
+            self.tokens.line();
+        }
+        let blocks = self.long("the number of blocks")?;
+        let n = self.long("the number of elements")?;
+        let n = self.bounded(n, 8, "elements")?;
+        if version == Version::V41 {
+            self.long("the smallest number of an element")?;
+            self.long("the largest number of an element")?;
+        }
+        for _ in 0..blocks.max(0) {
+            let at = self.tokens.at;
+            let [first, second] = [self.int("an entity")?, self.int("an entity")?];
+            let (dimension, entity) = if version == Version::V41 { (first, second) } else { (second, first) };
+            let number = self.int("the type of elements")?;
+            let in_block = self.long("the number of elements in a block")?;
+            let kind = self.kind(number, at)?;
+            let in_block = usize::try_from(in_block).ok().filter(|&b| b <= n - elements.kinds.len());
+            let in_block =
+                in_block.ok_or_else(|| self.source.error_byte(at, format!("a block of elements goes past the {n} that are announced")))?;
+            let two = [0, if dimension == 3 { entity } else { 0 }];
+            for _ in 0..in_block {
+                if !self.binary {
+                    let (mut line, at) = self.line("an element")?;
+                    let tag = line.integer("the number of an element")?;
+                    let mut nodes = Vec::with_capacity(kind.nodes.unwrap_or(0));
+                    while line.peek().is_some() {
+                        nodes.push(line.integer("a node of an element")?);
+                    }
+                    elements.push(self.source, at, kind, tag, two, &nodes)?;
+                    continue;
+                }
+                let wide = version == Version::V41;
+                let tag = if wide { self.long("the number of an element")? } else { self.int("the number of an element")? };
+                for _ in 0..kind.nodes.unwrap_or(0) {
+                    let node = if wide { self.long("a node of an element")? } else { self.int("a node of an element")? };
+                    elements.nodes.push(node);
+                }
+                elements.mark(kind, tag, two);
+            }
+        }
+        if elements.kinds.len() != n {
+            let message = format!("$Elements: {n} elements are announced, {} are there", elements.kinds.len());
+            return Err(self.source.error_byte(self.tokens.at, message));
+        }
+        Ok(())
+    }
+}
+
+impl Elements {
+    fn push(&mut self, source: &Source, at: usize, kind: CellType, tag: i64, marks: [i64; 2], nodes: &[i64]) -> Result<()> {
+        let wanted = kind.nodes.unwrap_or(0);
+        if nodes.len() != wanted {
+            let message = format!("element {tag} ({}) has {} nodes instead of {wanted}", kind.name, nodes.len());
+            return Err(source.error_line(at, message));
+        }
+        self.nodes.extend_from_slice(nodes);
+        self.mark(kind, tag, marks);
+        Ok(())
+    }
+
+    fn mark(&mut self, kind: CellType, tag: i64, marks: [i64; 2]) {
+        self.kinds.push(kind);
+        self.tags.push(tag);
+        self.physical.push(marks[0]);
+        self.entities.push(marks[1]);
+    }
+}

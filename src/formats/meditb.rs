@@ -1,0 +1,100 @@
+//! Binary Medit meshes (`.meshb`), versions 1 to 4, either byte order.
+
+use super::assemble::Assembly;
+use super::medit::{Content, SECTIONS};
+use super::scalar::{Number, Scalar};
+use super::source::Source;
+use crate::error::Result;
+
+const DIMENSION: i64 = 3;
+const VERTICES: i64 = 4;
+const END: i64 = 54;
+
+struct Reader<'a> {
+    source: &'a Source,
+    at: usize,
+    big_endian: bool,
+    version: i64,
+}
+
+pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+    let big_endian = source.bytes.first() == Some(&0);
+    let mut reader = Reader { source, at: 4, big_endian, version: 1 };
+    reader.version = reader.number(Scalar::I32)?;
+    if !(1..=4).contains(&reader.version) {
+        return Err(source.error_byte(4, format!("version {}; 1 to 4 can be read", reader.version)));
+    }
+    let mut content = Content::default();
+    loop {
+        let start = reader.at;
+        let keyword: i64 = reader.number(Scalar::I32)?;
+        let next: i64 = reader.number(reader.position())?;
+        if keyword == END {
+            break;
+        }
+        let past = usize::try_from(next).ok().filter(|&n| n > start && n <= source.bytes.len());
+        let past = past.ok_or_else(|| source.error_byte(start, format!("section {keyword} is said to end at byte {next}")))?;
+        if keyword == DIMENSION {
+            let n: i64 = reader.number(Scalar::I32)?;
+            if n != 3 {
+                return Err(source.error_byte(start, format!("a mesh of dimension {n}, not 3")));
+            }
+        } else if keyword == VERTICES {
+            let (float, int) = (if reader.version == 1 { Scalar::F32 } else { Scalar::F64 }, reader.int());
+            let n = reader.count(3 * float.size() + int.size())?;
+            let mut points = Vec::with_capacity(n);
+            for _ in 0..n {
+                points.push([reader.number(float)?, reader.number(float)?, reader.number(float)?]);
+                content.point_marks.push(reader.number(int)?);
+            }
+            content.points = Some(points);
+        } else if let Some((_, _, kind)) = SECTIONS.iter().find(|s| s.1 == keyword) {
+            let (width, int) = (kind.nodes.unwrap_or(0), reader.int());
+            let n = reader.count((width + 1) * int.size())?;
+            let mut nodes = Vec::with_capacity(n * width);
+            for _ in 0..n {
+                for _ in 0..width {
+                    nodes.push(reader.number(int)?);
+                }
+                content.cell_marks.push(reader.number(int)?);
+            }
+            content.cells.push((*kind, nodes));
+        } else {
+            content.skipped.push(format!("number {keyword}"));
+        }
+        if reader.at > past {
+            return Err(source.error_byte(start, format!("section {keyword} is longer than the {} bytes it is said to have", past - start)));
+        }
+        reader.at = past;
+    }
+    let mut assembly = Assembly::new(source, format!("Medit binary, version {}", reader.version));
+    content.assemble(source, &mut assembly)?;
+    Ok(assembly)
+}
+
+impl Reader<'_> {
+    fn position(&self) -> Scalar {
+        if self.version < 3 { Scalar::I32 } else { Scalar::I64 }
+    }
+
+    fn int(&self) -> Scalar {
+        if self.version < 4 { Scalar::I32 } else { Scalar::I64 }
+    }
+
+    fn number<T: Number>(&mut self, scalar: Scalar) -> Result<T> {
+        let bytes = self.source.bytes.get(self.at..self.at.saturating_add(scalar.size()));
+        let value = bytes.and_then(|b| scalar.convert(b, self.big_endian).first().copied());
+        let value = value.ok_or_else(|| self.source.error_byte(self.at, "the file ends here, without a section End"))?;
+        self.at += scalar.size();
+        Ok(value)
+    }
+
+    /// A number of things of `each` bytes.
+    fn count(&mut self, each: usize) -> Result<usize> {
+        let at = self.at;
+        let n: i64 = self.number(self.int())?;
+        let room = self.source.bytes.len().saturating_sub(self.at) / each;
+        let fits = usize::try_from(n).ok().filter(|&n| n <= room);
+        fits.ok_or_else(|| self.source.error_byte(at, format!("a count of {n}, but the rest of the file has room for {room} at most")))
+    }
+}

@@ -1,0 +1,99 @@
+//! NumPy's array files. A header of three keys is read here by hand: the crates at hand bring a parser of Python literals along, and
+//! trust the shape before they look at the size of the file.
+
+use super::scalar::Scalar;
+use super::source::{Source, printable};
+use crate::error::Result;
+
+pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
+
+/// The header of an array of that type and shape, padded so that the data are aligned. `descr` is a Python literal.
+pub(crate) fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
+    let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
+    let comma = if shape.len() == 1 { "," } else { "" };
+    let mut text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}{comma}), }}", shape.join(", "));
+    let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
+    while text.len() + 1 < length {
+        text.push(' ');
+    }
+    text.push('\n');
+    let mut out = MAGIC.to_vec();
+    out.extend([1, 0]);
+    out.extend((length as u16).to_le_bytes());
+    out.extend(text.as_bytes());
+    out
+}
+
+/// Points from an array of shape (n, 3), or (3,) for a single one.
+pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
+    let bytes = &source.bytes;
+    let short = || source.error_byte(bytes.len(), "the file ends inside the header");
+    let (size, start) = match bytes.get(6) {
+        Some(1) => (2, 10),
+        Some(2 | 3) => (4, 12),
+        Some(other) => return Err(source.error_byte(6, format!("version {other} of the format; 1 to 3 can be read"))),
+        None => return Err(short()),
+    };
+    let length = bytes.get(8..8 + size).ok_or_else(short)?.iter().rev().fold(0usize, |n, &b| n << 8 | b as usize);
+    let text = bytes.get(start..start + length).ok_or_else(short)?;
+    let text = String::from_utf8_lossy(text);
+    let field = |key: &str| {
+        let at = text.find(&format!("'{key}'")).or_else(|| text.find(&format!("\"{key}\"")));
+        let rest = at.and_then(|at| text[at + key.len() + 2..].trim_start().strip_prefix(':'));
+        rest.map(str::trim_start).ok_or_else(|| source.error_in("header", format!("no key {key}")))
+    };
+    let descr = field("descr")?;
+    let quote = descr.chars().next().filter(|c| "'\"".contains(*c));
+    let name = quote.and_then(|q| descr[1..].split_once(q)).map(|(name, _)| name);
+    let kind = name.and_then(scalar);
+    let (scalar, big_endian) = kind.ok_or_else(|| {
+        source.error_in("header", format!("an array of type {}; floating-point numbers are needed", printable(descr.as_bytes())))
+    })?;
+    let fortran = field("fortran_order")?.starts_with("True");
+    let shape = field("shape")?.strip_prefix('(').and_then(|s| s.split_once(')')).map(|(s, _)| s);
+    let shape: Option<Vec<usize>> =
+        shape.and_then(|s| s.split(',').map(str::trim).filter(|s| !s.is_empty()).map(|s| s.parse().ok()).collect());
+    let n = match shape.as_deref() {
+        Some([n, 3]) => *n,
+        Some([3]) => 1,
+        other => {
+            return Err(
+                source.error_in("header", format!("shape {}; (n, 3) is needed", other.map_or("unreadable".into(), |s| format!("{s:?}"))))
+            );
+        }
+    };
+    let data = &bytes[start + length..];
+    let wanted = n.checked_mul(3 * scalar.size()).filter(|&w| w <= data.len());
+    let wanted = wanted
+        .ok_or_else(|| source.error_byte(start + length, format!("{n} points are announced, but only {} bytes follow", data.len())))?;
+    let values: Vec<f64> = scalar.convert(&data[..wanted], big_endian);
+    Ok(if fortran {
+        (0..n).map(|i| [values[i], values[n + i], values[2 * n + i]]).collect()
+    } else {
+        values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
+    })
+}
+
+/// A type like `<f8`.
+fn scalar(name: &str) -> Option<(Scalar, bool)> {
+    let (order, kind) = name.split_at_checked(1)?;
+    let big_endian = match order {
+        "<" | "|" | "=" => false,
+        ">" => true,
+        _ => return None,
+    };
+    let scalar = match kind {
+        "f4" => Scalar::F32,
+        "f8" => Scalar::F64,
+        "i1" => Scalar::I8,
+        "u1" => Scalar::U8,
+        "i2" => Scalar::I16,
+        "u2" => Scalar::U16,
+        "i4" => Scalar::I32,
+        "u4" => Scalar::U32,
+        "i8" => Scalar::I64,
+        "u8" => Scalar::U64,
+        _ => return None,
+    };
+    Some((scalar, big_endian))
+}

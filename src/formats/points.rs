@@ -1,0 +1,104 @@
+//! Points to be located: NumPy arrays and tables of text.
+
+use std::path::Path;
+
+use super::npy;
+use super::source::{Source, Tokens, parse_float, printable};
+use crate::error::Result;
+
+/// Reads points: a `.npy` file of shape (n, 3) with any type of numbers, or a table of text with one point per line, separated by
+/// commas, semicolons or white space. The first line of a table may name the columns; if it names `x`, `y` and `z`, these are taken,
+/// otherwise there must be three columns. Lines that begin with `#` are comments.
+///
+/// # Errors
+/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
+pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
+    let source = Source::read(path.as_ref())?;
+    if source.bytes.starts_with(npy::MAGIC) {
+        return npy::read_points(&source);
+    }
+    if source.bytes.starts_with(b"PK\x03\x04") {
+        return Err(source.error("an archive (.npz?); save the array of points as .npy"));
+    }
+    if let Some(at) = source.bytes.iter().position(|&b| b == 0) {
+        return Err(source.error_byte(at, "a byte 0: neither a .npy file nor a table of text"));
+    }
+    table(&source)
+}
+
+fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
+    let mut points = Vec::new();
+    let mut columns: Option<[usize; 3]> = None;
+    let mut width = 0;
+    let mut lines = Tokens::new(source, 0..source.bytes.len(), None);
+    while let Some((line, at)) = lines.line() {
+        let line = line.trim_ascii();
+        if line.is_empty() || line.starts_with(b"#") {
+            continue;
+        }
+        let fields = split(line);
+        let Some(columns) = columns else {
+            width = fields.len();
+            let numbers = fields.iter().all(|f| number(f, line).is_some());
+            columns = Some(choose(&fields, numbers).ok_or_else(|| {
+                let message = format!("{width} columns; there must be three, or a first line that names x, y and z among them");
+                source.error_line(at, message)
+            })?);
+            if numbers {
+                points.push(point(source, at, line, &fields, columns.unwrap_or_default())?);
+            }
+            continue;
+        };
+        if fields.len() != width {
+            return Err(source.error_line(at, format!("{} columns instead of {width}", fields.len())));
+        }
+        points.push(point(source, at, line, &fields, columns)?);
+    }
+    if columns.is_none() {
+        return Err(source.error("no points in it"));
+    }
+    Ok(points)
+}
+
+fn split(line: &[u8]) -> Vec<&[u8]> {
+    let clean = |f: &'static str| move |b: &u8| f.as_bytes().contains(b);
+    let separator = if line.contains(&b';') { Some(clean(";")) } else { line.contains(&b',').then(|| clean(",")) };
+    match separator {
+        Some(is) => line.split(is).map(<[u8]>::trim_ascii).collect(),
+        None => line.split(u8::is_ascii_whitespace).filter(|f| !f.is_empty()).collect(),
+    }
+}
+
+/// A number; where semicolons separate, the decimal mark may be a comma.
+fn number(field: &[u8], line: &[u8]) -> Option<f64> {
+    if line.contains(&b';') && field.contains(&b',') {
+        let dotted: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
+        return parse_float(&dotted);
+    }
+    parse_float(field)
+}
+
+/// Which columns hold x, y and z.
+fn choose(fields: &[&[u8]], numbers: bool) -> Option<[usize; 3]> {
+    let find = |names: [&str; 3]| {
+        let at = names.map(|name| {
+            fields.iter().position(|f| {
+                let f = f.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).unwrap_or(f);
+                f.eq_ignore_ascii_case(name.as_bytes())
+            })
+        });
+        Some([at[0]?, at[1]?, at[2]?])
+    };
+    let named = if numbers { None } else { find(["x", "y", "z"]).or_else(|| find(["Points:0", "Points:1", "Points:2"])) };
+    named.or_else(|| (fields.len() == 3).then_some([0, 1, 2]))
+}
+
+fn point(source: &Source, at: usize, line: &[u8], fields: &[&[u8]], columns: [usize; 3]) -> Result<[f64; 3]> {
+    let mut point = [0.0; 3];
+    for (x, column) in point.iter_mut().zip(columns) {
+        let field = fields.get(column).copied().unwrap_or_default();
+        let value = number(field, line);
+        *x = value.ok_or_else(|| source.error_line(at, format!("`{}` is not a number", printable(field))))?;
+    }
+    Ok(point)
+}

@@ -1,0 +1,188 @@
+//! A file read whole, and errors that name a place in it.
+
+use std::path::{Path, PathBuf};
+
+use crate::error::{Error, Result};
+
+/// A file in memory.
+pub(crate) struct Source {
+    /// Its path, for messages.
+    pub path: PathBuf,
+    /// Its content, without a UTF-8 byte-order mark.
+    pub bytes: Vec<u8>,
+}
+
+impl Source {
+    /// Reads the whole file. A memory map would save the copy, but a map of a file that another process cuts short kills this one.
+    pub fn read(path: &Path) -> Result<Self> {
+        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
+        Ok(Self::new(path, bytes))
+    }
+
+    /// The content of a file.
+    pub fn new(path: &Path, mut bytes: Vec<u8>) -> Self {
+        if bytes.starts_with(b"\xef\xbb\xbf") {
+            bytes.drain(..3);
+        }
+        Self { path: path.into(), bytes }
+    }
+
+    /// An error without a place.
+    pub fn error(&self, message: impl Into<String>) -> Error {
+        Error::File { path: self.path.clone(), place: String::new(), message: message.into() }
+    }
+
+    /// An error at a place described in words.
+    pub fn error_in(&self, place: impl std::fmt::Display, message: impl Into<String>) -> Error {
+        Error::File { path: self.path.clone(), place: format!("{place}: "), message: message.into() }
+    }
+
+    /// An error in the line of text that holds byte `at`.
+    pub fn error_line(&self, at: usize, message: impl Into<String>) -> Error {
+        self.error_in(format_args!("line {}", self.line(at)), message)
+    }
+
+    /// An error at a byte of binary data.
+    pub fn error_byte(&self, at: usize, message: impl Into<String>) -> Error {
+        self.error_in(format_args!("byte {at}"), message)
+    }
+
+    /// Number, from 1, of the line that holds byte `at`; a lone carriage return ends a line too.
+    pub fn line(&self, at: usize) -> usize {
+        let before = &self.bytes[..at.min(self.bytes.len())];
+        let feed_follows = |i: usize| self.bytes.get(i + 1) == Some(&b'\n');
+        1 + before.iter().enumerate().filter(|&(i, &b)| b == b'\n' || (b == b'\r' && !feed_follows(i))).count()
+    }
+}
+
+/// A word of a file for a message: short, and without control characters.
+pub(crate) fn printable(word: &[u8]) -> String {
+    let cut = &word[..word.len().min(60)];
+    let text = String::from_utf8_lossy(cut);
+    let mut text: String = text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    if cut.len() < word.len() {
+        text.push('…');
+    }
+    text
+}
+
+/// The numbers and words of a text, separated by white space.
+#[derive(Clone)]
+pub(crate) struct Tokens<'a> {
+    source: &'a Source,
+    /// Next unread byte of the source.
+    pub at: usize,
+    end: usize,
+    /// Starts a comment that lasts to the end of the line.
+    comment: Option<u8>,
+}
+
+impl<'a> Tokens<'a> {
+    pub fn new(source: &'a Source, range: std::ops::Range<usize>, comment: Option<u8>) -> Self {
+        Self { source, at: range.start, end: range.end.min(source.bytes.len()), comment }
+    }
+
+    /// Skips white space and comments.
+    pub fn skip_space(&mut self) {
+        let bytes = &self.source.bytes[..self.end];
+        while let Some(&b) = bytes.get(self.at) {
+            if b.is_ascii_whitespace() || b == 0x0b {
+                self.at += 1;
+            } else if Some(b) == self.comment {
+                self.at += bytes[self.at..].iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(self.end - self.at);
+            } else {
+                return;
+            }
+        }
+    }
+
+    /// The next token and where it begins; `None` at the end.
+    pub fn next_token(&mut self) -> Option<(&'a [u8], usize)> {
+        self.skip_space();
+        let start = self.at.min(self.end);
+        let rest = &self.source.bytes[start..self.end];
+        let stop = |b: u8| b.is_ascii_whitespace() || b == 0x0b || Some(b) == self.comment;
+        let length = rest.iter().position(|&b| stop(b)).unwrap_or(rest.len());
+        self.at += length;
+        (length > 0).then(|| (&rest[..length], start))
+    }
+
+    /// The next token without consuming it.
+    pub fn peek(&self) -> Option<&'a [u8]> {
+        self.clone().next_token().map(|(token, _)| token)
+    }
+
+    /// The next token; an error that says what was wanted at the end.
+    pub fn word(&mut self, what: &str) -> Result<(&'a [u8], usize)> {
+        self.next_token().ok_or_else(|| self.source.error_line(self.end, format!("the file ends where {what} should be")))
+    }
+
+    /// The next token as an integer.
+    pub fn integer(&mut self, what: &str) -> Result<i64> {
+        let (token, at) = self.word(what)?;
+        parse_integer(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
+    }
+
+    /// The next token as a number that counts something of which the rest of the text must hold two bytes each, so that a wrong
+    /// count is refused before anything is allocated for it.
+    pub fn count(&mut self, what: &str) -> Result<usize> {
+        let (token, at) = self.word(what)?;
+        let fail = |why: &str| self.source.error_line(at, format!("`{}` as {what}: {why}", printable(token)));
+        let n = parse_integer(token).ok_or_else(|| fail("not an integer in range"))?;
+        let n = usize::try_from(n).map_err(|_| fail("negative"))?;
+        if n > self.left() / 2 + 1 { Err(fail("more than the rest of the file can hold")) } else { Ok(n) }
+    }
+
+    /// The next token as a floating-point number.
+    pub fn float(&mut self, what: &str) -> Result<f64> {
+        let (token, at) = self.word(what)?;
+        parse_float(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
+    }
+
+    /// The rest of the line from here, its end consumed; `None` at the end of the text.
+    pub fn line(&mut self) -> Option<(&'a [u8], usize)> {
+        if self.at >= self.end {
+            return None;
+        }
+        let start = self.at;
+        let rest = &self.source.bytes[start..self.end];
+        let length = rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
+        let feed = if rest[length..].starts_with(b"\r\n") { 2 } else { usize::from(length < rest.len()) };
+        self.at += length + feed;
+        Some((&rest[..length], start))
+    }
+
+    /// Bytes not read yet.
+    pub fn left(&self) -> usize {
+        self.end.saturating_sub(self.at)
+    }
+}
+
+/// An integer in decimal; `None` if it is none or does not fit.
+pub(crate) fn parse_integer(token: &[u8]) -> Option<i64> {
+    let (negative, digits) = match token {
+        [b'-', rest @ ..] => (true, rest),
+        [b'+', rest @ ..] | rest => (false, rest),
+    };
+    if digits.is_empty() {
+        return None;
+    }
+    let mut value = 0i64;
+    for &b in digits {
+        let digit = i64::from(b.wrapping_sub(b'0'));
+        if digit > 9 {
+            return None;
+        }
+        value = value.checked_mul(10)?.checked_sub(digit)?;
+    }
+    if negative { Some(value) } else { value.checked_neg() }
+}
+
+/// A floating-point number; Fortran's exponent letter D is understood.
+pub(crate) fn parse_float(token: &[u8]) -> Option<f64> {
+    let text = std::str::from_utf8(token).ok()?;
+    text.parse().ok().or_else(|| {
+        let looks_fortran = text.len() <= 64 && text.bytes().all(|b| b.is_ascii_digit() || b"+-.dD".contains(&b));
+        looks_fortran.then(|| text.replace(['d', 'D'], "e").parse().ok()).flatten()
+    })
+}

@@ -1,0 +1,355 @@
+//! VTK XML unstructured grids (`.vtu`), version 0.1 to 2.x: the XML skeleton. The arrays themselves: `vtu_data`.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use super::LoadOptions;
+use super::assemble::{Array, Assembly};
+use super::cells::{self, CellType};
+use super::report::Fate;
+use super::scalar::Scalar;
+use super::source::{Source, printable};
+use super::vtu_data::{Appended, Codec, Place, StoredArray};
+use crate::error::Result;
+use crate::mesh::On;
+
+/// One `Piece` of the grid.
+#[derive(Default)]
+struct Piece {
+    at: usize,
+    points: u64,
+    cells: u64,
+    /// Arrays by the element that holds them.
+    point_data: Vec<StoredArray>,
+    cell_data: Vec<StoredArray>,
+    positions: Option<StoredArray>,
+    topology: Vec<StoredArray>,
+}
+
+/// What the elements outside the arrays say.
+struct Skeleton {
+    codec: Codec,
+    pieces: Vec<Piece>,
+    format: String,
+}
+
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+    let text = head(source);
+    let skeleton = Parser { source, reader: Reader::from_str(&text), stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
+    let mut codec = skeleton.codec;
+    codec.set_budget(source.bytes.len(), options.expansion);
+    let mut assembly = Assembly::new(source, skeleton.format);
+    let n_pieces = skeleton.pieces.len();
+    let mut starts = Vec::with_capacity(n_pieces);
+    for (i, piece) in skeleton.pieces.iter().enumerate() {
+        starts.push(assembly.points.len());
+        read_piece(source, &mut codec, &mut assembly, piece, i)?;
+    }
+    if n_pieces > 1 && options.merge_pieces {
+        assembly.merge_pieces(&starts);
+    }
+    Ok(assembly)
+}
+
+/// The part of the file that is XML: up to the appended data. Bytes that are no UTF-8 become question marks, so that a name in
+/// another encoding does no harm.
+fn head(source: &Source) -> Cow<'_, str> {
+    const APPENDED: &[u8] = b"<AppendedData";
+    let bytes = &source.bytes;
+    let tag = bytes.windows(APPENDED.len()).position(|w| w == APPENDED);
+    let end = tag.and_then(|at| bytes[at..].iter().position(|&b| b == b'>').map(|close| at + close + 1)).unwrap_or(bytes.len());
+    match std::str::from_utf8(&bytes[..end]) {
+        Ok(text) => Cow::Borrowed(text),
+        Err(_) => Cow::Owned(bytes[..end].iter().map(|&b| if b.is_ascii() { char::from(b) } else { '?' }).collect()),
+    }
+}
+
+struct Parser<'a, 't> {
+    source: &'a Source,
+    reader: Reader<&'t [u8]>,
+    stack: Vec<String>,
+    codec: Option<(Codec, String)>,
+    pieces: Vec<Piece>,
+}
+
+impl Parser<'_, '_> {
+    fn run(mut self) -> Result<Skeleton> {
+        let mut appended = None;
+        loop {
+            let start = self.reader.buffer_position() as usize;
+            let event = self.reader.read_event();
+            let end = self.reader.buffer_position() as usize;
+            let fail = |message: String| Err(self.source.error_line(start, message));
+            match event {
+                Err(error) => {
+                    return Err(self.source.error_line(self.reader.error_position() as usize, format!("not well-formed XML: {error}")));
+                }
+                Ok(Event::Eof) if self.stack.is_empty() => break,
+                Ok(Event::Eof) => return fail(format!("the file ends inside <{}>", self.stack.join("><"))),
+                Ok(Event::DocType(e)) if e.trim_start().get(..4).is_some_and(|t| t.eq_ignore_ascii_case("html")) => {
+                    return fail("an HTML page, not a mesh".into());
+                }
+                Ok(Event::DocType(_)) => {
+                    return fail("a document type declaration; VTK files have none, and entities are not expanded".into());
+                }
+                Ok(Event::GeneralRef(_)) => return fail("an entity reference in the data".into()),
+                Ok(Event::Text(_) | Event::CData(_)) => self.text(start..end),
+                Ok(Event::Start(e)) => {
+                    if e.name().as_ref() == "AppendedData" {
+                        appended = Some((self.attributes(&e, start)?, end));
+                        break;
+                    }
+                    if self.stack.len() > 32 {
+                        return fail("elements nested more than 32 deep".into());
+                    }
+                    self.open(&e, start)?;
+                    self.stack.push(printable(e.name().as_ref().as_bytes()));
+                }
+                Ok(Event::Empty(e)) => self.open(&e, start)?,
+                Ok(Event::End(_)) => {
+                    self.stack.pop();
+                }
+                Ok(Event::Comment(_) | Event::Decl(_) | Event::PI(_)) => {}
+            }
+        }
+        let Some((mut codec, format)) = self.codec.take() else {
+            return Err(self.source.error("no element <VTKFile> in it: not a VTK file"));
+        };
+        if self.pieces.is_empty() {
+            return Err(self.source.error("no <Piece> in it"));
+        }
+        if let Some((attributes, end)) = appended {
+            codec.appended = Some(self.appended(&attributes, end)?);
+        }
+        Ok(Skeleton { codec, pieces: self.pieces, format })
+    }
+
+    fn appended(&self, attributes: &[(String, String)], end: usize) -> Result<Appended> {
+        let encoding = get(attributes, "encoding").unwrap_or("base64");
+        let base64 = match encoding {
+            "raw" => false,
+            "base64" => true,
+            other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", printable(other.as_bytes())))),
+        };
+        let bytes = &self.source.bytes[end..];
+        let space = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(bytes.len());
+        if bytes.get(space) != Some(&b'_') {
+            return Err(self.source.error_byte(end + space, "the appended data must begin with an underscore"));
+        }
+        let start = end + space + 1;
+        let stop = if base64 {
+            bytes[space..].iter().position(|&b| b == b'<').map_or(self.source.bytes.len(), |n| end + space + n)
+        } else {
+            self.source.bytes.len()
+        };
+        Ok(Appended { base64, range: start..stop.max(start) })
+    }
+
+    fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {
+        let mut found = Vec::new();
+        // Without the check for duplicates, which is quadratic; 64 attributes are more than any element of this format has.
+        for attribute in element.attributes().with_checks(false).take(64) {
+            let attribute = attribute.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            let value = quick_xml::escape::unescape(&attribute.value);
+            let value = value.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+        }
+        Ok(found)
+    }
+
+    fn open(&mut self, element: &BytesStart<'_>, at: usize) -> Result<()> {
+        let parent = self.stack.last().map(String::as_str);
+        match (element.name().as_ref(), parent) {
+            ("VTKFile", None) => {
+                let attributes = self.attributes(element, at)?;
+                let kind = get(&attributes, "type").unwrap_or("");
+                if kind != "UnstructuredGrid" {
+                    let hint = if kind.starts_with('P') { "; open the pieces it lists, or let ParaView save it as one file" } else { "" };
+                    let message = format!("a VTK XML file of type `{}`, not UnstructuredGrid{hint}", printable(kind.as_bytes()));
+                    return Err(self.source.error_line(at, message));
+                }
+                let codec = Codec::new(|name| get(&attributes, name)).map_err(|message| self.source.error_line(at, message))?;
+                let version = get(&attributes, "version").unwrap_or("without a version");
+                let format = format!("VTK XML unstructured grid {}{}", printable(version.as_bytes()), codec.describe());
+                self.codec = Some((codec, format));
+            }
+            (name, None) => {
+                let message = format!("an XML or HTML document <{}>, not a VTK file", printable(name.as_bytes()));
+                return Err(self.source.error_line(at, message));
+            }
+            ("Piece", _) => {
+                let attributes = self.attributes(element, at)?;
+                let number = |name: &str| {
+                    let text = get(&attributes, name).unwrap_or("");
+                    let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", printable(text.as_bytes())));
+                    text.trim().parse::<u64>().map_err(|_| wrong())
+                };
+                let piece = Piece { at, points: number("NumberOfPoints")?, cells: number("NumberOfCells")?, ..Piece::default() };
+                self.pieces.push(piece);
+            }
+            ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
+                let group = group.to_owned();
+                let array = self.array(&self.attributes(element, at)?, at)?;
+                if let Some(piece) = self.pieces.last_mut() {
+                    match group.as_str() {
+                        "PointData" => piece.point_data.push(array),
+                        "CellData" => piece.cell_data.push(array),
+                        "Points" => piece.positions = Some(array),
+                        _ => piece.topology.push(array),
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn array(&self, attributes: &[(String, String)], at: usize) -> Result<StoredArray> {
+        let name = get(attributes, "Name").unwrap_or("unnamed").to_owned();
+        let fail = |message: String| self.source.error_line(at, format!("array `{}`: {message}", printable(name.as_bytes())));
+        let kind = get(attributes, "type").unwrap_or("");
+        let scalar = match kind {
+            "String" | "Bit" => None,
+            _ => Some(Scalar::vtk_xml(kind).ok_or_else(|| fail(format!("unknown type `{}`", printable(kind.as_bytes()))))?),
+        };
+        let components = match get(attributes, "NumberOfComponents") {
+            None => 1,
+            Some(text) => {
+                let n = text.trim().parse::<u64>().ok().filter(|&n| u32::try_from(n).is_ok());
+                n.ok_or_else(|| fail(format!("NumberOfComponents=\"{}\"", printable(text.as_bytes()))))?
+            }
+        };
+        let place = match get(attributes, "format").unwrap_or("ascii") {
+            "ascii" => Place::Ascii(Vec::new()),
+            "binary" => Place::Inline(Vec::new()),
+            "appended" => {
+                let text = get(attributes, "offset").unwrap_or("");
+                let offset = text.trim().parse::<u64>();
+                Place::Appended(offset.map_err(|_| fail(format!("offset=\"{}\" is not a number", printable(text.as_bytes()))))?)
+            }
+            other => return Err(fail(format!("unknown format `{}`", printable(other.as_bytes())))),
+        };
+        Ok(StoredArray { name, scalar, components, place, at })
+    }
+
+    /// Text belongs to the array whose element is innermost.
+    fn text(&mut self, range: Range<usize>) {
+        let [.., group, last] = self.stack.as_slice() else { return };
+        if last != "DataArray" {
+            return;
+        }
+        let Some(piece) = self.pieces.last_mut() else { return };
+        let array = match group.as_str() {
+            "PointData" => piece.point_data.last_mut(),
+            "CellData" => piece.cell_data.last_mut(),
+            "Points" => piece.positions.as_mut(),
+            "Cells" => piece.topology.last_mut(),
+            _ => None,
+        };
+        if let Some(StoredArray { place: Place::Ascii(parts) | Place::Inline(parts), .. }) = array {
+            parts.push(range);
+        }
+    }
+}
+
+fn get<'s>(attributes: &'s [(String, String)], name: &str) -> Option<&'s str> {
+    attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+}
+
+fn read_piece(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize) -> Result<()> {
+    let fail = |message: &str| source.error_line(piece.at, format!("piece {index}: {message}"));
+    let n_points = piece.points;
+    let offset = assembly.points.len();
+    if n_points > 0 {
+        let positions = piece.positions.as_ref().ok_or_else(|| fail("no <Points>"))?;
+        if positions.components != 3 {
+            return Err(fail("the points must have 3 components"));
+        }
+        let values: Vec<f64> = codec.floats(source, positions, n_points)?;
+        assembly.points.extend(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
+    }
+    let first_cell = assembly.cells();
+    read_cells(source, codec, assembly, piece, index, offset)?;
+    let tuples = [(On::Points, &piece.point_data, n_points), (On::Cells, &piece.cell_data, piece.cells)];
+    for (on, arrays, count) in tuples {
+        let before = if on == On::Points { offset } else { first_cell };
+        for array in arrays {
+            if array.scalar.is_none() {
+                assembly.warnings.push(format!("array `{}` holds text and is left out", printable(array.name.as_bytes())));
+            } else if array.components == 0 || array.components > 9 {
+                let message = format!("array `{}` has {} components and is left out", printable(array.name.as_bytes()), array.components);
+                assembly.warnings.push(message);
+            } else {
+                let values: Vec<f32> = codec.floats(source, array, count)?;
+                append(assembly, array, on, before, &values);
+            }
+        }
+    }
+    assembly.complete_arrays();
+    Ok(())
+}
+
+/// Appends one piece's values to the array of that name; `before` values per component belong to earlier pieces.
+fn append(assembly: &mut Assembly<'_>, stored: &StoredArray, on: On, before: usize, values: &[f32]) {
+    let components = stored.components as usize;
+    let same = |a: &&mut Array| a.on == on && a.name == stored.name && a.components == components && a.values.len() == before * components;
+    if let Some(array) = assembly.arrays.iter_mut().find(same) {
+        array.values.extend_from_slice(values);
+    } else {
+        let mut all = vec![f32::NAN; before * components];
+        all.extend_from_slice(values);
+        assembly.arrays.push(Array { name: stored.name.clone(), on, components, values: all });
+    }
+}
+
+fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize, offset: usize) -> Result<()> {
+    if piece.cells == 0 {
+        return Ok(());
+    }
+    let find = |name: &str| {
+        let found = piece.topology.iter().find(|a| a.name == name);
+        found.ok_or_else(|| source.error_line(piece.at, format!("piece {index}: no array `{name}` in <Cells>")))
+    };
+    let types = codec.integers(source, find("types")?, Some(piece.cells))?;
+    let offsets = codec.integers(source, find("offsets")?, Some(piece.cells))?;
+    let mut previous = 0;
+    for (cell, &end) in offsets.iter().enumerate() {
+        if end < previous {
+            return Err(
+                source.error_in("array `offsets`", format!("cell {cell} of piece {index} would end at {end}, but begins at {previous}"))
+            );
+        }
+        previous = end;
+    }
+    let connectivity = codec.integers(source, find("connectivity")?, None)?;
+    if previous != connectivity.len() as i64 {
+        let message = format!("the last cell of piece {index} ends at {previous}, but `connectivity` has {} values", connectivity.len());
+        return Err(source.error_in("array `offsets`", message));
+    }
+    let ghosts = piece.cell_data.iter().find(|a| a.name == "vtkGhostType" && a.components == 1);
+    let ghosts = ghosts.map(|a| codec.integers(source, a, Some(piece.cells))).transpose()?;
+    assembly.reserve(types.len());
+    let mut start = 0;
+    let mut kind: Option<(i64, CellType)> = None;
+    for (cell, (&number, &end)) in types.iter().zip(&offsets).enumerate() {
+        let end = end as usize;
+        let nodes = &connectivity[start..end];
+        start = end;
+        if kind.is_none_or(|(n, _)| n != number) {
+            let found = cells::vtk(number);
+            kind = Some((
+                number,
+                found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
+            ));
+        }
+        if ghosts.as_ref().is_some_and(|g| g[cell] & 1 != 0) {
+            assembly.skip("ghost cell", Fate::Ghost);
+        } else if let Some((_, kind)) = kind {
+            assembly.push(kind, nodes, offset)?;
+        }
+    }
+    Ok(())
+}

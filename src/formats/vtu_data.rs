@@ -1,0 +1,308 @@
+//! Arrays of VTK XML files: text, base64 and raw bytes, compressed or not.
+//!
+//! Every size is checked against the bytes that are there, and against what the number of points and cells asks for, before
+//! anything of that size is allocated.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use base64::Engine as _;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use rayon::prelude::*;
+
+use super::scalar::{Number, Scalar};
+use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::unpack::Compressor;
+use crate::error::{Error, Result};
+
+/// An array as the XML describes it.
+pub(crate) struct StoredArray {
+    pub name: String,
+    /// `None`: text or bits.
+    pub scalar: Option<Scalar>,
+    pub components: u64,
+    pub place: Place,
+    /// Where its element begins.
+    pub at: usize,
+}
+
+/// Where the values are.
+pub(crate) enum Place {
+    /// Numbers in these ranges of the file.
+    Ascii(Vec<Range<usize>>),
+    /// Base64 in these ranges of the file.
+    Inline(Vec<Range<usize>>),
+    /// At this offset of the appended data.
+    Appended(u64),
+}
+
+/// The appended data.
+pub(crate) struct Appended {
+    pub base64: bool,
+    pub range: Range<usize>,
+}
+
+/// How a file stores binary arrays.
+pub(crate) struct Codec {
+    big_endian: bool,
+    /// Bytes of a number in the headers of arrays: 4 or 8.
+    word: usize,
+    compressor: Option<Compressor>,
+    pub appended: Option<Appended>,
+    /// Bytes that may still be unpacked.
+    budget: u64,
+    expansion: u64,
+}
+
+/// The encoded bytes of an array.
+enum Stream<'a> {
+    Raw(&'a [u8]),
+    Base64(Vec<&'a [u8]>),
+}
+
+impl Codec {
+    /// From the attributes of the root element.
+    pub fn new<'s>(get: impl Fn(&str) -> Option<&'s str>) -> Result<Self, String> {
+        let quote = |s: &str| printable(s.as_bytes());
+        let big_endian = match get("byte_order") {
+            None | Some("LittleEndian") => false,
+            Some("BigEndian") => true,
+            Some(other) => return Err(format!("unknown byte_order `{}`", quote(other))),
+        };
+        let word = match get("header_type") {
+            None | Some("UInt32") => 4,
+            Some("UInt64") => 8,
+            Some(other) => return Err(format!("unknown header_type `{}`", quote(other))),
+        };
+        let compressor = match get("compressor") {
+            None | Some("") => None,
+            Some("vtkZLibDataCompressor") => Some(Compressor::Zlib),
+            Some("vtkLZ4DataCompressor") => Some(Compressor::Lz4),
+            Some("vtkLZMADataCompressor") => Some(Compressor::Xz),
+            Some(other) => return Err(format!("unknown compressor `{}`; save the file with zlib or uncompressed", quote(other))),
+        };
+        Ok(Self { big_endian, word, compressor, appended: None, budget: 0, expansion: 0 })
+    }
+
+    /// Limits what may be unpacked from a file of `bytes` bytes.
+    pub fn set_budget(&mut self, bytes: usize, expansion: u64) {
+        self.expansion = expansion;
+        self.budget = (64 << 20) + expansion.saturating_mul(bytes as u64);
+    }
+
+    /// Byte order and compressor in words.
+    pub fn describe(&self) -> String {
+        let order = if self.big_endian { ", big-endian" } else { "" };
+        self.compressor.map_or(order.to_owned(), |c| format!("{order}, {}", c.name()))
+    }
+
+    /// All values of an array of `tuples` tuples.
+    pub fn floats<T: Number + Send>(&mut self, source: &Source, array: &StoredArray, tuples: u64) -> Result<Vec<T>> {
+        let count = tuples.checked_mul(array.components).filter(|&n| n < 1 << 60);
+        let count = count.ok_or_else(|| place(source, array, &format!("{tuples} × {} values", array.components)))?;
+        self.values(source, array, Some(count))
+    }
+
+    /// All values of an array of indices; `count` of them if it is given.
+    pub fn integers(&mut self, source: &Source, array: &StoredArray, count: Option<u64>) -> Result<Vec<i64>> {
+        if array.scalar.is_none_or(Scalar::is_float) {
+            return Err(place(source, array, "its type must be an integer type"));
+        }
+        if array.components != 1 {
+            return Err(place(source, array, &format!("it must have 1 component, not {}", array.components)));
+        }
+        self.values(source, array, count)
+    }
+
+    fn values<T: Number>(&mut self, source: &Source, array: &StoredArray, count: Option<u64>) -> Result<Vec<T>> {
+        let scalar = array.scalar.ok_or_else(|| place(source, array, "it holds text"))?;
+        if let Place::Ascii(parts) = &array.place {
+            return ascii(source, array, scalar, parts, count);
+        }
+        if count == Some(0) {
+            return Ok(Vec::new());
+        }
+        let stream = self.stream(source, array)?;
+        let bytes = match self.compressor {
+            None => self.plain(&stream, scalar, count),
+            Some(compressor) => self.unpack(&stream, compressor, scalar, count),
+        };
+        let bytes = bytes.map_err(|message| place(source, array, &message))?;
+        Ok(scalar.convert(&bytes, self.big_endian))
+    }
+
+    fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
+        match &array.place {
+            Place::Ascii(parts) | Place::Inline(parts) => Ok(Stream::Base64(parts.iter().map(|r| &source.bytes[r.clone()]).collect())),
+            Place::Appended(offset) => {
+                let appended = self.appended.as_ref().ok_or_else(|| place(source, array, "the file has no appended data"))?;
+                let start = usize::try_from(*offset).ok().and_then(|o| appended.range.start.checked_add(o));
+                let start = start.filter(|&s| s < appended.range.end);
+                let start = start.ok_or_else(|| place(source, array, &format!("offset {offset} lies beyond the end of the file")))?;
+                let bytes = &source.bytes[start..appended.range.end];
+                Ok(if appended.base64 { Stream::Base64(vec![bytes]) } else { Stream::Raw(bytes) })
+            }
+        }
+    }
+
+    /// A number of an array's header.
+    fn header(&self, bytes: &[u8], i: usize) -> u64 {
+        let word = bytes.get(i * self.word..(i + 1) * self.word).unwrap_or_default();
+        let mut wide = [0; 8];
+        if self.big_endian {
+            wide[8 - word.len()..].copy_from_slice(word);
+            u64::from_be_bytes(wide)
+        } else {
+            wide[..word.len()].copy_from_slice(word);
+            u64::from_le_bytes(wide)
+        }
+    }
+
+    fn plain<'a>(&self, stream: &Stream<'a>, scalar: Scalar, count: Option<u64>) -> Result<Cow<'a, [u8]>, String> {
+        let size = self.header(&stream.prefix(self.word as u64)?, 0);
+        check_size(size, scalar, count)?;
+        let all = size.checked_add(self.word as u64).ok_or("its size overflows")?;
+        Ok(match stream.prefix(all)? {
+            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[self.word..]),
+            Cow::Owned(mut bytes) => {
+                bytes.drain(..self.word);
+                Cow::Owned(bytes)
+            }
+        })
+    }
+
+    fn unpack(
+        &mut self,
+        stream: &Stream<'_>,
+        compressor: Compressor,
+        scalar: Scalar,
+        count: Option<u64>,
+    ) -> Result<Cow<'static, [u8]>, String> {
+        let word = self.word as u64;
+        let start = stream.prefix(3 * word)?;
+        let [blocks, block, last] = [0, 1, 2].map(|i| self.header(&start, i));
+        if blocks == 0 {
+            check_size(0, scalar, count)?;
+            return Ok(Cow::Borrowed(&[]));
+        }
+        if block == 0 || last > block {
+            return Err(format!("{blocks} compressed blocks of {block} bytes with a last one of {last}"));
+        }
+        let final_block = if last == 0 { block } else { last };
+        let size = (blocks - 1).checked_mul(block).and_then(|n| n.checked_add(final_block)).ok_or("its size overflows")?;
+        check_size(size, scalar, count)?;
+        let limit = format!("more than {} times the size of the file; save it without compression", self.expansion);
+        self.budget = self.budget.checked_sub(size).ok_or_else(|| format!("it would unpack to {size} bytes, {limit}"))?;
+        let header = blocks.checked_add(3).and_then(|n| n.checked_mul(word)).ok_or("its number of blocks overflows")?;
+        let sizes = stream.prefix(header)?;
+        let mut end = header;
+        let mut ranges = Vec::with_capacity(blocks as usize);
+        for i in 0..blocks as usize {
+            let begin = end;
+            end = end.checked_add(self.header(&sizes, i + 3)).ok_or("the sizes of its blocks overflow")?;
+            ranges.push(begin as usize..end as usize);
+        }
+        let packed = stream.prefix(end)?;
+        let mut bytes = vec![0; size as usize];
+        let parts: Vec<_> = bytes.chunks_mut(usize::try_from(block).unwrap_or(usize::MAX)).zip(ranges).enumerate().collect();
+        parts.into_par_iter().try_for_each(|(i, (out, range))| {
+            let result = compressor.unpack(&packed[range], out);
+            result.map_err(|why| format!("block {i} of {blocks} ({}): {why}", compressor.name()))
+        })?;
+        Ok(Cow::Owned(bytes))
+    }
+}
+
+/// An error about an array.
+fn place(source: &Source, array: &StoredArray, message: &str) -> Error {
+    let place = format!("array `{}` (line {})", printable(array.name.as_bytes()), source.line(array.at));
+    source.error_in(place, message)
+}
+
+fn check_size(size: u64, scalar: Scalar, count: Option<u64>) -> Result<(), String> {
+    let each = scalar.size() as u64;
+    if let Some(count) = count {
+        let wanted = count.checked_mul(each).ok_or("its size overflows")?;
+        if size != wanted {
+            return Err(format!("it has {size} bytes where {count} values of {each} bytes need {wanted}"));
+        }
+    }
+    if size.is_multiple_of(each) { Ok(()) } else { Err(format!("{size} bytes are no whole number of values of {each} bytes")) }
+}
+
+fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts: &[Range<usize>], count: Option<u64>) -> Result<Vec<T>> {
+    let length: usize = parts.iter().map(|part| part.len() / 2 + 1).sum();
+    if count.is_some_and(|n| n > length as u64) {
+        let wanted = count.unwrap_or(0);
+        return Err(place(source, array, &format!("{wanted} values are announced, but its text has room for {length} at most")));
+    }
+    let mut values = Vec::with_capacity(count.unwrap_or(0) as usize);
+    for part in parts {
+        let mut tokens = Tokens::new(source, part.clone(), None);
+        while let Some((token, at)) = tokens.next_token() {
+            let value = if scalar.is_float() {
+                parse_float(token).map(T::from_f64)
+            } else {
+                let wide = || std::str::from_utf8(token).ok()?.parse().ok().map(T::from_u64);
+                parse_integer(token).map(T::from_i64).or_else(wide)
+            };
+            let name = printable(array.name.as_bytes());
+            values.push(value.ok_or_else(|| {
+                let kind = if scalar.is_float() { "number" } else { "whole number" };
+                source.error_line(at, format!("array `{name}`: `{}` is not a {kind}", printable(token)))
+            })?);
+        }
+    }
+    match count {
+        Some(n) if n != values.len() as u64 => Err(place(source, array, &format!("it has {} values instead of {n}", values.len()))),
+        _ => Ok(values),
+    }
+}
+
+impl<'a> Stream<'a> {
+    /// The first `n` bytes.
+    fn prefix(&self, n: u64) -> Result<Cow<'a, [u8]>, String> {
+        let room = match self {
+            Stream::Raw(bytes) => bytes.len(),
+            Stream::Base64(parts) => parts.iter().map(|p| p.len()).sum::<usize>() / 4 * 3 + 3,
+        };
+        let n = usize::try_from(n).ok().filter(|&n| n <= room);
+        let n = n.ok_or_else(|| format!("it is longer than the {room} bytes that are left of the file"))?;
+        match self {
+            Stream::Raw(bytes) => Ok(Cow::Borrowed(&bytes[..n])),
+            Stream::Base64(parts) => decode_base64(parts, n).map(Cow::Owned),
+        }
+    }
+}
+
+/// Decodes the first `n` bytes. The header and the data of an array may be encoded one by one, with padding between them.
+fn decode_base64(parts: &[&[u8]], n: usize) -> Result<Vec<u8>, String> {
+    const CONFIG: GeneralPurposeConfig =
+        GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true);
+    const ENGINE: GeneralPurpose = GeneralPurpose::new(&base64::alphabet::STANDARD, CONFIG);
+    fn flush(out: &mut Vec<u8>, text: &mut Vec<u8>) -> Result<(), String> {
+        ENGINE.decode_vec(&*text, out).map_err(|e| format!("bad base64 after {} bytes: {e}", out.len()))?;
+        text.clear();
+        Ok(())
+    }
+    let mut out = Vec::with_capacity(n + 3072);
+    let mut text = Vec::with_capacity(4096);
+    let mut padded = false;
+    for &b in parts.iter().copied().flatten().filter(|b| !b.is_ascii_whitespace()) {
+        text.push(b);
+        padded |= b == b'=';
+        if text.len() % 4 == 0 && (padded || text.len() == 4096 || out.len() + text.len() / 4 * 3 >= n) {
+            flush(&mut out, &mut text)?;
+            padded = false;
+            if out.len() >= n {
+                break;
+            }
+        }
+    }
+    flush(&mut out, &mut text)?;
+    if out.len() < n {
+        return Err(format!("its base64 data end after {} of {n} bytes", out.len()));
+    }
+    out.truncate(n);
+    Ok(out)
+}

@@ -1,0 +1,234 @@
+//! Result files. Every one is written beside its target and renamed when it is complete, so that a reader never sees half a file
+//! and a failure leaves the old one in place.
+
+mod image;
+mod located;
+mod slices;
+mod voxels;
+mod vtu;
+
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use tempfile::NamedTempFile;
+
+use super::detect::ending;
+use super::npy;
+use crate::error::{Error, Result};
+pub use image::write_png;
+pub use located::{Located, write_located};
+pub use slices::{SliceGrid, SliceWriter};
+pub use voxels::{Channel, VoxelPackage, VoxelWriter};
+pub use vtu::write_mesh;
+
+/// A format of results, by the ending of the path.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OutputFormat {
+    /// A NumPy array.
+    Npy,
+    /// A zip archive of NumPy arrays.
+    Npz,
+    /// Comma-separated text.
+    Csv,
+    /// A VTK XML unstructured grid.
+    Vtu,
+    /// A VTK XML image.
+    Vti,
+    /// A picture.
+    Png,
+    /// A package of voxels for printers.
+    Svx,
+    /// JSON.
+    Json,
+}
+
+impl OutputFormat {
+    const ALL: [(Self, &str); 8] = [
+        (Self::Npy, "npy"),
+        (Self::Npz, "npz"),
+        (Self::Csv, "csv"),
+        (Self::Vtu, "vtu"),
+        (Self::Vti, "vti"),
+        (Self::Png, "png"),
+        (Self::Svx, "svx"),
+        (Self::Json, "json"),
+    ];
+
+    /// The format of `path`, which must be one of `allowed`. Ask before long work.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] that lists the endings that are allowed.
+    pub fn of(path: impl AsRef<Path>, allowed: &[Self]) -> Result<Self> {
+        let path = path.as_ref();
+        let ending = ending(path);
+        let found = Self::ALL.iter().find(|(format, name)| *name == ending && allowed.contains(format));
+        found.map(|f| f.0).ok_or_else(|| {
+            let names: Vec<String> = Self::ALL.iter().filter(|f| allowed.contains(&f.0)).map(|f| format!(".{}", f.1)).collect();
+            Error::Invalid(format!("{}: the ending of the output must be one of {}", path.display(), names.join(", ")))
+        })
+    }
+}
+
+/// A file that takes its place when it is complete; dropped before that, nothing is left of it.
+pub struct OutputFile {
+    target: PathBuf,
+    file: Target,
+}
+
+enum Target {
+    Temporary(BufWriter<NamedTempFile>),
+    /// Devices and pipes cannot be renamed to.
+    Direct(BufWriter<File>),
+}
+
+impl OutputFile {
+    /// Begins a file that will be at `path`.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the folder cannot be written to.
+    pub fn create(path: impl AsRef<Path>) -> Result<Self> {
+        let path = path.as_ref();
+        let fail = |source| Error::Io { path: path.into(), source };
+        // A link stays a link; what it points to is replaced.
+        let target = path.canonicalize().unwrap_or_else(|_| path.into());
+        if let Ok(meta) = std::fs::metadata(&target)
+            && !meta.is_file()
+        {
+            let file = File::options().write(true).open(&target).map_err(fail)?;
+            return Ok(Self { target, file: Target::Direct(BufWriter::new(file)) });
+        }
+        let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
+        let prefix = format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy());
+        let mut builder = tempfile::Builder::new();
+        builder.prefix(&prefix).suffix(".part");
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::PermissionsExt as _;
+            builder.permissions(std::fs::Permissions::from_mode(0o666));
+        }
+        let file = builder.tempfile_in(folder).map_err(fail)?;
+        Ok(Self { target, file: Target::Temporary(BufWriter::with_capacity(1 << 18, file)) })
+    }
+
+    /// Completes the file and moves it to its place.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if the rest cannot be written.
+    pub fn commit(self) -> Result<()> {
+        let path = self.target.clone();
+        let fail = |source| Error::Io { path: path.clone(), source };
+        match self.file {
+            Target::Direct(mut file) => file.flush().map_err(fail),
+            Target::Temporary(file) => {
+                let file = file.into_inner().map_err(|e| fail(e.into_error()))?;
+                file.persist(&self.target).map(drop).map_err(|e| fail(e.error))
+            }
+        }
+    }
+
+    /// Names the file in an error.
+    pub(crate) fn fail(&self, source: std::io::Error) -> Error {
+        Error::Io { path: self.target.clone(), source }
+    }
+}
+
+impl Write for OutputFile {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        match &mut self.file {
+            Target::Temporary(file) => file.write(bytes),
+            Target::Direct(file) => file.write(bytes),
+        }
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        match &mut self.file {
+            Target::Temporary(file) => file.flush(),
+            Target::Direct(file) => file.flush(),
+        }
+    }
+}
+
+impl Seek for OutputFile {
+    fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
+        match &mut self.file {
+            Target::Temporary(file) => file.seek(to),
+            Target::Direct(file) => file.seek(to),
+        }
+    }
+}
+
+/// A file made by `write` in one go.
+pub(crate) fn write_file(path: &Path, write: impl FnOnce(&mut OutputFile) -> std::io::Result<()>) -> Result<()> {
+    let mut file = OutputFile::create(path)?;
+    write(&mut file).map_err(|error| file.fail(error))?;
+    file.commit()
+}
+
+/// Writes anything as JSON.
+///
+/// # Errors
+/// [`Error::Io`] if it cannot be written.
+pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<()> {
+    write_file(path.as_ref(), |file| {
+        serde_json::to_writer(&mut *file, value)?;
+        writeln!(file)
+    })
+}
+
+/// A number that a NumPy array can hold.
+pub trait NpyNumber: bytemuck::Pod {
+    /// Type name of NumPy.
+    const DESCR: &'static str;
+}
+
+impl NpyNumber for f32 {
+    const DESCR: &'static str = if cfg!(target_endian = "little") { "'<f4'" } else { "'>f4'" };
+}
+
+impl NpyNumber for f64 {
+    const DESCR: &'static str = if cfg!(target_endian = "little") { "'<f8'" } else { "'>f8'" };
+}
+
+impl NpyNumber for u32 {
+    const DESCR: &'static str = if cfg!(target_endian = "little") { "'<u4'" } else { "'>u4'" };
+}
+
+impl NpyNumber for u8 {
+    const DESCR: &'static str = "'|u1'";
+}
+
+/// Writes an array of that shape, last index fastest.
+///
+/// # Errors
+/// [`Error::Invalid`] if the shape does not fit the data, [`Error::Io`] if they cannot be written.
+pub fn write_npy<T: NpyNumber>(path: impl AsRef<Path>, shape: &[usize], data: &[T]) -> Result<()> {
+    let path = path.as_ref();
+    if shape.iter().product::<usize>() != data.len() {
+        return Err(Error::Invalid(format!("{}: {} values for an array of shape {shape:?}", path.display(), data.len())));
+    }
+    write_file(path, |file| {
+        file.write_all(&npy::header(T::DESCR, shape))?;
+        file.write_all(bytemuck::cast_slice(data))
+    })
+}
+
+/// Text as the value of an XML attribute; what XML cannot hold becomes U+FFFD.
+pub(crate) fn xml_attribute(text: &str) -> String {
+    let mut out = String::with_capacity(text.len());
+    for c in text.chars() {
+        match c {
+            '&' => out.push_str("&amp;"),
+            '<' => out.push_str("&lt;"),
+            '>' => out.push_str("&gt;"),
+            '"' => out.push_str("&quot;"),
+            '\n' => out.push_str("&#10;"),
+            '\r' => out.push_str("&#13;"),
+            '\t' => out.push_str("&#9;"),
+            '\0'..='\u{1f}' | '\u{fffe}' | '\u{ffff}' => out.push('\u{fffd}'),
+            c => out.push(c),
+        }
+    }
+    out
+}

@@ -1,0 +1,145 @@
+//! VTK XML unstructured grids: appended raw data, zlib.
+
+use std::fmt::Write as _;
+use std::io::Write;
+use std::path::Path;
+
+use flate2::{Compression, write::ZlibEncoder};
+use rayon::prelude::*;
+
+use super::{OutputFile, write_file, xml_attribute};
+use crate::error::Result;
+use crate::mesh::{Mesh, On};
+
+/// Numbers of an array.
+#[derive(Clone, Copy)]
+pub(crate) enum Block<'a> {
+    F32(&'a [f32]),
+    F64(&'a [f64]),
+    U32(&'a [u32]),
+    U8(&'a [u8]),
+}
+
+impl<'a> Block<'a> {
+    pub fn bytes(self) -> &'a [u8] {
+        match self {
+            Block::F32(v) => bytemuck::cast_slice(v),
+            Block::F64(v) => bytemuck::cast_slice(v),
+            Block::U32(v) => bytemuck::cast_slice(v),
+            Block::U8(v) => v,
+        }
+    }
+
+    pub const fn kind(self) -> &'static str {
+        match self {
+            Block::F32(_) => "Float32",
+            Block::F64(_) => "Float64",
+            Block::U32(_) => "UInt32",
+            Block::U8(_) => "UInt8",
+        }
+    }
+}
+
+/// A named array.
+#[derive(Clone, Copy)]
+pub(crate) struct Column<'a> {
+    pub name: &'a str,
+    pub components: usize,
+    pub block: Block<'a>,
+}
+
+/// A grid in the arrays of the format.
+pub(crate) struct Grid<'a> {
+    pub points: Column<'a>,
+    pub connectivity: &'a [u32],
+    pub ends: &'a [u32],
+    pub types: &'a [u8],
+    pub point_data: &'a [Column<'a>],
+    pub cell_data: &'a [Column<'a>],
+}
+
+/// Byte order of this machine, which is that of the data written.
+pub(crate) const BYTE_ORDER: &str = if cfg!(target_endian = "little") { "LittleEndian" } else { "BigEndian" };
+
+/// Uncompressed size of a block: enough for compression, small enough to share among threads.
+const BLOCK: usize = 1 << 18;
+
+impl Grid<'_> {
+    pub fn write(&self, file: &mut OutputFile) -> std::io::Result<()> {
+        let mut xml = String::new();
+        let mut data = Vec::new();
+        let n_points = self.points.block.bytes().len() / if matches!(self.points.block, Block::F32(_)) { 12 } else { 24 };
+        let open = format!(
+            "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"{BYTE_ORDER}\" header_type=\"UInt64\" compressor=\"vtkZLibDataCompressor\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"{n_points}\" NumberOfCells=\"{}\">\n",
+            self.types.len()
+        );
+        xml.push_str(&open);
+        let cells = [("connectivity", Block::U32(self.connectivity)), ("offsets", Block::U32(self.ends)), ("types", Block::U8(self.types))];
+        let cells = cells.map(|(name, block)| Column { name, components: 1, block });
+        let groups = [("PointData", self.point_data), ("CellData", self.cell_data), ("Points", &[self.points]), ("Cells", &cells)];
+        for (group, columns) in groups {
+            let _ = writeln!(xml, "<{group}>");
+            for column in columns {
+                let (kind, name, components) = (column.block.kind(), xml_attribute(column.name), column.components);
+                let offset = data.len();
+                let _ = writeln!(
+                    xml,
+                    "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{components}\" format=\"appended\" offset=\"{offset}\"/>"
+                );
+                pack(column.block.bytes(), &mut data)?;
+            }
+            let _ = writeln!(xml, "</{group}>");
+        }
+        xml.push_str("</Piece>\n</UnstructuredGrid>\n<AppendedData encoding=\"raw\">\n_");
+        file.write_all(xml.as_bytes())?;
+        file.write_all(&data)?;
+        file.write_all(b"\n</AppendedData>\n</VTKFile>\n")
+    }
+}
+
+/// Appends compressed blocks with their header.
+fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
+    let blocks: Vec<Vec<u8>> = bytes
+        .par_chunks(BLOCK)
+        .map(|block| {
+            let mut encoder = ZlibEncoder::new(Vec::new(), Compression::fast());
+            encoder.write_all(block)?;
+            encoder.finish()
+        })
+        .collect::<std::io::Result<_>>()?;
+    let last = bytes.len() % BLOCK;
+    let header = [blocks.len(), BLOCK, last].into_iter().chain(blocks.iter().map(Vec::len));
+    data.extend(header.flat_map(|n| (n as u64).to_ne_bytes()));
+    data.extend(blocks.into_iter().flatten());
+    Ok(())
+}
+
+/// Writes a mesh with its fields as `.vtu`. The ids of cells that were split become the array `cell_id`.
+///
+/// # Errors
+/// [`crate::Error::Io`] if it cannot be written.
+pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
+    let moved: Option<Vec<[f64; 3]>> =
+        (mesh.origin != [0.0; 3]).then(|| mesh.points.iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + mesh.origin[c])).collect());
+    let block = moved.as_ref().map_or(Block::F32(mesh.points.as_flattened()), |points| Block::F64(points.as_flattened()));
+    let points = Column { name: "Points", components: 3, block };
+    let ends: Vec<u32> = (1..=mesh.tets.len() as u32).map(|i| 4 * i).collect();
+    let types = vec![10; mesh.tets.len()];
+    let columns = |on: On| -> Vec<Column<'_>> {
+        let fields = mesh.fields.iter().filter(|f| f.on == on);
+        fields.map(|f| Column { name: &f.name, components: 1, block: Block::F32(&f.values) }).collect()
+    };
+    let mut cell_data = columns(On::Cells);
+    if let Some(ids) = &mesh.cell_ids {
+        cell_data.push(Column { name: "cell_id", components: 1, block: Block::U32(ids) });
+    }
+    let grid = Grid {
+        points,
+        connectivity: mesh.tets.as_flattened(),
+        ends: &ends,
+        types: &types,
+        point_data: &columns(On::Points),
+        cell_data: &cell_data,
+    };
+    write_file(path.as_ref(), |file| grid.write(file))
+}

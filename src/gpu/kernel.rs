@@ -1,0 +1,119 @@
+//! What is known of a kernel at build time, and its pipelines.
+
+use super::context::{Binding, Gpu};
+use super::memory::BufferRef;
+use super::{debug, failed};
+use crate::error::Result;
+use ash::vk;
+
+/// How a kernel uses a buffer, from its declaration.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Access {
+    Read,
+    Write,
+    ReadWrite,
+}
+
+#[derive(Debug)]
+pub(crate) struct BufferInfo {
+    pub name: &'static str,
+    pub access: Access,
+}
+
+/// A kernel as `build.rs` reflected it.
+#[derive(Debug)]
+pub(crate) struct KernelInfo {
+    pub name: &'static str,
+    pub address: &'static [u8],
+    pub descriptor: &'static [u8],
+    pub buffers: &'static [BufferInfo],
+    pub scalar_bytes: usize,
+}
+
+/// Specialization constants as (id, value).
+pub(crate) trait Specialization: Copy + Default {
+    fn values(&self) -> Vec<(u32, u32)>;
+}
+
+/// The arguments of a kernel; implemented by generated code.
+pub(crate) trait Kernel {
+    type Spec: Specialization;
+    const INFO: &'static KernelInfo;
+    fn buffers(&self) -> Vec<BufferRef>;
+    /// Writes the scalars into the push-constant bytes, which begin at `base`.
+    fn scalars(&self, base: usize, out: &mut [u8]);
+}
+
+/// A pipeline with its layouts.
+#[derive(Clone, Copy)]
+pub(crate) struct Pipeline {
+    pub handle: vk::Pipeline,
+    pub layout: vk::PipelineLayout,
+    pub set_layout: vk::DescriptorSetLayout,
+}
+
+impl KernelInfo {
+    /// Bytes of push constants before the scalars.
+    pub(crate) fn scalar_base(&self, binding: Binding) -> usize {
+        if binding == Binding::Address { 8 * self.buffers.len() } else { 0 }
+    }
+}
+
+/// Compiles a kernel for a device.
+pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
+    let device = gpu.device();
+    let binding = gpu.binding();
+    let code = if binding == Binding::Address { info.address } else { info.descriptor };
+    let words: Vec<u32> = code.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let bindings: Vec<_> = (0..info.buffers.len() as u32)
+        .map(|i| {
+            let b = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);
+            b.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::COMPUTE)
+        })
+        .collect();
+    let push_bytes = (info.scalar_base(binding) + info.scalar_bytes) as u32;
+    let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_bytes)];
+    let entries: Vec<_> = constants
+        .iter()
+        .enumerate()
+        .map(|(i, (id, _))| vk::SpecializationMapEntry { constant_id: *id, offset: 4 * i as u32, size: 4 })
+        .collect();
+    let values: Vec<u8> = constants.iter().flat_map(|(_, v)| v.to_le_bytes()).collect();
+    let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
+    // SAFETY: all structs outlive the calls; objects belong to this device; a partial failure leaks at most one layout, which the
+    // device frees.
+    unsafe {
+        let set_layout = if binding == Binding::Descriptors {
+            let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
+            device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?
+        } else {
+            vk::DescriptorSetLayout::null()
+        };
+        let sets = [set_layout];
+        let mut layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
+        if binding == Binding::Descriptors {
+            layout_info = layout_info.set_layouts(&sets);
+        }
+        let layout = device.create_pipeline_layout(&layout_info, None).map_err(failed("vkCreatePipelineLayout"))?;
+        let module = device
+            .create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None)
+            .map_err(failed("vkCreateShaderModule"))?;
+        let mut stage = vk::PipelineShaderStageCreateInfo::default()
+            .stage(vk::ShaderStageFlags::COMPUTE)
+            .module(module)
+            .name(c"main")
+            .specialization_info(&specialization);
+        let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default().required_subgroup_size(gpu.subgroup_size());
+        if gpu.requires_subgroup_size() {
+            // Where the driver may choose, `gl_SubgroupSize` and the lanes that run can differ: nail both down.
+            stage = stage.push_next(&mut required).flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
+        }
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        let made = device.create_compute_pipelines(gpu.pipeline_cache(), &infos, None);
+        device.destroy_shader_module(module, None);
+        let pipeline = made.map_err(|(_, e)| failed("vkCreateComputePipelines")(e))?[0];
+        debug::name(gpu.debug_device(), pipeline, info.name);
+        debug::name(gpu.debug_device(), layout, info.name);
+        Ok(Pipeline { handle: pipeline, layout, set_layout })
+    }
+}

@@ -1,0 +1,146 @@
+//! Buffers from gpu-allocator, and references to parts of buffers.
+
+use super::context::Gpu;
+use super::{debug, failed};
+use crate::error::{Error, Result};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+
+/// Usage of every buffer that kernels touch; the host's buffers need these flags too (the address one only with [`super::Binding::Address`]).
+pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
+    vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
+        | vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
+        | vk::BufferUsageFlags::TRANSFER_DST.as_raw()
+        | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
+);
+
+/// Offsets of arrays within a buffer are multiples of this: enough for every device's storage-buffer offsets and 16-byte loads.
+pub const ALIGNMENT: u64 = 256;
+
+/// A part of a buffer, ours or the host's: what kernels get as an argument.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct BufferRef {
+    /// The buffer.
+    pub buffer: vk::Buffer,
+    /// Bytes from its start.
+    pub offset: u64,
+    /// Bytes.
+    pub size: u64,
+    /// Device address of the first byte; 0 where the device has no buffer addresses.
+    pub address: u64,
+}
+
+impl BufferRef {
+    /// The part from `offset`, `size` bytes long (both within this part).
+    #[must_use]
+    pub fn part(self, offset: u64, size: u64) -> Self {
+        debug_assert!(offset + size <= self.size, "part {offset}+{size} of {}", self.size);
+        let address = if self.address == 0 { 0 } else { self.address + offset };
+        Self { buffer: self.buffer, offset: self.offset + offset, size, address }
+    }
+
+    /// The 4-byte word at index `i`.
+    #[must_use]
+    pub fn word(self, i: u64) -> Self {
+        self.part(4 * i, 4)
+    }
+}
+
+/// A buffer with memory of its own, freed when dropped.
+pub struct Buffer {
+    gpu: Gpu,
+    handle: vk::Buffer,
+    allocation: Option<Allocation>,
+    size: u64,
+    address: u64,
+    name: String,
+}
+
+impl Buffer {
+    /// A device-local buffer of `size` bytes (at least 16 are allocated, so that an empty array has an address).
+    ///
+    /// # Errors
+    /// [`Error::Memory`] names the buffer and its size.
+    pub fn new(gpu: &Gpu, name: &str, size: u64) -> Result<Self> {
+        Self::with_location(gpu, name, size, MemoryLocation::GpuOnly)
+    }
+
+    /// A host-visible buffer for transfers.
+    pub(crate) fn staging(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation) -> Result<Self> {
+        Self::with_location(gpu, name, size, location)
+    }
+
+    fn with_location(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation) -> Result<Self> {
+        let device = gpu.device();
+        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
+        let mut usage = USAGE;
+        if gpu.has_addresses() {
+            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        }
+        let info = vk::BufferCreateInfo::default().size(size.max(16)).usage(usage);
+        // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.
+        let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
+        // SAFETY: the handle was just made.
+        let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+        let description =
+            AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
+        let allocated = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()));
+        let allocated = allocated.and_then(|mut a| a.allocate(&description).map_err(|e| memory_error(e.to_string())));
+        let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, size, address: 0, name: name.into() };
+        buffer.allocation = Some(allocated?);
+        if let Some(allocation) = &buffer.allocation {
+            // SAFETY: fresh memory of the right requirements, bound once.
+            unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) }.map_err(failed("vkBindBufferMemory"))?;
+        }
+        if gpu.has_addresses() {
+            // SAFETY: the buffer was made with the address usage and is bound.
+            buffer.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
+        }
+        debug::name(gpu.debug_device(), handle, name);
+        Ok(buffer)
+    }
+
+    /// The whole buffer as an argument.
+    pub fn all(&self) -> BufferRef {
+        BufferRef { buffer: self.handle, offset: 0, size: self.size, address: self.address }
+    }
+
+    /// Bytes asked for.
+    pub fn size(&self) -> u64 {
+        self.size
+    }
+
+    /// Name given at creation.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// The bytes, where the memory is visible to the host.
+    pub(crate) fn mapped(&self) -> Option<&[u8]> {
+        self.allocation.as_ref()?.mapped_slice()?.get(..self.size as usize)
+    }
+
+    /// As [`Buffer::mapped`], to write.
+    pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
+        self.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
+    }
+}
+
+impl std::fmt::Debug for Buffer {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "Buffer({}, {} bytes)", self.name, self.size)
+    }
+}
+
+impl Drop for Buffer {
+    fn drop(&mut self) {
+        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
+        unsafe { self.gpu.device().destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.gpu.allocator().lock())
+            && let Err(e) = allocator.free(allocation)
+        {
+            log::error!("freeing {}: {e}", self.name);
+        }
+    }
+}

@@ -1,0 +1,33 @@
+//! The Vulkan layer, and the only folder with `unsafe`: device, memory, pipelines, and the recorder of commands.
+#![allow(unsafe_code)]
+
+mod context;
+mod debug;
+mod kernel;
+mod memory;
+mod recorder;
+mod requirements;
+mod submit;
+
+pub use context::{Binding, Gpu, GpuOptions, list_devices};
+pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
+pub use memory::{ALIGNMENT, Buffer, BufferRef, USAGE};
+pub(crate) use recorder::Groups;
+pub use recorder::Recorder;
+pub use requirements::{DeviceReport, Requirements};
+pub use submit::{Readback, StageTime};
+
+use crate::error::Error;
+use ash::vk;
+
+/// Turns a failed Vulkan call into an [`Error`] that names it.
+pub(crate) fn failed(call: &'static str) -> impl FnOnce(vk::Result) -> Error {
+    move |result| {
+        let hint = match result {
+            vk::Result::ERROR_DEVICE_LOST => "; the driver gave up: try smaller jobs, or another device",
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => "; the device's memory is full: a larger --alpha makes a smaller tree",
+            _ => "",
+        };
+        Error::Vulkan { call, result, hint: hint.into() }
+    }
+}

@@ -1,0 +1,291 @@
+//! Appends work to a command buffer: dispatches, named barriers, fills, copies, timestamps. Submits nothing, waits for nothing.
+//!
+//! The recorder knows from reflection which buffers each kernel reads and writes. It checks, as the work is recorded, that no dispatch
+//! meets an earlier one's writes (or writes what an earlier one reads) without a barrier between them.
+
+use super::context::{Binding, Gpu};
+use super::failed;
+use super::kernel::{Access, Kernel};
+use super::memory::BufferRef;
+use crate::error::{Error, Result};
+use ash::vk;
+
+/// Most workgroups along one axis of a dispatch.
+const MAX_GROUPS: u32 = 65_535;
+
+/// Workgroups of a dispatch.
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Groups {
+    /// Known to the host.
+    Count(u32),
+    /// Three words in device memory.
+    Indirect(BufferRef),
+}
+
+/// Folds a number of workgroups into two dimensions, as `glsl/primitives/dispatch_args.comp` does.
+pub(crate) fn fold_groups(groups: u32) -> [u32; 3] {
+    if groups > MAX_GROUPS { [32_768, groups.div_ceil(32_768), 1] } else { [groups, 1, 1] }
+}
+
+/// One use of a range of a buffer since the last barrier.
+struct Use {
+    buffer: vk::Buffer,
+    begin: u64,
+    end: u64,
+    writes: bool,
+    by: &'static str,
+}
+
+/// Records into one command buffer.
+pub struct Recorder<'a> {
+    gpu: &'a Gpu,
+    commands: vk::CommandBuffer,
+    uses: Vec<Use>,
+    hazard: Option<String>,
+    timestamps: Option<(vk::QueryPool, u32)>,
+    /// Names and begin/end slots of the timed stages so far.
+    pub(crate) stages: Vec<(String, u32, u32)>,
+    next_slot: u32,
+    /// Descriptor pools of this recording; empty where buffers go by address.
+    pools: Vec<vk::DescriptorPool>,
+    barriers: Vec<&'static str>,
+    /// Leave out the n-th barrier, to see that its absence is noticed.
+    drop_barrier: Option<u32>,
+}
+
+impl<'a> Recorder<'a> {
+    /// A recorder for a command buffer in the recording state. `timestamps`: a reset query pool and its size.
+    ///
+    /// The recorder must be kept until the commands have been executed where the device binds by descriptors, since it owns their sets.
+    ///
+    /// # Safety
+    /// `commands` is in the recording state, outside a render pass, of a family with compute, and belongs to `gpu`'s device.
+    pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
+        let (uses, stages, pools) = (Vec::new(), Vec::new(), Vec::new());
+        Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, barriers: Vec::new(), drop_barrier: None }
+    }
+
+    /// The device.
+    pub fn gpu(&self) -> &'a Gpu {
+        self.gpu
+    }
+
+    /// Leaves out the n-th barrier from now on, for tests.
+    #[doc(hidden)]
+    pub fn drop_barrier(&mut self, n: Option<u32>) {
+        self.drop_barrier = n;
+    }
+
+    /// Labels of the barriers recorded, for tests.
+    #[doc(hidden)]
+    pub fn barriers(&self) -> &[&'static str] {
+        &self.barriers
+    }
+
+    /// Runs a kernel.
+    pub(crate) fn dispatch<K: Kernel>(&mut self, arguments: &K, spec: K::Spec, groups: Groups) -> Result<()> {
+        let info = K::INFO;
+        let pipeline = self.gpu.pipeline::<K>(spec)?;
+        let buffers = arguments.buffers();
+        if let Groups::Count(0) = groups {
+            return Ok(());
+        }
+        let mut uses: Vec<_> = buffers.iter().zip(info.buffers).map(|(b, i)| (*b, i.access != Access::Read)).collect();
+        if let Groups::Indirect(words) = groups {
+            uses.push((words, false));
+        }
+        self.touch(&uses, info.name);
+        let device = self.gpu.device();
+        let base = info.scalar_base(self.gpu.binding());
+        let mut push = [0u8; 128];
+        arguments.scalars(base, &mut push);
+        // SAFETY: pipeline, layouts and sets belong to this device; push constants fit the layout made from the same numbers; the
+        // caller of `new` vouches for the command buffer.
+        unsafe {
+            device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle);
+            if self.gpu.binding() == Binding::Address {
+                for (i, b) in buffers.iter().enumerate() {
+                    push[8 * i..8 * i + 8].copy_from_slice(&b.address.to_le_bytes());
+                }
+            } else if !buffers.is_empty() {
+                let set = self.descriptor_set(pipeline.set_layout, &buffers, info.name)?;
+                device.cmd_bind_descriptor_sets(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &[set], &[]);
+            }
+            let bytes = &push[..base + info.scalar_bytes];
+            device.cmd_push_constants(self.commands, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytes);
+            match groups {
+                Groups::Count(n) => {
+                    let [x, y, z] = fold_groups(n);
+                    device.cmd_dispatch(self.commands, x, y, z);
+                }
+                Groups::Indirect(words) => device.cmd_dispatch_indirect(self.commands, words.buffer, words.offset),
+            }
+        }
+        Ok(())
+    }
+
+    /// Makes everything written so far visible to everything after; `label` says by whom and for whom.
+    pub fn barrier(&mut self, label: &'static str) {
+        self.barriers.push(label);
+        if self.drop_barrier == Some(self.barriers.len() as u32 - 1) {
+            return;
+        }
+        self.uses.clear();
+        let source = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        let target = source | vk::PipelineStageFlags::DRAW_INDIRECT;
+        let barrier =
+            vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE).dst_access_mask(
+                vk::AccessFlags::SHADER_READ
+                    | vk::AccessFlags::SHADER_WRITE
+                    | vk::AccessFlags::TRANSFER_READ
+                    | vk::AccessFlags::TRANSFER_WRITE
+                    | vk::AccessFlags::INDIRECT_COMMAND_READ,
+            );
+        self.label(label);
+        // SAFETY: the caller of `new` vouches for the command buffer.
+        unsafe {
+            self.gpu.device().cmd_pipeline_barrier(self.commands, source, target, vk::DependencyFlags::empty(), &[barrier], &[], &[]);
+        }
+    }
+
+    /// Fills a range (a multiple of 4 bytes) with a word.
+    pub fn fill(&mut self, range: BufferRef, word: u32) {
+        if range.size == 0 {
+            return;
+        }
+        self.touch(&[(range, true)], "fill");
+        // SAFETY: ranges are aligned to 4 bytes by construction.
+        unsafe { self.gpu.device().cmd_fill_buffer(self.commands, range.buffer, range.offset, range.size.next_multiple_of(4), word) };
+    }
+
+    /// Copies the bytes of `from` to the beginning of `to`.
+    pub fn copy(&mut self, from: BufferRef, to: BufferRef) {
+        if from.size == 0 {
+            return;
+        }
+        self.touch(&[(from, false), (to.part(0, from.size), true)], "copy");
+        let region = [vk::BufferCopy { src_offset: from.offset, dst_offset: to.offset, size: from.size }];
+        // SAFETY: both ranges lie in their buffers.
+        unsafe { self.gpu.device().cmd_copy_buffer(self.commands, from.buffer, to.buffer, &region) };
+    }
+
+    /// Records `work` as a stage of that name: labelled, and timed where there is room for its timestamps.
+    pub fn stage<T>(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(format!("olbvh.{name}"))) {
+            // SAFETY: labels are balanced by the end below.
+            unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
+        }
+        let begin = self.timestamp(vk::PipelineStageFlags::TOP_OF_PIPE);
+        let result = work(self);
+        let end = self.timestamp(vk::PipelineStageFlags::BOTTOM_OF_PIPE);
+        if let (Some(begin), Some(end)) = (begin, end) {
+            self.stages.push((name.to_string(), begin, end));
+        }
+        if let Some(debug) = self.gpu.debug_device() {
+            // SAFETY: balances the begin above.
+            unsafe { debug.cmd_end_debug_utils_label(self.commands) };
+        }
+        result
+    }
+
+    /// Ends the recording's checks.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] names two dispatches that need a barrier between them.
+    pub fn finish(&mut self) -> Result<()> {
+        self.hazard.take().map_or(Ok(()), |h| Err(Error::Invalid(h)))
+    }
+
+    fn timestamp(&mut self, stage: vk::PipelineStageFlags) -> Option<u32> {
+        let (pool, size) = self.timestamps?;
+        if self.next_slot >= size {
+            return None;
+        }
+        let slot = self.next_slot;
+        self.next_slot += 1;
+        // SAFETY: the slot lies in the pool, which the caller has reset.
+        unsafe { self.gpu.device().cmd_write_timestamp(self.commands, stage, pool, slot) };
+        Some(slot)
+    }
+
+    fn label(&self, label: &'static str) {
+        if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(label)) {
+            // SAFETY: a plain label in a recording command buffer.
+            unsafe { debug.cmd_insert_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
+        }
+    }
+
+    /// Notes the uses of one command and looks for earlier ones that they must not overlap.
+    fn touch(&mut self, ranges: &[(BufferRef, bool)], by: &'static str) {
+        let before = self.uses.len();
+        for &(range, writes) in ranges {
+            let (buffer, begin, end) = (range.buffer, range.offset, range.offset + range.size);
+            let clash = |u: &&Use| u.buffer == buffer && u.begin < end && begin < u.end && (u.writes || writes);
+            if let (None, Some(earlier)) = (&self.hazard, self.uses[..before].iter().find(clash)) {
+                let verb = |w| if w { "writes" } else { "reads" };
+                self.hazard =
+                    Some(format!("{by} {} what {} {} with no barrier between them", verb(writes), earlier.by, verb(earlier.writes)));
+            }
+            self.uses.push(Use { buffer, begin, end, writes, by });
+        }
+    }
+
+    /// A descriptor set with these buffers.
+    fn descriptor_set(
+        &mut self,
+        layout: vk::DescriptorSetLayout,
+        buffers: &[BufferRef],
+        kernel: &'static str,
+    ) -> Result<vk::DescriptorSet> {
+        let device = self.gpu.device();
+        let limit = u64::from(self.gpu.limits().max_storage_buffer_range);
+        if let Some(large) = buffers.iter().find(|b| b.size > limit) {
+            return Err(Error::TooLarge(format!(
+                "{kernel} needs a storage buffer of {} bytes; the device binds {limit} at most",
+                large.size
+            )));
+        }
+        let alignment = self.gpu.limits().min_storage_buffer_offset_alignment.max(1);
+        if let Some(odd) = buffers.iter().find(|b| b.offset % alignment != 0) {
+            let text = format!("{kernel} is given a buffer at offset {}, the device binds multiples of {alignment}", odd.offset);
+            return Err(Error::Invalid(text));
+        }
+        let layouts = [layout];
+        // SAFETY: pools and sets belong to this device and live until the recorder is dropped.
+        unsafe {
+            let allocate = |pool| {
+                device.allocate_descriptor_sets(&vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts))
+            };
+            let mut sets = self.pools.last().map_or(Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY), |p| allocate(*p));
+            if sets.is_err() {
+                let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: 2048 }];
+                let info = vk::DescriptorPoolCreateInfo::default().max_sets(256).pool_sizes(&sizes);
+                let pool = device.create_descriptor_pool(&info, None).map_err(failed("vkCreateDescriptorPool"))?;
+                self.pools.push(pool);
+                sets = allocate(pool);
+            }
+            let set = sets.map_err(failed("vkAllocateDescriptorSets"))?[0];
+            let infos: Vec<_> =
+                buffers.iter().map(|b| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size.max(16) }]).collect();
+            let writes: Vec<_> = infos
+                .iter()
+                .enumerate()
+                .map(|(i, info)| {
+                    let w = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i as u32);
+                    w.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
+                })
+                .collect();
+            device.update_descriptor_sets(&writes, &[]);
+            Ok(set)
+        }
+    }
+}
+
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {
+        for pool in self.pools.drain(..) {
+            // SAFETY: the commands have been executed (see `new`), so no set is in use.
+            unsafe { self.gpu.device().destroy_descriptor_pool(pool, None) };
+        }
+    }
+}

@@ -1,0 +1,200 @@
+//! What a device must offer, told before a device exists.
+
+use ash::vk;
+use std::ffi::{CStr, c_char};
+
+/// What the engine needs of a physical device, checked against one.
+#[derive(Clone, Debug)]
+pub struct Requirements {
+    /// What the device lacks; empty if it qualifies.
+    pub missing: Vec<String>,
+    /// Device extensions to enable: those preferred that the device has.
+    pub extensions: Vec<&'static CStr>,
+    /// The device can pass buffers by address; without it, descriptors serve.
+    pub buffer_addresses: bool,
+    /// Subgroup sizes can be required per pipeline.
+    pub subgroup_size_control: bool,
+    /// Smallest, usual and largest subgroup size.
+    pub subgroup_sizes: [u32; 3],
+    /// A queue family with compute, and the number of valid bits of its timestamps.
+    pub queue_family: Option<(u32, u32)>,
+}
+
+/// A Vulkan device as the `devices` command lists it.
+#[derive(Clone, Debug)]
+pub struct DeviceReport {
+    /// Name as the driver gives it.
+    pub name: String,
+    /// Driver name and version.
+    pub driver: String,
+    /// Highest API version.
+    pub api: String,
+    /// Subgroup size.
+    pub subgroup: u32,
+    /// Kind: discrete, integrated, virtual, cpu, other.
+    pub kind: &'static str,
+    /// Bytes of the largest device-local heap.
+    pub memory: u64,
+    /// The requirements.
+    pub requirements: Requirements,
+}
+
+/// Fixed-size C string of a properties struct.
+pub(crate) fn text(chars: &[c_char]) -> String {
+    let bytes: Vec<u8> = chars.iter().map(|&c| c as u8).take_while(|&b| b != 0).collect();
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// What of a device decides whether it qualifies.
+struct Offer {
+    api: u32,
+    invocations: u32,
+    shared_bytes: u32,
+    /// Operations in compute shaders.
+    subgroup: vk::SubgroupFeatureFlags,
+    compute_queue: bool,
+}
+
+/// What an offer lacks, in words.
+fn missing(offer: &Offer) -> Vec<String> {
+    let mut missing = Vec::new();
+    let (major, minor) = (vk::api_version_major(offer.api), vk::api_version_minor(offer.api));
+    if (major, minor) < (1, 2) {
+        missing.push(format!("Vulkan 1.2 (has {major}.{minor})"));
+    }
+    if offer.invocations < 256 {
+        missing.push(format!("256 invocations per workgroup (has {})", offer.invocations));
+    }
+    if offer.shared_bytes < 16384 {
+        missing.push(format!("16 KiB of shared memory (has {} bytes)", offer.shared_bytes));
+    }
+    let operations = [
+        (vk::SubgroupFeatureFlags::BASIC, "basic"),
+        (vk::SubgroupFeatureFlags::VOTE, "vote"),
+        (vk::SubgroupFeatureFlags::ARITHMETIC, "arithmetic"),
+        (vk::SubgroupFeatureFlags::BALLOT, "ballot"),
+    ];
+    for (flag, name) in operations {
+        if !offer.subgroup.contains(flag) {
+            missing.push(format!("subgroup {name} operations in compute"));
+        }
+    }
+    if !offer.compute_queue {
+        missing.push("a compute queue".into());
+    }
+    missing
+}
+
+impl Requirements {
+    /// Checks a physical device: Vulkan 1.2, a compute queue, subgroup basic, vote, arithmetic and ballot in compute, 256 invocations per
+    /// workgroup; buffer addresses and subgroup size control are preferred.
+    pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+        let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
+        let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        // SAFETY: the handle is one of this instance; the structs live until the calls return.
+        let (properties, extensions, families) = unsafe {
+            let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut control);
+            instance.get_physical_device_properties2(device, &mut properties);
+            (
+                properties.properties,
+                instance.enumerate_device_extension_properties(device).unwrap_or_default(),
+                instance.get_physical_device_queue_family_properties(device),
+            )
+        };
+        let queue_family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
+        let queue_family = queue_family.map(|i| (i as u32, families[i].timestamp_valid_bits));
+        let in_compute = subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE);
+        let missing = missing(&Offer {
+            api: properties.api_version,
+            invocations: properties.limits.max_compute_work_group_invocations,
+            shared_bytes: properties.limits.max_compute_shared_memory_size,
+            subgroup: if in_compute { subgroup.supported_operations } else { vk::SubgroupFeatureFlags::empty() },
+            compute_queue: queue_family.is_some(),
+        });
+        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
+        let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
+        let can_control = has(ash::ext::subgroup_size_control::NAME);
+        // SAFETY: as above; the extension struct is chained only where the extension exists.
+        unsafe {
+            let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut addresses);
+            if can_control {
+                features = features.push_next(&mut size_control);
+            }
+            instance.get_physical_device_features2(device, &mut features);
+        }
+        let subgroup_size_control = can_control && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
+        let sizes = if can_control {
+            [control.min_subgroup_size, subgroup.subgroup_size, control.max_subgroup_size]
+        } else {
+            [subgroup.subgroup_size; 3]
+        };
+        let preferred = [ash::ext::subgroup_size_control::NAME];
+        Self {
+            missing,
+            extensions: preferred.into_iter().filter(|e| has(e)).collect(),
+            buffer_addresses: addresses.buffer_device_address != 0,
+            subgroup_size_control,
+            subgroup_sizes: sizes,
+            queue_family,
+        }
+    }
+}
+
+impl DeviceReport {
+    /// Reads a device's properties and checks it.
+    pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+        let requirements = Requirements::check(instance, device);
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
+        // SAFETY: the handle is one of this instance; the structs live until the calls return.
+        let (properties, memory) = unsafe {
+            let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+            instance.get_physical_device_properties2(device, &mut properties);
+            (properties.properties, instance.get_physical_device_memory_properties(device))
+        };
+        let version = properties.api_version;
+        let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
+        Self {
+            name: text(&properties.device_name),
+            driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)).trim().to_string(),
+            api: format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
+            subgroup: requirements.subgroup_sizes[1],
+            kind: match properties.device_type {
+                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
+                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
+                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
+                vk::PhysicalDeviceType::CPU => "cpu",
+                _ => "other",
+            },
+            memory: heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).max().unwrap_or(0),
+            requirements,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_missing_is_named() {
+        let least = || Offer {
+            api: vk::API_VERSION_1_2,
+            invocations: 256,
+            shared_bytes: 16384,
+            subgroup: vk::SubgroupFeatureFlags::BASIC
+                | vk::SubgroupFeatureFlags::VOTE
+                | vk::SubgroupFeatureFlags::ARITHMETIC
+                | vk::SubgroupFeatureFlags::BALLOT,
+            compute_queue: true,
+        };
+        assert!(missing(&least()).is_empty());
+        assert_eq!(missing(&Offer { api: vk::API_VERSION_1_1, ..least() }), ["Vulkan 1.2 (has 1.1)"]);
+        assert_eq!(missing(&Offer { invocations: 128, ..least() }), ["256 invocations per workgroup (has 128)"]);
+        assert_eq!(missing(&Offer { shared_bytes: 8192, ..least() }), ["16 KiB of shared memory (has 8192 bytes)"]);
+        let no_ballot = least().subgroup & !vk::SubgroupFeatureFlags::BALLOT;
+        assert_eq!(missing(&Offer { subgroup: no_ballot, ..least() }), ["subgroup ballot operations in compute"]);
+        let nothing = Offer { api: 0, invocations: 0, shared_bytes: 0, subgroup: vk::SubgroupFeatureFlags::empty(), compute_queue: false };
+        assert_eq!(missing(&nothing).len(), 8);
+    }
+}

@@ -1,0 +1,192 @@
+//! The convenient side: record, submit, wait; move bytes to the device and back.
+
+use super::context::Gpu;
+use super::failed;
+use super::memory::{Buffer, BufferRef};
+use super::recorder::Recorder;
+use crate::error::{Error, Result};
+use ash::vk;
+use bytemuck::Pod;
+use gpu_allocator::MemoryLocation;
+
+/// Bytes that one staging buffer holds; larger transfers go in several.
+const STAGING: u64 = 32 << 20;
+/// Timestamps of one submission.
+const TIMESTAMPS: u32 = 256;
+
+/// Device time of a recorded stage.
+#[derive(Clone, Debug)]
+pub struct StageTime {
+    /// Name of the stage.
+    pub name: String,
+    /// Milliseconds between the timestamps at its begin and end.
+    pub milliseconds: f64,
+}
+
+/// What a submission brings back.
+#[derive(Clone, Debug, Default)]
+pub struct Readback {
+    /// Stages in the order in which they ended; empty where the queue has no timestamps.
+    pub stages: Vec<StageTime>,
+}
+
+impl Readback {
+    /// Milliseconds of all stages of that name.
+    pub fn milliseconds(&self, name: &str) -> f64 {
+        self.stages.iter().filter(|s| s.name == name).map(|s| s.milliseconds).sum()
+    }
+}
+
+/// Vulkan objects of one submission, destroyed together.
+struct Submission<'a> {
+    gpu: &'a Gpu,
+    pool: vk::CommandPool,
+    fence: vk::Fence,
+    queries: vk::QueryPool,
+}
+
+impl Drop for Submission<'_> {
+    fn drop(&mut self) {
+        let device = self.gpu.device();
+        // SAFETY: either never submitted, or waited for.
+        unsafe {
+            device.destroy_query_pool(self.queries, None);
+            device.destroy_fence(self.fence, None);
+            device.destroy_command_pool(self.pool, None);
+        }
+    }
+}
+
+impl Gpu {
+    /// Records work, submits it, and waits until it is done.
+    ///
+    /// # Errors
+    /// Those of `record`, a missing barrier, or a failed Vulkan call.
+    pub fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, Readback)> {
+        let device = self.device();
+        let timed = self.timestamp_bits() > 0;
+        let mut submission =
+            Submission { gpu: self, pool: vk::CommandPool::null(), fence: vk::Fence::null(), queries: vk::QueryPool::null() };
+        // SAFETY: objects are made, used and destroyed here, in order; the queue is locked while it is submitted to.
+        unsafe {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.family()).flags(vk::CommandPoolCreateFlags::TRANSIENT);
+            submission.pool = device.create_command_pool(&info, None).map_err(failed("vkCreateCommandPool"))?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(submission.pool).command_buffer_count(1);
+            let commands = device.allocate_command_buffers(&info).map_err(failed("vkAllocateCommandBuffers"))?[0];
+            super::debug::name(self.debug_device(), commands, label);
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            device.begin_command_buffer(commands, &begin).map_err(failed("vkBeginCommandBuffer"))?;
+            if timed {
+                let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(TIMESTAMPS);
+                submission.queries = device.create_query_pool(&info, None).map_err(failed("vkCreateQueryPool"))?;
+                device.cmd_reset_query_pool(commands, submission.queries, 0, TIMESTAMPS);
+            }
+            let mut recorder = Recorder::new(self, commands, timed.then_some((submission.queries, TIMESTAMPS)));
+            let value = record(&mut recorder)?;
+            recorder.finish()?;
+            // What the host reads next.
+            let barrier = [vk::MemoryBarrier::default()
+                .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
+                .dst_access_mask(vk::AccessFlags::HOST_READ)];
+            let source = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+            device.cmd_pipeline_barrier(commands, source, vk::PipelineStageFlags::HOST, vk::DependencyFlags::empty(), &barrier, &[], &[]);
+            device.end_command_buffer(commands).map_err(failed("vkEndCommandBuffer"))?;
+            submission.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
+            let buffers = [commands];
+            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
+            {
+                let queue = self.queue()?;
+                device.queue_submit(*queue, &submit, submission.fence).map_err(failed("vkQueueSubmit"))?;
+            }
+            device.wait_for_fences(&[submission.fence], true, u64::MAX).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
+            let stages = if timed { self.read_timestamps(submission.queries, &recorder.stages)? } else { Vec::new() };
+            Ok((value, Readback { stages }))
+        }
+    }
+
+    fn read_timestamps(&self, queries: vk::QueryPool, stages: &[(String, u32, u32)]) -> Result<Vec<StageTime>> {
+        let used = stages.iter().map(|s| s.2 + 1).max().unwrap_or(0);
+        let mut ticks = vec![0u64; used as usize];
+        if used > 0 {
+            // SAFETY: the queries up to `used` were written by the submission that has ended.
+            let read = unsafe { self.device().get_query_pool_results(queries, 0, &mut ticks, vk::QueryResultFlags::TYPE_64) };
+            read.map_err(failed("vkGetQueryPoolResults"))?;
+        }
+        let mask = if self.timestamp_bits() >= 64 { u64::MAX } else { (1 << self.timestamp_bits()) - 1 };
+        let period = f64::from(self.limits().timestamp_period) * 1e-6;
+        let time = |(name, b, e): &(String, u32, u32)| {
+            let span = ticks[*e as usize].wrapping_sub(ticks[*b as usize]) & mask;
+            StageTime { name: name.clone(), milliseconds: span as f64 * period }
+        };
+        Ok(stages.iter().map(time).collect())
+    }
+
+    /// A device-local buffer with this content.
+    ///
+    /// # Errors
+    /// [`Error::Memory`], or a failed Vulkan call.
+    pub fn upload<T: Pod>(&self, name: &str, data: &[T]) -> Result<Buffer> {
+        let mut buffer = Buffer::new(self, name, size_of_val(data) as u64)?;
+        self.write(&mut buffer, bytemuck::cast_slice(data))?;
+        Ok(buffer)
+    }
+
+    /// Writes bytes to the beginning of a buffer.
+    fn write(&self, buffer: &mut Buffer, bytes: &[u8]) -> Result<()> {
+        if let Some(mapped) = buffer.mapped_mut() {
+            mapped[..bytes.len()].copy_from_slice(bytes);
+            return Ok(());
+        }
+        let mut staging = Buffer::staging(self, "olbvh.upload.staging", STAGING.min(bytes.len() as u64), MemoryLocation::CpuToGpu)?;
+        for (i, chunk) in bytes.chunks(STAGING as usize).enumerate() {
+            let mapped = staging.mapped_mut().ok_or_else(|| Error::Invalid("upload memory is not mapped".into()))?;
+            mapped[..chunk.len()].copy_from_slice(chunk);
+            let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(i as u64 * STAGING, chunk.len() as u64));
+            self.run("olbvh.upload.staging", |r| {
+                r.copy(from, to);
+                Ok(())
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Reads a part of a buffer back.
+    ///
+    /// # Errors
+    /// A failed Vulkan call, or no memory for the transfer.
+    pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
+        let count = part.size as usize / size_of::<T>();
+        let mut data = vec![T::zeroed(); count];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
+        if let Some(mapped) = buffer.mapped() {
+            let at = part.offset as usize;
+            bytes.copy_from_slice(&mapped[at..at + bytes.len()]);
+            return Ok(data);
+        }
+        self.download_ref(part, bytes)?;
+        Ok(data)
+    }
+
+    /// Reads a range of any buffer back through staging memory.
+    pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
+        let staging = Buffer::staging(self, "olbvh.download.staging", STAGING.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
+        for (i, chunk) in bytes.chunks_mut(STAGING as usize).enumerate() {
+            let (from, to) = (part.part(i as u64 * STAGING, chunk.len() as u64), staging.all());
+            self.run("olbvh.download.staging", |r| {
+                r.copy(from, to);
+                Ok(())
+            })?;
+            let mapped = staging.mapped().ok_or_else(|| Error::Invalid("download memory is not mapped".into()))?;
+            chunk.copy_from_slice(&mapped[..chunk.len()]);
+        }
+        Ok(())
+    }
+}
+
+/// Says which submission was lost.
+fn named(error: Error, label: &str) -> Error {
+    match error {
+        Error::Vulkan { call, result, hint } => Error::Vulkan { call, result, hint: format!(" in {label}{hint}") },
+        other => other,
+    }
+}

@@ -1,0 +1,23 @@
+//! The kernels' Rust side, generated from `glsl/` by `build.rs`, and how they are tuned per device.
+
+use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
+
+mod target;
+pub use target::{SortTarget, Target, TileTarget};
+
+fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
+    out[at..at + bytes.len()].copy_from_slice(bytes);
+}
+
+mod generated {
+    #![allow(clippy::all, clippy::pedantic)]
+    use super::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization, put};
+    include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
+}
+pub(crate) use generated::*;
+
+/// Every kernel's name with those of its buffers, for tests.
+#[doc(hidden)]
+pub fn interfaces() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
+    ALL.iter().map(|k| (k.name, k.buffers.iter().map(|b| b.name).collect()))
+}

@@ -1,0 +1,106 @@
+//! What a caller may ask of a build. One set of options for the device and the CPU; knows no Vulkan.
+
+use crate::error::{Error, Result};
+
+/// How far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf, unless the caller says otherwise (SPEC 3.1).
+pub const TOLERANCE: f32 = 1e-5;
+
+/// Which cells list a primitive (SPEC 2.2). The stronger the test, the shorter the lists and the longer the construction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Assign {
+    /// Every cell of the primitive's quantized bounding box (the paper, Eq. 5–6).
+    #[default]
+    Aabb = 0,
+    /// Of those, the cells that no face plane separates from the primitive.
+    Planes = 1,
+    /// Of those, the cells that touch the primitive: face planes and the 18 crosses of edges and axes.
+    Exact = 2,
+}
+
+impl Assign {
+    /// All three, weakest first.
+    pub const ALL: [Self; 3] = [Self::Aabb, Self::Planes, Self::Exact];
+
+    /// The name used on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Aabb => "aabb",
+            Self::Planes => "planes",
+            Self::Exact => "exact",
+        }
+    }
+}
+
+impl std::fmt::Display for Assign {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+impl std::str::FromStr for Assign {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|a| a.name().eq_ignore_ascii_case(name));
+        found.ok_or_else(|| Error::Invalid(format!("unknown assignment `{name}`; known are aabb, planes, exact")))
+    }
+}
+
+/// How to build a tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BuildOptions {
+    /// The paper's α in 0…10: how many levels coarser than the cells' size the leaves are.
+    pub alpha: f32,
+    /// Which cells list a primitive.
+    pub assign: Assign,
+    /// Store a box per node (24 bytes each). Without, boxes follow from the grid.
+    pub boxes: bool,
+    /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
+    /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: as many as 32 bits count.
+    pub capacity: Option<u32>,
+}
+
+impl Default for BuildOptions {
+    fn default() -> Self {
+        Self { alpha: 0.0, assign: Assign::Aabb, boxes: false, capacity: None }
+    }
+}
+
+impl BuildOptions {
+    /// α in units of 1/65536, rounded to nearest, so that every device chooses the same level.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if α is not in 0…10.
+    pub fn alpha_fixed(&self) -> Result<u32> {
+        if (0.0..=10.0).contains(&self.alpha) {
+            Ok((f64::from(self.alpha) * 65536.0).round() as u32)
+        } else {
+            Err(Error::Invalid(format!("alpha is {}, it must be from 0 to 10", self.alpha)))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn alpha_is_checked_and_rounded() {
+        let fixed = |alpha| BuildOptions { alpha, ..BuildOptions::default() }.alpha_fixed();
+        assert_eq!(fixed(0.0).unwrap(), 0);
+        assert_eq!(fixed(0.5).unwrap(), 32768);
+        assert_eq!(fixed(10.0).unwrap(), 655_360);
+        for bad in [-0.001, 10.001, f32::NAN, f32::INFINITY] {
+            assert!(matches!(fixed(bad), Err(Error::Invalid(_))), "{bad}");
+        }
+    }
+
+    #[test]
+    fn assignments_have_names() {
+        for a in Assign::ALL {
+            assert_eq!(a.to_string().parse::<Assign>().unwrap(), a);
+        }
+        assert!("boxes".parse::<Assign>().is_err());
+    }
+}

@@ -1,0 +1,98 @@
+//! Reduce, exclusive scan and stable radix sort on the device, as functions that append to a recorder.
+
+mod reduce;
+mod scan;
+mod selftest;
+mod sort;
+
+pub use reduce::{REDUCE_SCRATCH, Reduction, cmd_reduce};
+pub use scan::{ScanScratch, cmd_exclusive_scan};
+pub(crate) use selftest::self_test;
+pub use sort::{SortScratch, cmd_sort_pairs};
+
+use crate::error::{Error, Result};
+use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::kernels::{DispatchArgs, DispatchArgsSpec};
+
+/// Number of items: an upper limit known to the host, and where given the true number in a word of device memory.
+#[derive(Clone, Copy, Debug)]
+pub struct Count {
+    /// No more items than this are touched, whatever the device says.
+    pub max: u32,
+    /// The word with the true number.
+    pub live: Option<BufferRef>,
+}
+
+impl Count {
+    /// A number known to the host.
+    pub fn host(n: u32) -> Self {
+        Self { max: n, live: None }
+    }
+
+    /// A number in device memory, at most `max`.
+    pub fn device(max: u32, live: BufferRef) -> Self {
+        Self { max, live: Some(live) }
+    }
+
+    /// The word that kernels read.
+    pub(crate) fn word(&self, gpu: &Gpu) -> BufferRef {
+        self.live.unwrap_or_else(|| gpu.unbounded())
+    }
+
+    /// Workgroups for `per_group` items each, behind a barrier with this label. Where the device knows the number, `arguments` (12 bytes)
+    /// receives them first, from a number that must be visible before.
+    pub(crate) fn groups(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef, label: &'static str) -> Result<Groups> {
+        let Some(live) = self.live else {
+            r.barrier(label);
+            return Ok(Groups::Count(self.max.div_ceil(per_group)));
+        };
+        let words = arguments.part(0, 12);
+        let spec = DispatchArgsSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
+        r.dispatch(&DispatchArgs { live, groups: words, count: self.max, per_group }, spec, Groups::Count(1))?;
+        r.barrier(label);
+        Ok(Groups::Indirect(words))
+    }
+}
+
+/// Hands out aligned parts of a buffer; without a buffer it only measures how many bytes are wanted.
+#[derive(Debug)]
+pub struct Arena {
+    memory: Option<BufferRef>,
+    used: u64,
+}
+
+impl Arena {
+    /// Parts of this memory.
+    pub fn new(memory: BufferRef) -> Self {
+        Self { memory: Some(memory), used: 0 }
+    }
+
+    /// Bytes that `carve` takes from an arena.
+    pub fn measure<T>(carve: impl FnOnce(&mut Self) -> Result<T>) -> Result<u64> {
+        let mut arena = Self { memory: None, used: 0 };
+        carve(&mut arena)?;
+        Ok(arena.used)
+    }
+
+    /// The next `bytes` bytes, aligned for every use.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the memory is too small.
+    pub fn take(&mut self, bytes: u64) -> Result<BufferRef> {
+        let begin = self.used;
+        self.used = (begin + bytes.max(16)).next_multiple_of(crate::gpu::ALIGNMENT);
+        match self.memory {
+            None => Ok(BufferRef { buffer: ash::vk::Buffer::null(), offset: begin, size: bytes.max(16), address: 0 }),
+            Some(memory) if begin + bytes.max(16) <= memory.size => Ok(memory.part(begin, bytes.max(16))),
+            Some(memory) => Err(Error::Invalid(format!("{} bytes of scratch memory are too few: {} are needed", memory.size, self.used))),
+        }
+    }
+
+    /// The next `n` words.
+    ///
+    /// # Errors
+    /// As [`Arena::take`].
+    pub fn words(&mut self, n: u64) -> Result<BufferRef> {
+        self.take(4 * n)
+    }
+}

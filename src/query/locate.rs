@@ -1,0 +1,293 @@
+//! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, values of fields.
+
+use super::Scene;
+use crate::build::{DeviceMesh, Tree};
+use crate::error::{Error, Result};
+use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
+use crate::kernels::{
+    Interpolate, InterpolateSpec, Locate, LocateAll, LocateAllSpec, LocateByTraversal, LocateByTraversalSpec, LocateSpec,
+};
+use crate::mesh::On;
+use crate::options::TOLERANCE;
+use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+
+/// Entries of a list that one dispatch searches.
+const SLICE: u32 = 16_384;
+/// Points of one submission of the convenient layer.
+const CHUNK: usize = 1 << 20;
+
+/// How the leaf of a point is found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Path {
+    /// By descent over child masks.
+    #[default]
+    Descent,
+    /// By the paper's traversal with a short stack of that many nodes (at least 1); lists beyond 32,000 entries are cut.
+    Traversal(u32),
+}
+
+/// How points are located.
+#[derive(Clone, Copy, Debug)]
+pub struct LocateOptions {
+    /// How far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
+    pub tolerance: f32,
+    /// How the leaf is found.
+    pub path: Path,
+}
+
+impl Default for LocateOptions {
+    fn default() -> Self {
+        Self { tolerance: TOLERANCE, path: Path::Descent }
+    }
+}
+
+/// Points in device memory.
+#[derive(Clone, Copy, Debug)]
+pub struct PointInput {
+    /// 32-bit floats; point i begins at float `i * stride`.
+    pub points: BufferRef,
+    /// Floats from one point to the next, at least 3.
+    pub stride: u32,
+    /// Number of points.
+    pub count: u32,
+    /// A tetrahedron per point (or all ones) to try first, such as the last owner. Valid tetrahedra of this mesh only.
+    pub hints: Option<BufferRef>,
+}
+
+/// Where answers go.
+#[derive(Clone, Copy, Debug)]
+pub struct LocateOutput {
+    /// One word per point: the owner, or all ones.
+    pub owners: BufferRef,
+    /// 16 bytes per point at a multiple of 16: barycentric coordinates in the order of the cell's vertices, zeroes without owner.
+    pub barycentrics: BufferRef,
+}
+
+/// Records point location. Reads mesh, tree and points in compute shaders, writes `output` in compute shaders; no barrier before or after.
+///
+/// # Errors
+/// [`Error::Invalid`] for a stride below 3.
+pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
+    let PointInput { points, stride, count, hints } = *input;
+    let LocateOutput { owners, barycentrics } = *output;
+    let tolerance = options.tolerance;
+    if stride < 3 {
+        return Err(Error::Invalid(format!("points {stride} floats apart; a point has three")));
+    }
+    let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
+    let (cells, vertices) = (scene.mesh.input.cells, scene.mesh.arrays.vertices);
+    let workgroup = r.gpu().target().each;
+    let groups = Groups::Count(count.div_ceil(workgroup));
+    r.stage("query.locate", |r| {
+        if let Path::Traversal(stack) = options.path {
+            let arguments = LocateByTraversal {
+                grid,
+                masks,
+                co,
+                po,
+                p,
+                flags,
+                cells,
+                vertices,
+                points,
+                owners,
+                barycentrics,
+                count,
+                stride,
+                tolerance,
+            };
+            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), ..Default::default() }, groups);
+        }
+        let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
+        let spec = LocateSpec { workgroup, hints: u32::from(hints.is_some()), slice: SLICE, ..Default::default() };
+        let hints = hints.unwrap_or_else(|| r.gpu().nothing());
+        for slice in 0..slices {
+            if slice > 0 {
+                r.barrier("locate.slice → locate.slice");
+            }
+            let last = u32::from(slice + 1 == slices);
+            let arguments = Locate {
+                grid,
+                masks,
+                co,
+                po,
+                p,
+                flags,
+                cells,
+                vertices,
+                points,
+                hints,
+                owners,
+                barycentrics,
+                count,
+                stride,
+                slice,
+                last,
+                tolerance,
+            };
+            r.dispatch(&arguments, spec, groups)?;
+        }
+        Ok(())
+    })
+}
+
+/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float each, NaN without owner.
+///
+/// # Errors
+/// [`Error::Vulkan`] if the pipeline cannot be made.
+pub fn cmd_interpolate(
+    r: &mut Recorder<'_>,
+    scene: &Scene,
+    field: BufferRef,
+    on: On,
+    located: &LocateOutput,
+    values: BufferRef,
+    count: u32,
+) -> Result<()> {
+    let workgroup = r.gpu().target().each;
+    let LocateOutput { owners, barycentrics } = *located;
+    let spec = InterpolateSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };
+    let arguments = Interpolate { cells: scene.mesh.input.cells, field, owners, barycentrics, values, count };
+    r.stage("query.interpolate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
+}
+
+/// Answers in host memory.
+#[derive(Clone, Debug, Default)]
+pub struct Located {
+    /// Owner of each point, or all ones.
+    pub owners: Vec<u32>,
+    /// Barycentric coordinates in the order of the cell's vertices.
+    pub barycentrics: Vec<[f32; 4]>,
+    /// Values of the field asked for; empty without one.
+    pub values: Vec<f32>,
+    /// Device time per stage.
+    pub stages: Vec<StageTime>,
+}
+
+/// Locates points (relative to the mesh's origin); `field`: values and what they belong to; `report` is told how many points are done.
+///
+/// # Errors
+/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
+pub fn locate(
+    mesh: &DeviceMesh,
+    tree: &Tree,
+    points: &[[f32; 3]],
+    field: Option<(&[f32], On)>,
+    options: &LocateOptions,
+    report: &dyn Fn(u64, u64),
+) -> Result<Located> {
+    let gpu = tree.gpu();
+    let scene = Scene::new(mesh, tree);
+    let field = match field {
+        Some((values, on)) => {
+            let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
+            if values.len() != expected as usize {
+                return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
+            }
+            Some((gpu.upload("olbvh.query.field", values)?, on))
+        }
+        None => None,
+    };
+    let mut all = Located::default();
+    let most = points.len().min(CHUNK) as u64;
+    let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
+    let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
+    let values = gpu.buffer("olbvh.query.values", 4 * most)?;
+    for chunk in points.chunks(CHUNK) {
+        let input = gpu.upload("olbvh.query.points", chunk)?;
+        let count = chunk.len() as u32;
+        let n = u64::from(count);
+        let input = PointInput { points: input.all(), stride: 3, count, hints: None };
+        let output = LocateOutput { owners: owners.all().part(0, 4 * n), barycentrics: barycentrics.all().part(0, 16 * n) };
+        let ((), time) = gpu.run("olbvh.query.locate", |r| {
+            cmd_locate(r, &scene, &input, &output, options)?;
+            if let Some((field, on)) = &field {
+                r.barrier("locate → interpolate");
+                cmd_interpolate(r, &scene, field.all(), *on, &output, values.all().part(0, 4 * n), count)?;
+            }
+            Ok(())
+        })?;
+        all.owners.extend(gpu.download::<u32>(&owners, output.owners)?);
+        all.barycentrics.extend(gpu.download::<[f32; 4]>(&barycentrics, output.barycentrics)?);
+        if field.is_some() {
+            all.values.extend(gpu.download::<f32>(&values, values.all().part(0, 4 * n))?);
+        }
+        all.stages.extend(time.stages);
+        report(all.owners.len() as u64, points.len() as u64);
+    }
+    Ok(all)
+}
+
+/// Every tetrahedron that contains each point, ascending; where none does, the owner alone, if there is one.
+///
+/// # Errors
+/// As [`locate`].
+pub fn locate_all(
+    mesh: &DeviceMesh,
+    tree: &Tree,
+    points: &[[f32; 3]],
+    options: &LocateOptions,
+    report: &dyn Fn(u64, u64),
+) -> Result<Vec<Vec<u32>>> {
+    let gpu = tree.gpu();
+    let scene = Scene::new(mesh, tree);
+    let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
+    let (cells, vertices) = (scene.mesh.input.cells, scene.mesh.arrays.vertices);
+    let workgroup = gpu.target().each;
+    let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
+    let mut all = Vec::with_capacity(points.len());
+    for chunk in points.chunks(CHUNK) {
+        let buffer = gpu.upload("olbvh.query.points", chunk)?;
+        let (points_ref, count, n) = (buffer.all(), chunk.len() as u32, chunk.len() as u64);
+        let carve =
+            |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(n)?, a.words(n)?, a.words(1)?, ScanScratch::carve(gpu, a, count)?));
+        let memory = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
+        let (owners, barycentrics, counts, places, total, scan) = carve(&mut Arena::new(memory.all()))?;
+        let record = |r: &mut Recorder<'_>, fill: u32, places: BufferRef, found: BufferRef, capacity: u32| {
+            for slice in 0..slices {
+                let arguments = LocateAll {
+                    grid,
+                    masks,
+                    co,
+                    po,
+                    p,
+                    flags,
+                    cells,
+                    vertices,
+                    points: points_ref,
+                    owners,
+                    places,
+                    found,
+                    count,
+                    stride: 3,
+                    slice,
+                    capacity,
+                };
+                r.dispatch(
+                    &arguments,
+                    LocateAllSpec { workgroup, fill, slice: SLICE, ..Default::default() },
+                    Groups::Count(count.div_ceil(workgroup)),
+                )?;
+                r.barrier("locate_all.slice → next");
+            }
+            Ok(())
+        };
+        gpu.run("olbvh.query.count_owners", |r| {
+            let input = PointInput { points: points_ref, stride: 3, count, hints: None };
+            r.fill(counts, 0);
+            cmd_locate(r, &scene, &input, &LocateOutput { owners, barycentrics }, options)?;
+            r.barrier("locate → locate_all");
+            record(r, 0, counts, r.gpu().nothing(), 0)?;
+            cmd_exclusive_scan(r, counts, places, total, Count::host(count), &scan)
+        })?;
+        let mut begins: Vec<u32> = gpu.download(&memory, places.part(0, 4 * n))?;
+        let total = gpu.download::<u32>(&memory, total.part(0, 4))?.first().copied().unwrap_or(0);
+        begins.push(total);
+        let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
+        gpu.run("olbvh.query.list_owners", |r| record(r, 1, places, found.all(), total))?;
+        let found: Vec<u32> = gpu.download(&found, found.all())?;
+        all.extend(begins.windows(2).map(|w| found.get(w[0] as usize..w[1] as usize).unwrap_or_default().to_vec()));
+        report(all.len() as u64, points.len() as u64);
+    }
+    Ok(all)
+}

@@ -1,0 +1,173 @@
+//! Does a tetrahedron touch a cell? The filters behind the assignments `Planes` and `Exact` (SPEC 2.2). Twin of
+//! `glsl/shared/assign.glsl`: the same operations in the same order.
+//!
+//! Separating axes in normalised coordinates: the four face planes, and for `Exact` the crosses of six edges and three axes. (The
+//! three box faces are the candidate range itself.) Two promises, in floating point as on paper:
+//! 1. a candidate cell that the closed tetrahedron touches is kept;
+//! 2. a candidate cell that holds a point p with `Tet::weights(p).inside` is kept.
+//!
+//! **Box of cell k** on axis c: `h = extent_c·2^-(l+1)`, or `extent_c/2` on an axis that is flat to the quantization (`inv_c = 0`: cell 0
+//! stands for all of it). Centre `floor(((2k+1)·h)·2^42)·2^-42`: like every vertex a multiple of 2^-42, so that no product below is
+//! denormal. Half size `h + (extent_c·2^-20 + 2^-41)`: quantization is off by at most four roundings (2^-22 of the extent), the
+//! centre by 2^-42.
+//!
+//! **Slack.** A candidate's centre is nowhere farther from a vertex than `reach_c = E_c + 2·half_c`, E being the size of the
+//! tetrahedron's bounding box. A determinant of this length is off by less than 2^-21·Σ|products|; the tests allow 2^-18, that is
+//! `slack_c = reach_c·2^-18 + 2^-42` per unit of |product of edges|, and it is part of the limits that are computed once per tetrahedron.
+//!
+//! **Spread.** Promise 2 for edges needs more: a point that is inside within the rounding ε ≤ 2^-21·6B of the four determinants (B = volume
+//! of the bounding box) may lie outside an edge's shadow by 3ε/|V| of its width, V being six times the volume. So the limits of edges
+//! get `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
+
+use super::grid::{Grid, reciprocal};
+use super::tet::{Tet, Vec3, cross, dot, sub};
+use crate::options::Assign;
+
+/// 2^n for |n| ≤ 126.
+const fn two_to(n: i32) -> f32 {
+    f32::from_bits(((n + 127) as u32) << 23)
+}
+
+/// The vertices of the face opposite to vertex i, in ascending global index.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+/// Edges, and the two vertices that are not on them.
+const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
+
+/// A face plane: a box is outside if `dot(normal, centre − at) > limit`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Face {
+    normal: Vec3,
+    at: Vec3,
+    limit: f32,
+}
+
+/// The cross of an edge and an axis: a box is outside if `u_i·along_j − u_j·along_i` with `u = centre − at` is below `lo` or above `hi`.
+#[derive(Clone, Copy, Debug, Default)]
+struct Shadow {
+    lo: f32,
+    hi: f32,
+}
+
+/// The test of one tetrahedron against cells of one level.
+#[derive(Clone, Debug)]
+pub struct Filter {
+    assign: Assign,
+    h: Vec3,
+    faces: [Face; 4],
+    edges: bool,
+    at: [Vec3; 6],
+    along: [Vec3; 6],
+    shadows: [[Shadow; 3]; 6],
+}
+
+/// Half a cell of `level` per axis in normalised coordinates, not inflated.
+pub fn half_cell(grid: &Grid, level: u32) -> Vec3 {
+    let scale = two_to(-1 - level as i32);
+    [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { grid.extent[c] * 0.5 } else { grid.extent[c] * scale })
+}
+
+/// Half size of a cell's box with the allowance for rounding.
+pub fn inflated(grid: &Grid, h: Vec3) -> Vec3 {
+    [0, 1, 2].map(|c| h[c] + (grid.extent[c] * two_to(-20) + two_to(-41)))
+}
+
+/// Centre of the box of a cell with half size `h`.
+pub fn cell_centre(h: Vec3, cell: [u32; 3]) -> Vec3 {
+    [0, 1, 2].map(|c| (((2 * cell[c] + 1) as f32 * h[c]) * two_to(42)).floor() * two_to(-42))
+}
+
+/// Sums of the absolute products in `cross(a, b)`.
+fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
+    let [a, b] = [abs(a), abs(b)];
+    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
+}
+
+fn abs(a: Vec3) -> Vec3 {
+    a.map(f32::abs)
+}
+
+impl Filter {
+    /// The filter of `tet` for cells of `level` (0…10) under `assign`.
+    pub fn new(tet: &Tet, grid: &Grid, level: u32, assign: Assign) -> Self {
+        let h = half_cell(grid, level);
+        let mut filter = Self {
+            assign,
+            h,
+            faces: [Face::default(); 4],
+            edges: false,
+            at: [[0.0; 3]; 6],
+            along: [[0.0; 3]; 6],
+            shadows: [[Shadow::default(); 3]; 6],
+        };
+        if assign == Assign::Aabb {
+            return filter;
+        }
+        let v = &tet.v;
+        let half = inflated(grid, h);
+        let size = [0, 1, 2].map(|c| {
+            let hi = v[0][c].max(v[1][c]).max(v[2][c].max(v[3][c]));
+            hi - v[0][c].min(v[1][c]).min(v[2][c].min(v[3][c]))
+        });
+        let slack = [0, 1, 2].map(|c| (size[c] + 2.0 * half[c]) * two_to(-18) + two_to(-42));
+        let volume = tet.volume();
+        // The outward normal, by the sign that `Tet::weights` uses.
+        let s = if volume < 0.0 { -1.0 } else { 1.0 };
+        for (i, [p, q, r]) in FACES.into_iter().enumerate() {
+            let (a, b) = (sub(v[q], v[p]), sub(v[r], v[p]));
+            let outward = if i % 2 == 0 { s } else { -s };
+            let normal = cross(a, b).map(|x| outward * x);
+            let limit = dot(abs(normal), half) + dot(cross_bound(a, b), slack);
+            filter.faces[i] = Face { normal, at: v[p], limit };
+        }
+        let volume = volume.abs();
+        let room = (size[0] * size[1]) * size[2];
+        filter.edges = assign == Assign::Exact && volume > room * two_to(-12);
+        if !filter.edges {
+            return filter;
+        }
+        let spread = (room * reciprocal(volume)) * two_to(-16);
+        for (e, [p, q, m, n]) in EDGES.into_iter().enumerate() {
+            let along = sub(v[q], v[p]);
+            filter.at[e] = v[p];
+            filter.along[e] = along;
+            let (um, un) = (sub(v[m], v[p]), sub(v[n], v[p]));
+            for axis in 0..3 {
+                let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+                let (tm, tn) = (um[i] * along[j] - um[j] * along[i], un[i] * along[j] - un[j] * along[i]);
+                let (lo, hi) = (tm.min(tn).min(0.0), tm.max(tn).max(0.0));
+                let (ai, aj) = (along[i].abs(), along[j].abs());
+                let grow = ((aj * half[i] + ai * half[j]) + (aj * slack[i] + ai * slack[j])) + spread * (hi - lo);
+                filter.shadows[e][axis] = Shadow { lo: lo - grow, hi: hi + grow };
+            }
+        }
+        filter
+    }
+
+    /// Whether the tetrahedron's entry in candidate `cell` (one of its bounding box) is kept.
+    pub fn touches(&self, cell: [u32; 3]) -> bool {
+        if self.assign == Assign::Aabb {
+            return true;
+        }
+        let centre = cell_centre(self.h, cell);
+        for face in &self.faces {
+            if dot(face.normal, sub(centre, face.at)) > face.limit {
+                return false;
+            }
+        }
+        if self.edges {
+            for e in 0..6 {
+                let u = sub(centre, self.at[e]);
+                let along = self.along[e];
+                for axis in 0..3 {
+                    let (i, j) = ((axis + 1) % 3, (axis + 2) % 3);
+                    let t = u[i] * along[j] - u[j] * along[i];
+                    let shadow = self.shadows[e][axis];
+                    if t < shadow.lo || t > shadow.hi {
+                        return false;
+                    }
+                }
+            }
+        }
+        true
+    }
+}

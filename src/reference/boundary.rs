@@ -1,0 +1,247 @@
+//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/*boundary*`.
+
+use super::grid::{COORDINATE_LIMIT, Grid, canonical};
+use super::tet::Tet;
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering};
+
+/// "No neighbour", "no owner".
+pub const NONE: u32 = u32::MAX;
+
+/// Cells of a mesh by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Counts {
+    /// All tetrahedra, bad ones included.
+    pub cells: u32,
+    /// Left out of every structure: see [`Fault`].
+    pub bad: u32,
+    /// Marked as boundary: no partner across a face, flat, or at a fold.
+    pub boundary: u32,
+    /// Negative signed volume in the caller's order of vertices.
+    pub negative: u32,
+    /// Zero volume.
+    pub flat: u32,
+}
+
+/// Why a cell is bad.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A vertex index (given) is not below the number of points.
+    Index(u32),
+    /// A vertex index (given) occurs twice.
+    Repeated(u32),
+    /// A vertex (given) has a coordinate that is NaN, infinite, or too large to compute with.
+    Coordinate(u32),
+}
+
+impl std::fmt::Display for Fault {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Index(v) => write!(f, "vertex {v} does not exist"),
+            Self::Repeated(v) => write!(f, "vertex {v} occurs twice"),
+            Self::Coordinate(v) => write!(f, "vertex {v} is not finite or beyond ±{COORDINATE_LIMIT:e}"),
+        }
+    }
+}
+
+/// What a mesh is like before any tree is built over it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Topology {
+    /// Per tetrahedron, the neighbour across the face opposite to each vertex in the caller's order; [`NONE`] where not exactly two valid
+    /// tetrahedra share the face.
+    pub neighbours: Vec<[u32; 4]>,
+    /// One bit per tetrahedron (bit t % 32 of word t / 32): boundary primitive.
+    pub boundary: Vec<u32>,
+    /// One bit per tetrahedron: not bad.
+    pub valid: Vec<u32>,
+    /// Grid over the bounds of the vertices used by valid cells, at the finest level.
+    pub grid: Grid,
+    /// Cells by kind.
+    pub counts: Counts,
+    /// The bad cells in ascending order, with the first reason found.
+    pub bad: Vec<(u32, Fault)>,
+}
+
+/// Bit `i` of packed words; false past the end.
+pub fn bit(words: &[u32], i: u32) -> bool {
+    words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
+}
+
+impl Topology {
+    /// Whether tetrahedron `tet` is part of the structure.
+    pub fn is_valid(&self, tet: u32) -> bool {
+        bit(&self.valid, tet)
+    }
+
+    /// Whether tetrahedron `tet` is a boundary primitive.
+    pub fn is_boundary(&self, tet: u32) -> bool {
+        bit(&self.boundary, tet)
+    }
+
+    /// Number of cells in the structure.
+    pub fn valid_cells(&self) -> u32 {
+        self.counts.cells - self.counts.bad
+    }
+
+    /// Refuses a mesh with bad cells (the policy `Reject`), naming the first five.
+    ///
+    /// # Errors
+    /// [`Error::BadCells`].
+    pub fn reject_bad(&self) -> Result<()> {
+        if self.bad.is_empty() {
+            return Ok(());
+        }
+        let first: Vec<String> = self.bad.iter().take(5).map(|(tet, fault)| format!("cell {tet}: {fault}")).collect();
+        Err(Error::BadCells { count: self.bad.len() as u64, first: first.join(", ") })
+    }
+}
+
+/// Computes the topology of `mesh`. Bad cells are counted and listed, never an error.
+///
+/// # Errors
+/// [`Error::TooLarge`] if the faces of the mesh, or its points, do not fit 32-bit indices.
+pub fn topology(mesh: &Mesh) -> Result<Topology> {
+    if mesh.tets.len() >= (u32::MAX / 4) as usize || mesh.points.len() >= u32::MAX as usize {
+        let (tets, points) = (mesh.tets.len(), mesh.points.len());
+        return Err(Error::TooLarge(format!("{tets} tetrahedra on {points} points; at most 2^30 and 2^32 can be indexed")));
+    }
+    let bad: Vec<_> = (0..mesh.tets.len() as u32).into_par_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect();
+    let valid = words(mesh.tets.len(), &|t| bad.binary_search_by_key(&t, |b| b.0).is_err());
+    let (lo, hi) = bounds(mesh, &valid);
+    let grid = Grid::new(lo, hi);
+    let neighbours = neighbours(mesh, &valid);
+    let normalised: Vec<_> = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
+    let signs: Vec<Signs> = mesh.tets.par_iter().enumerate().map(|(t, &ids)| Signs::new(bit(&valid, t as u32), ids, &normalised)).collect();
+    let is_boundary = |t: u32| bit(&valid, t) && on_boundary(mesh, &neighbours, &signs, t);
+    let boundary = words(mesh.tets.len(), &is_boundary);
+    let count = |pick: fn(&Signs) -> bool| signs.par_iter().filter(|s| pick(s)).count() as u32;
+    let counts = Counts {
+        cells: mesh.tets.len() as u32,
+        bad: bad.len() as u32,
+        boundary: boundary.iter().map(|w| w.count_ones()).sum(),
+        negative: count(|s| s.caller < 0),
+        flat: count(|s| s.valid && s.sorted == 0),
+    };
+    Ok(Topology { neighbours, boundary, valid, grid, counts, bad })
+}
+
+/// Packs `n` answers into words.
+fn words(n: usize, answer: &(dyn Fn(u32) -> bool + Sync)) -> Vec<u32> {
+    let word = |w: usize| (w * 32..n.min(w * 32 + 32)).fold(0, |word, t| word | u32::from(answer(t as u32)) << (t % 32));
+    (0..n.div_ceil(32)).into_par_iter().map(word).collect()
+}
+
+/// Why a tetrahedron is bad; `None` if it is not.
+pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
+    let ids = mesh.tets.get(tet as usize)?;
+    let repeated = |i: usize| ids[..i].contains(&ids[i]);
+    let point = |v: u32| mesh.points.get(v as usize);
+    let range = ids.iter().find(|&&v| point(v).is_none()).map(|&v| Fault::Index(v));
+    let range = range.or_else(|| (1..4).find(|&i| repeated(i)).map(|i| Fault::Repeated(ids[i])));
+    let usable = |v: u32| point(v).is_some_and(|p| p.iter().all(|x| x.abs() < COORDINATE_LIMIT));
+    range.or_else(|| ids.iter().find(|&&v| !usable(v)).map(|&v| Fault::Coordinate(v)))
+}
+
+fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {
+    let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    let join =
+        |a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])| ([0, 1, 2].map(|c| a.0[c].min(b.0[c])), [0, 1, 2].map(|c| a.1[c].max(b.1[c])));
+    let of = |bounds, (t, ids): (usize, &[u32; 4])| {
+        let points = ids.iter().filter(|_| bit(valid, t as u32)).map(|&v| mesh.points[v as usize].map(canonical));
+        points.fold(bounds, |b, p| join(b, (p, p)))
+    };
+    mesh.tets.par_iter().enumerate().fold(|| empty, of).reduce(|| empty, join)
+}
+
+/// The vertices of face `i` (opposite to vertex `i`) in ascending order.
+fn face(ids: [u32; 4], i: usize) -> [u32; 3] {
+    let mut face = [ids[usize::from(i == 0)], ids[1 + usize::from(i <= 1)], ids[2 + usize::from(i <= 2)]];
+    face.sort_unstable();
+    face
+}
+
+/// Faces are bucketed by their smallest vertex, and equal ones found within a bucket.
+fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
+    let faces_of = |t: usize| (0..4).map(move |i| (4 * t + i, face(mesh.tets[t], i)[0] as usize));
+    let valid_tets = || (0..mesh.tets.len()).filter(|&t| bit(valid, t as u32));
+    let mut ends = vec![0u32; mesh.points.len() + 1];
+    for (_, v) in valid_tets().flat_map(faces_of) {
+        ends[v + 1] += 1;
+    }
+    for v in 1..ends.len() {
+        ends[v] += ends[v - 1];
+    }
+    // Filling moves each bucket's start to its end.
+    let mut slots = vec![0u32; *ends.last().unwrap_or(&0) as usize];
+    for (slot, v) in valid_tets().flat_map(faces_of) {
+        slots[ends[v] as usize] = slot as u32;
+        ends[v] += 1;
+    }
+    let partner: Vec<[AtomicU32; 4]> = mesh.tets.par_iter().map(|_| [NONE; 4].map(AtomicU32::new)).collect();
+    let set = |slot: u32, tet: u32| partner[slot as usize / 4][slot as usize % 4].store(tet, Ordering::Relaxed);
+    (0..mesh.points.len()).into_par_iter().with_min_len(1024).for_each_init(Vec::new, |bucket, v| {
+        let begin = if v == 0 { 0 } else { ends[v - 1] };
+        let key = |&slot: &u32| {
+            let [_, b, c] = face(mesh.tets[slot as usize / 4], slot as usize % 4);
+            (b, c, slot)
+        };
+        bucket.clear();
+        bucket.extend(slots[begin as usize..ends[v] as usize].iter().map(key));
+        bucket.sort_unstable();
+        for same in bucket.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
+            if let [a, b] = same {
+                set(a.2, b.2 / 4);
+                set(b.2, a.2 / 4);
+            }
+        }
+    });
+    partner.into_par_iter().map(|p| p.map(AtomicU32::into_inner)).collect()
+}
+
+/// Signs of a cell's volume; all 0 for bad cells.
+#[derive(Clone, Copy)]
+struct Signs {
+    valid: bool,
+    /// With the vertices in ascending index.
+    sorted: i8,
+    /// With the vertices in the caller's order: `sorted` times the parity of the order.
+    caller: i8,
+}
+
+impl Signs {
+    fn new(valid: bool, ids: [u32; 4], normalised: &[[f32; 3]]) -> Self {
+        if !valid {
+            return Self { valid, sorted: 0, caller: 0 };
+        }
+        let tet = Tet::new(ids, normalised);
+        let volume = tet.volume();
+        let sorted = i8::from(volume > 0.0) - i8::from(volume < 0.0);
+        let inversions = (0..4).flat_map(|j| (0..j).map(move |i| (i, j))).filter(|&(i, j)| tet.rank[i] > tet.rank[j]).count();
+        Self { valid, sorted, caller: if inversions % 2 == 0 { sorted } else { -sorted } }
+    }
+}
+
+/// The side of a face, its vertices ascending, on which the vertex of rank `rank` opposite to it lies; 0 for flat cells.
+fn side(signs: Signs, rank: usize) -> i8 {
+    if rank % 2 == 1 { signs.sorted } else { -signs.sorted }
+}
+
+fn on_boundary(mesh: &Mesh, neighbours: &[[u32; 4]], signs: &[Signs], t: u32) -> bool {
+    let ids = mesh.tets[t as usize];
+    let mine = signs[t as usize];
+    let rank = |ids: [u32; 4], vertex: u32| ids.iter().filter(|&&other| other < vertex).count();
+    mine.sorted == 0
+        || (0..4).any(|i| {
+            let n = neighbours[t as usize][i];
+            if n == NONE {
+                return true;
+            }
+            let theirs = mesh.tets[n as usize];
+            let shared = face(ids, i);
+            let opposite = theirs.into_iter().find(|v| !shared.contains(v)).unwrap_or(NONE);
+            // A flat neighbour has no side; it is boundary itself.
+            side(mine, rank(ids, ids[i])) == side(signs[n as usize], rank(theirs, opposite))
+        })
+}

@@ -1,0 +1,45 @@
+//! The whole construction, as section 3.2 of the paper tells it. Twin of `src/build`.
+
+use super::boundary::Topology;
+use super::codes::Stage;
+use super::vertices::Vertices;
+use super::{depth, leaves, levels};
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::options::BuildOptions;
+use crate::tree::TreeArrays;
+
+/// Builds the tree over the valid cells of `mesh`, whose topology is `topology` (see [`super::boundary::topology`], which is stage 0: bounds and
+/// boundary marking).
+///
+/// # Errors
+/// [`Error::Invalid`] if α is not in 0…10 or the topology is that of another mesh; [`Error::TooLarge`] if the entries do not fit the capacity
+/// even in a single node, or 32 bits where there is no capacity.
+pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result<TreeArrays> {
+    if topology.neighbours.len() != mesh.tets.len() {
+        let (of, is) = (topology.neighbours.len(), mesh.tets.len());
+        return Err(Error::Invalid(format!("the topology is of a mesh of {of} tetrahedra, this mesh has {is}")));
+    }
+    let vertices = Vertices::new(mesh, &topology.grid);
+
+    // Stage 1: determine the depth of the tree.
+    let sizes = depth::measure(mesh, topology, &vertices);
+    let mut grid = topology.grid;
+    grid.level = sizes.level(options)?;
+
+    // Stage 2: calculate and sort the Morton codes of the primitives.
+    let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: options.assign };
+    let counts = stage.count();
+    let entries = stage.emit(&counts)?.sorted(grid.level);
+
+    // Stage 3: record at which levels the codes split.
+    let splits = super::splits::splits(&entries.codes, grid.level);
+
+    // Stage 4: construct the nodes bottom-up.
+    let flags = leaves::flags(&entries.primitives, &splits, mesh, topology, &vertices, &grid);
+    let boundary = levels::flags(flags, &splits);
+    let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
+    let mask = levels::masks(&splits);
+    let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
+    Ok(TreeArrays { assign: options.assign, grid, p, po, co, no, boundary, mask, boxes })
+}

@@ -1,0 +1,110 @@
+//! Stage 2: which cells a primitive lies in, as Morton codes, and their order (SPEC 2.2, the paper's Eq. 6). Twin of `glsl/build/2*`.
+
+use super::assign::Filter;
+use super::boundary::Topology;
+use super::grid::{Grid, morton};
+use super::sort::sort_pairs;
+use super::vertices::Vertices;
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::options::Assign;
+use rayon::prelude::*;
+
+/// Primitives per task.
+const CHUNK: usize = 1 << 14;
+
+/// Entries: a code and a primitive each, in one order.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Entries {
+    /// Morton code of the cell, at the level of the leaves.
+    pub codes: Vec<u32>,
+    /// Primitive that lies in it.
+    pub primitives: Vec<u32>,
+}
+
+/// The inputs of this stage.
+#[derive(Clone, Copy, Debug)]
+pub struct Stage<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Its topology.
+    pub topology: &'a Topology,
+    /// Its vertices in `grid`.
+    pub vertices: &'a Vertices,
+    /// The grid, at the level of the leaves.
+    pub grid: &'a Grid,
+    /// The assignment.
+    pub assign: Assign,
+}
+
+impl Stage<'_> {
+    /// The cells of primitive `tet` in candidate order; none if it is bad.
+    pub fn each_cell(&self, tet: u32, mut visit: impl FnMut([u32; 3])) {
+        if !self.topology.is_valid(tet) {
+            return;
+        }
+        let ids = self.mesh.tets[tet as usize];
+        let cells = self.vertices.cells(ids, self.grid.level).iter();
+        if self.assign == Assign::Aabb {
+            cells.for_each(visit);
+        } else {
+            let filter = Filter::new(&self.vertices.tet(ids), self.grid, self.grid.level, self.assign);
+            cells.filter(|&cell| filter.touches(cell)).for_each(&mut visit);
+        }
+    }
+
+    /// Number of entries of each primitive.
+    pub fn count(&self) -> Vec<u32> {
+        let count = |tet: usize| {
+            let mut n = 0;
+            if self.assign == Assign::Aabb && self.topology.is_valid(tet as u32) {
+                n = self.vertices.cells(self.mesh.tets[tet], self.grid.level).count();
+            } else {
+                self.each_cell(tet as u32, |_| n += 1);
+            }
+            n
+        };
+        (0..self.mesh.tets.len()).into_par_iter().map(count).collect()
+    }
+
+    /// Writes all entries, in primitive order and candidate order within a primitive; `counts` as [`Stage::count`] gave them.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] if 32 bits cannot count them.
+    pub fn emit(&self, counts: &[u32]) -> Result<Entries> {
+        let total: u64 = counts.par_iter().map(|&n| u64::from(n)).sum();
+        if total > u64::from(u32::MAX) {
+            return Err(Error::TooLarge(format!("{total} entries, 32-bit offsets end at {}", u32::MAX)));
+        }
+        let mut entries = Entries { codes: vec![0; total as usize], primitives: vec![0; total as usize] };
+        let (mut codes, mut primitives) = (entries.codes.as_mut_slice(), entries.primitives.as_mut_slice());
+        let mut tasks = Vec::new();
+        for (i, counts) in counts.chunks(CHUNK).enumerate() {
+            let n = counts.iter().map(|&n| n as usize).sum();
+            let (c, p);
+            (c, codes) = codes.split_at_mut(n);
+            (p, primitives) = primitives.split_at_mut(n);
+            tasks.push((i * CHUNK, counts.len(), c, p));
+        }
+        tasks.into_par_iter().for_each(|(first, n, codes, primitives)| {
+            let mut slots = codes.iter_mut().zip(primitives);
+            for tet in (first..first + n).map(|t| t as u32) {
+                self.each_cell(tet, |cell| {
+                    if let Some((code, primitive)) = slots.next() {
+                        (*code, *primitive) = (morton(cell), tet);
+                    }
+                });
+            }
+        });
+        Ok(entries)
+    }
+}
+
+impl Entries {
+    /// The entries by code, those of a code by primitive (the sort is stable and they come in primitive order).
+    #[must_use]
+    pub fn sorted(self, level: u32) -> Self {
+        let (codes, primitives) = sort_pairs(self.codes, self.primitives, 3 * level);
+        Self { codes, primitives }
+    }
+}

@@ -1,0 +1,88 @@
+//! Stage 1: the depth of the tree from the size of the primitives (SPEC 2.4, the paper's Eq. 11–12). Twin of `glsl/build/10_depth`.
+
+use super::boundary::Topology;
+use super::grid::{Grid, MAX_LEVEL, canonical};
+use super::vertices::Vertices;
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::options::BuildOptions;
+use rayon::prelude::*;
+
+/// Number of levels, and of values of `α_P`.
+const LEVELS: usize = MAX_LEVEL as usize + 1;
+
+/// What one pass over the primitives gathers: enough to choose a level, and to know the size of the tree at every level.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Sizes {
+    /// How many primitives have `α_P` = 0…10.
+    pub histogram: [u64; LEVELS],
+    /// `n_m(l)`: entries of the assignment `Aabb` at each level; an upper bound for the others.
+    pub entries: [u64; LEVELS],
+}
+
+/// `α_P`: integer log2 of the longest side of the bounding box in finest cells (Eq. 11), 0 for 0.
+pub fn log_extent(points: [[f32; 3]; 4], grid: &Grid) -> u32 {
+    let side = |c: usize| {
+        let x = points.map(|p| canonical(p[c]));
+        let size = canonical(x[0].max(x[1]).max(x[2].max(x[3])) - x[0].min(x[1]).min(x[2].min(x[3])));
+        (size * grid.inv[c]).floor().clamp(0.0, 1024.0) as u32
+    };
+    side(0).max(side(1)).max(side(2)).checked_ilog2().unwrap_or(0)
+}
+
+/// Measures all valid primitives.
+pub fn measure(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Sizes {
+    let add = |mut sizes: Sizes, (t, &ids): (usize, &[u32; 4])| {
+        if topology.is_valid(t as u32) {
+            let points = ids.map(|v| mesh.points[v as usize]);
+            sizes.histogram[log_extent(points, &topology.grid) as usize] += 1;
+            let finest = vertices.cells(ids, MAX_LEVEL);
+            for (level, entries) in sizes.entries.iter_mut().enumerate() {
+                let shift = LEVELS - 1 - level;
+                let [x, y, z] = [0, 1, 2].map(|c| u64::from((finest.hi[c] >> shift) - (finest.lo[c] >> shift) + 1));
+                *entries += x * y * z;
+            }
+        }
+        sizes
+    };
+    mesh.tets.par_iter().enumerate().fold(Sizes::default, add).reduce(Sizes::default, Sizes::sum)
+}
+
+impl Sizes {
+    fn sum(mut self, other: Self) -> Self {
+        for level in 0..LEVELS {
+            self.histogram[level] += other.histogram[level];
+            self.entries[level] += other.entries[level];
+        }
+        self
+    }
+
+    /// Eq. 12 for α in units of 1/65536, by integer comparisons: `l ≥ k ⟺ Σα_P·65536 ≤ N·((10.5 − k)·65536 − α)`.
+    pub fn heuristic(&self, alpha: u32) -> u32 {
+        let count = self.histogram.iter().sum::<u64>() as i64;
+        let sum = (0..).zip(self.histogram).map(|(a, n)| a * n as i64).sum::<i64>();
+        let reached = |k: &u32| sum * 65536 <= count * (688_128 - i64::from(*k) * 65536 - i64::from(alpha));
+        if count == 0 { 0 } else { (1..=MAX_LEVEL).rev().find(reached).unwrap_or(0) }
+    }
+
+    /// The level to build: the heuristic's, or the next coarser one whose entries fit the capacity.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits the capacity, or, without a capacity, if
+    /// the entries cannot be counted in 32 bits.
+    pub fn level(&self, options: &BuildOptions) -> Result<u32> {
+        let wanted = self.heuristic(options.alpha_fixed()?);
+        let entries = self.entries[wanted as usize];
+        let Some(capacity) = options.capacity else {
+            if entries > u64::from(u32::MAX) {
+                let text =
+                    format!("{entries} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity", u32::MAX);
+                return Err(Error::TooLarge(text));
+            }
+            return Ok(wanted);
+        };
+        let fits = |l: &u32| self.entries[*l as usize] <= u64::from(capacity);
+        let text = || format!("a tree of a single node has {} entries, the capacity is {capacity}", self.entries[0]);
+        (0..=wanted).rev().find(fits).ok_or_else(|| Error::TooLarge(text()))
+    }
+}

@@ -1,0 +1,96 @@
+//! Quantization and Morton codes (SPEC 2.1, the paper's Eq. 1–6). Twin of `glsl/shared/grid.glsl`.
+//!
+//! Every operation here is an integer one or a correctly rounded subtraction, multiplication or floor, in the same order as in
+//! the kernel, so results are bit-equal on every device.
+
+pub use crate::layout::Grid;
+
+/// Bits per axis of the finest grid (32-bit codes).
+pub const MAX_LEVEL: u32 = 10;
+/// Coordinates of this magnitude and beyond count as infinite: differences and scales stay in the range of normal numbers.
+pub const COORDINATE_LIMIT: f32 = f32::from_bits((125 + 127) << 23);
+/// An axis shorter than this (2^-103) is flat.
+pub const MIN_EXTENT: f32 = f32::from_bits((127 - 103) << 23);
+/// Normalised coordinates are multiples of 2^-42 and below 2^41, so that products of three differences neither overflow nor become
+/// denormal (devices may flush those).
+const GRID_UP: f32 = f32::from_bits((82 + 127) << 23);
+const GRID_DOWN: f32 = f32::from_bits((127 - 42) << 23);
+
+/// `x` without denormals.
+pub fn canonical(x: f32) -> f32 {
+    if x.to_bits() & 0x7f80_0000 == 0 { 0.0 } else { x }
+}
+
+impl Grid {
+    /// The grid over the closed box `[lo, hi]`, at the finest level; an empty box (`lo > hi`) gives a flat grid at 0.
+    pub fn new(lo: [f32; 3], hi: [f32; 3]) -> Self {
+        let empty = (0..3).any(|c| lo[c] > hi[c]);
+        let (lo, hi) = if empty { ([0.0; 3], [0.0; 3]) } else { (lo.map(canonical), hi.map(canonical)) };
+        let extent = [0, 1, 2].map(|c| canonical(hi[c] - lo[c]));
+        let largest = extent.into_iter().fold(MIN_EXTENT, f32::max);
+        let exponent = (largest.to_bits() >> 23) as i32 - 127;
+        let scale = f32::from_bits(((127 - exponent) as u32) << 23);
+        let inv = extent.map(|e| if e < MIN_EXTENT { 0.0 } else { 1024.0 / e });
+        let mut grid = Self { lo: pad(lo), hi: pad(hi), inv: pad(inv), extent: [0.0; 4], scale, level: MAX_LEVEL, ..Self::default() };
+        grid.extent = pad(grid.normalise(hi));
+        grid
+    }
+
+    /// Cell of the finest grid that holds `x`, clamped into the grid.
+    pub fn quantize(&self, x: [f32; 3]) -> [u32; 3] {
+        [0, 1, 2].map(|c| {
+            let q = (canonical(canonical(x[c]) - self.lo[c]) * self.inv[c]).floor();
+            q.clamp(0.0, 1023.0) as u32
+        })
+    }
+
+    /// `x` in normalised coordinates: the box's lower corner at 0, its largest extent in [2^40, 2^41).
+    pub fn normalise(&self, x: [f32; 3]) -> [f32; 3] {
+        [0, 1, 2].map(|c| {
+            let unit = canonical(canonical(canonical(x[c]) - self.lo[c]) * self.scale);
+            (unit * GRID_UP).floor() * GRID_DOWN
+        })
+    }
+}
+
+fn pad(v: [f32; 3]) -> [f32; 4] {
+    [v[0], v[1], v[2], 0.0]
+}
+
+/// Morton code of a cell: bits (x, y, z) from the most significant level down (Eq. 1).
+pub fn morton(q: [u32; 3]) -> u32 {
+    spread(q[0]) << 2 | spread(q[1]) << 1 | spread(q[2])
+}
+
+/// The cell of a Morton code.
+pub fn unmorton(code: u32) -> [u32; 3] {
+    [gather(code >> 2), gather(code >> 1), gather(code)]
+}
+
+/// Two zero bits between any two of the low ten bits of `v`.
+fn spread(v: u32) -> u32 {
+    let v = (v | v << 16) & 0x0300_00ff;
+    let v = (v | v << 8) & 0x0300_f00f;
+    let v = (v | v << 4) & 0x030c_30c3;
+    (v | v << 2) & 0x0924_9249
+}
+
+/// Inverse of [`spread`].
+fn gather(v: u32) -> u32 {
+    let v = v & 0x0924_9249;
+    let v = (v | v >> 2) & 0x030c_30c3;
+    let v = (v | v >> 4) & 0x0300_f00f;
+    let v = (v | v >> 8) & 0x0300_00ff;
+    (v | v >> 16) & 0x0000_03ff
+}
+
+/// Deterministic reciprocal of a normal `x`: a bit-trick guess and four Newton steps of correctly rounded operations, because
+/// Vulkan's division is not correctly rounded. Relative error below 2^-22; infinity of 0.
+pub fn reciprocal(x: f32) -> f32 {
+    let mut r = f32::from_bits(0x7ef3_11c7u32.wrapping_sub(x.to_bits() & 0x7fff_ffff));
+    let a = x.abs();
+    for _ in 0..4 {
+        r *= 2.0 - a * r;
+    }
+    if x < 0.0 { -r } else { r }
+}

@@ -1,0 +1,70 @@
+//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_leaves`.
+
+use super::assign::{cell_centre, half_cell};
+use super::boundary::{Topology, bit};
+use super::grid::{Grid, canonical, unmorton};
+use super::separate::box_touches;
+use super::splits::Splits;
+use super::tet::sub;
+use super::vertices::Vertices;
+use crate::mesh::Mesh;
+use rayon::prelude::*;
+
+/// A box as `[lo, hi]`, x y z each.
+pub type Box6 = [f32; 6];
+
+/// The box of the cell with Morton code `code` at `level`, in the units of the mesh: per axis from `lo + extent·(k·2^-l)` to
+/// `lo + extent·((k+1)·2^-l)` without denormals, where `extent = hi − lo`. The far side of the last cell is `hi` to the bit. On an axis that is
+/// flat to the quantization (`inv = 0`) cell 0 stands for everything: `[lo, hi]`.
+pub fn cell_box(grid: &Grid, level: u32, code: u32) -> Box6 {
+    let cells = 1u32 << level;
+    let size = f32::from_bits((127 - level) << 23);
+    let cell = unmorton(code);
+    let at = |c: usize, k: u32| {
+        if k == 0 {
+            grid.lo[c]
+        } else if k == cells || grid.inv[c] == 0.0 {
+            grid.hi[c]
+        } else {
+            canonical(grid.lo[c] + canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size))
+        }
+    };
+    let [x, y, z] = cell;
+    [at(0, x), at(1, y), at(2, z), at(0, x + 1), at(1, y + 1), at(2, z + 1)]
+}
+
+/// Entries of a leaf without boundary primitives that are asked whether they touch its cell.
+pub const ASKED: usize = 16;
+
+/// Boundary flag of a leaf: set if one of its primitives is one; also if none of the first [`ASKED`] primitives touches the cell. The bounding box
+/// of an inner primitive can reach out of the mesh into cells where no boundary primitive is listed, and those are outside as a whole. A cell that
+/// is touched and holds no part of the surface is full of mesh, and only such a leaf's flag is 0 (SPEC 2.3).
+pub fn flag(listed: &[u32], code: u32, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> bool {
+    if listed.iter().any(|&p| bit(&topology.boundary, p)) {
+        return true;
+    }
+    let half = half_cell(grid, grid.level);
+    let centre = cell_centre(half, unmorton(code));
+    let axes = [[half[0], 0.0, 0.0], [0.0, half[1], 0.0], [0.0, 0.0, half[2]]];
+    let touches = |&p: &u32| box_touches(&vertices.tet(mesh.tets[p as usize]).v.map(|v| sub(v, centre)), &axes, [0.0; 3]);
+    !listed.is_empty() && !listed.iter().take(ASKED).any(touches)
+}
+
+/// Boundary flag of each leaf.
+pub fn flags(primitives: &[u32], splits: &Splits, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> Vec<bool> {
+    let first = first_leaf(&splits.no);
+    // The first leaf begins at 0; see `TreeArrays::entries`.
+    let begin = |j: usize| if splits.po[j] >= splits.po[j + 1] { 0 } else { splits.po[j] as usize };
+    let listed = |j: usize| &primitives[begin(j)..splits.po[j + 1] as usize];
+    (first..splits.codes.len()).into_par_iter().map(|j| flag(listed(j), splits.codes[j], mesh, topology, vertices, grid)).collect()
+}
+
+/// Box of each leaf.
+pub fn boxes(splits: &Splits, grid: &Grid) -> Vec<Box6> {
+    let first = first_leaf(&splits.no);
+    splits.codes[first..].par_iter().map(|&code| cell_box(grid, grid.level, code)).collect()
+}
+
+fn first_leaf(no: &[u32]) -> usize {
+    if no.len() < 2 { 0 } else { no[no.len() - 2] as usize }
+}

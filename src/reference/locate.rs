@@ -1,0 +1,154 @@
+//! Point location over lists: every point has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
+
+use super::boundary::NONE;
+use super::grid::{Grid, MAX_LEVEL, canonical, morton};
+use super::tet::{Tet, Vec3, Weights};
+use super::traverse::{Node, traverse_leaves};
+use crate::mesh::{Field, Mesh, On};
+use crate::tree::TreeArrays;
+use rayon::prelude::*;
+use std::ops::ControlFlow;
+
+/// Default tolerance: how far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
+pub const TOLERANCE: f32 = 1e-5;
+
+/// Where a point lies.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Location {
+    /// Primitive that owns the point, or [`NONE`].
+    pub owner: u32,
+    /// Barycentric coordinates in the caller's order of the owner's vertices; all 0 without an owner.
+    pub barycentric: [f32; 4],
+}
+
+impl Location {
+    /// No owner.
+    pub const NOWHERE: Self = Self { owner: NONE, barycentric: [0.0; 4] };
+
+    /// The owner, if there is one.
+    pub fn found(&self) -> Option<u32> {
+        (self.owner != NONE).then_some(self.owner)
+    }
+}
+
+/// The finest cell of a point and its normalised coordinates, or `None` where no mesh can be: a coordinate is NaN or infinite, or
+/// `(p − lo)·scale` is not in [−1, 3] (the bounds reach from 0 to less than 2). Points just outside the bounds belong to the nearest cell.
+pub fn place(grid: &Grid, p: [f32; 3]) -> Option<([u32; 3], Vec3)> {
+    let near = |c: usize| (-1.0..=3.0).contains(&(canonical(canonical(p[c]) - grid.lo[c]) * grid.scale));
+    (near(0) && near(1) && near(2)).then(|| (grid.quantize(p), grid.normalise(p)))
+}
+
+/// Answers point queries about one mesh and its (valid) tree.
+#[derive(Clone, Debug)]
+pub struct Locator<'a> {
+    mesh: &'a Mesh,
+    tree: &'a TreeArrays,
+    normalised: Vec<Vec3>,
+    tolerance: f32,
+}
+
+/// The best of several cells none of which contains the point.
+struct Nearest {
+    owner: u32,
+    in_box: bool,
+    smallest: f32,
+    barycentric: [f32; 4],
+}
+
+impl<'a> Locator<'a> {
+    /// Prepares queries with the default tolerance. `tree` must have been built over `mesh`.
+    pub fn new(mesh: &'a Mesh, tree: &'a TreeArrays) -> Self {
+        let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
+        Self { mesh, tree, normalised, tolerance: TOLERANCE }
+    }
+
+    /// The same with another tolerance (see [`TOLERANCE`]).
+    #[must_use]
+    pub fn with_tolerance(self, tolerance: f32) -> Self {
+        Self { tolerance, ..self }
+    }
+
+    /// The owner of `p`: of the primitives listed in the point's leaf, the lowest id that contains it. If none does, the nearest: one whose box
+    /// holds the point before others, then the largest smallest barycentric coordinate, then the lowest id, flat cells never; in a boundary
+    /// leaf only if that coordinate reaches −tolerance.
+    pub fn locate(&self, p: [f32; 3]) -> Location {
+        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
+        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, x))
+    }
+
+    /// As [`Locator::locate`], but first looks whether `hint` (any number, such as the owner of the last point) contains the point clearly (see
+    /// [`Weights::clear`]), and if so takes it: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
+    pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
+        let usable = |t: &&[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.normalised.len() && !t[..i].contains(&v));
+        if let (Some((_, x)), Some(&ids)) = (place(&self.tree.grid, p), self.mesh.tets.get(hint as usize).filter(usable)) {
+            let tet = Tet::new(ids, &self.normalised);
+            let weights = tet.weights(x);
+            if weights.clear {
+                return Location { owner: hint, barycentric: weights.barycentric(tet.rank) };
+            }
+        }
+        self.locate(p)
+    }
+
+    /// Every primitive that contains `p`, ascending; if none does, the owner alone.
+    pub fn owners(&self, p: [f32; 3]) -> Vec<u32> {
+        let Some((cell, x)) = place(&self.tree.grid, p) else { return Vec::new() };
+        let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };
+        let inside = |&&t: &&u32| self.weights(t, x).1.inside;
+        let owners: Vec<u32> = self.tree.primitives(leaf).iter().filter(inside).copied().collect();
+        if owners.is_empty() { self.in_leaf(leaf, x).found().into_iter().collect() } else { owners }
+    }
+
+    /// As [`Locator::locate`], through the paper's traversal with a stack of `stack` nodes instead of the descent.
+    pub fn locate_by_traversal(&self, p: [f32; 3], stack: usize) -> Location {
+        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
+        let code = morton(cell);
+        let holds = |node: Node| node.code == code >> (3 * (MAX_LEVEL - node.level));
+        let mut location = Location::NOWHERE;
+        traverse_leaves(self.tree, stack, holds, |leaf| {
+            location = self.in_leaf(leaf.index, x);
+            ControlFlow::Break(())
+        });
+        location
+    }
+
+    /// [`Locator::locate`] for many points, in parallel.
+    pub fn locate_all(&self, points: &[[f32; 3]]) -> Vec<Location> {
+        points.par_iter().map(|&p| self.locate(p)).collect()
+    }
+
+    /// The field's value at a location: `(b0·v0 + b1·v1) + (b2·v2 + b3·v3)` over the owner's vertices in the caller's order, or the owner's value
+    /// of a field on cells. NaN without an owner, or where the field is too short.
+    pub fn value(&self, field: &Field, location: &Location) -> f32 {
+        let at = |i: u32| field.values.get(i as usize).copied().unwrap_or(f32::NAN);
+        let Some(&ids) = self.mesh.tets.get(location.owner as usize) else { return f32::NAN };
+        let (b, v) = (location.barycentric, ids.map(at));
+        match field.on {
+            On::Points => (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3]),
+            On::Cells => at(location.owner),
+        }
+    }
+
+    fn weights(&self, tet: u32, x: Vec3) -> (Tet, Weights) {
+        let tet = Tet::new(self.mesh.tets[tet as usize], &self.normalised);
+        (tet, tet.weights(x))
+    }
+
+    /// The owner among the primitives of a leaf.
+    fn in_leaf(&self, leaf: u32, x: Vec3) -> Location {
+        let mut best: Option<Nearest> = None;
+        for &t in self.tree.primitives(leaf) {
+            let (tet, weights) = self.weights(t, x);
+            if weights.inside {
+                return Location { owner: t, barycentric: weights.barycentric(tet.rank) };
+            }
+            let (in_box, smallest) = (weights.in_box, weights.smallest());
+            let better = best.as_ref().is_none_or(|b| (in_box && !b.in_box) || (in_box == b.in_box && smallest > b.smallest));
+            if better && tet.volume() != 0.0 {
+                best = Some(Nearest { owner: t, in_box, smallest, barycentric: weights.barycentric(tet.rank) });
+            }
+        }
+        let close = |b: &Nearest| !self.tree.is_boundary(leaf) || b.smallest >= -self.tolerance;
+        best.filter(close).map_or(Location::NOWHERE, |b| Location { owner: b.owner, barycentric: b.barycentric })
+    }
+}

@@ -1,0 +1,363 @@
+//! Overlap of two meshes (SPEC 3.5): which primitives of either intersect the other mesh, and which pairs. Twin of `glsl/query/overlap_*`.
+//!
+//! Both meshes lie in one space; their trees have grids of their own. Geometry between them is computed in normalised coordinates of the
+//! [`joint_grid`] over both bounds.
+//!
+//! # Sets
+//! For either mesh (its own: A, the other: B), all of it by inference until the last step:
+//! 1. A vertex of A in a cell of a non-boundary leaf of B lies in B. One in a boundary leaf is looked for in the leaf's list; the tetrahedron
+//!    of B that holds it intersects A. A primitive of A with a vertex in B intersects B.
+//! 2. Of the others, those whose box meets the bounds of B descend B's tree over the cells of their box: a primitive that touches the box of a
+//!    non-boundary node, 2^18 (about 2^-22 of the joint bounds) larger on each side, intersects B. No node below is looked at.
+//! 3. Those that still are undecided are tested by separating axes against the primitives of boundary leaves, up to the first that touches:
+//!    the narrow phase. With the assignment `Aabb` each pair is tested once, in the cell of the lower corner of the two boxes' intersection.
+//!
+//! All roundings are below 2^-21 of the joint bounds, so only pairs nearer to touching than 1e-6 of the scene's diagonal can go either way.
+//!
+//! # Pairs
+//! No inference is possible: all pairs of primitives whose boxes meet are tested, found through the cells of B. The sets are those of the
+//! primitives in pairs then.
+
+use super::boundary::{Topology, bit};
+use super::grid::{Grid, MAX_LEVEL, canonical, unmorton};
+use super::leaf_walk::{meets, walk_leaves};
+use super::separate::{box_touches, tets_touch};
+use super::tet::{Tet, Vec3, sub};
+use super::traverse::Node;
+use super::vertices::CellRange;
+use crate::layout::NodeFrame;
+use crate::mesh::Mesh;
+use crate::options::Assign;
+use crate::tree::TreeArrays;
+use rayon::prelude::*;
+
+/// A mesh with its topology and tree.
+#[derive(Clone, Copy)]
+pub struct Side<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// Its topology.
+    pub topology: &'a Topology,
+    /// Its tree.
+    pub tree: &'a TreeArrays,
+}
+
+/// What one direction took.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Effort {
+    /// Primitives with a vertex in the other mesh, or around one of its vertices.
+    pub by_vertex: u32,
+    /// Primitives that touch a non-boundary node of the other tree.
+    pub by_node: u32,
+    /// Primitives that needed a search in the other tree.
+    pub searched: u32,
+    /// Vertices that were looked up in the list of a leaf.
+    pub located: u32,
+    /// Tests of two tetrahedra by separating axes.
+    pub narrow: u64,
+}
+
+/// What intersects what.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Overlap {
+    /// Primitives of A that intersect B, ascending.
+    pub a: Vec<u32>,
+    /// Primitives of B that intersect A, ascending.
+    pub b: Vec<u32>,
+    /// Intersecting pairs, ascending by A then B, if asked for.
+    pub pairs: Option<Vec<[u32; 2]>>,
+    /// What A against B took, and B against A.
+    pub effort: [Effort; 2],
+}
+
+/// The grid over the bounds of both meshes; one without valid cells does not count.
+pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
+    let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+    match valid {
+        [true, false] => Grid::new(three(a.lo), three(a.hi)),
+        [false, _] => Grid::new(three(b.lo), three(b.hi)),
+        [true, true] => {
+            let lo = [0, 1, 2].map(|c| a.lo[c].min(b.lo[c]));
+            Grid::new(lo, [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])))
+        }
+    }
+}
+
+/// The cells of the tree with grid `grid` in normalised coordinates of the joint grid.
+pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
+    let corner = joint.normalise([grid.lo[0], grid.lo[1], grid.lo[2]]);
+    let half = [0, 1, 2].map(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * f32::from_bits((39 + 127) << 23));
+    let flat = [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { 1.0 } else { 0.0 });
+    let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
+    NodeFrame {
+        corner: pad(corner),
+        half_size: pad(half),
+        flat_axis: pad(flat),
+        joint_lo: joint.lo,
+        scale: joint.scale,
+        ..NodeFrame::default()
+    }
+}
+
+/// Centre and half size, allowance included, of the box of a node.
+fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
+    let two_to = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
+    let cell = unmorton(node.code);
+    let half =
+        [0, 1, 2].map(|c| if frame.flat_axis[c] == 0.0 { frame.half_size[c] * two_to(-(node.level as i32)) } else { frame.half_size[c] });
+    let at = |c: usize| frame.corner[c] + (2 * cell[c] + 1) as f32 * half[c];
+    let centre = [0, 1, 2].map(|c| (at(c) * two_to(42)).floor() * two_to(-42));
+    (centre, half.map(|h| h + two_to(18)))
+}
+
+/// Closed box of a primitive in the units of the mesh.
+fn raw_box(mesh: &Mesh, t: u32) -> (Vec3, Vec3) {
+    let v = mesh.tets[t as usize].map(|i| mesh.points[i as usize].map(canonical));
+    let fold = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|c| pick(pick(v[0][c], v[1][c]), pick(v[2][c], v[3][c])));
+    (fold(f32::min), fold(f32::max))
+}
+
+fn boxes_meet(a: &(Vec3, Vec3), b: &(Vec3, Vec3)) -> bool {
+    (0..3).all(|c| a.0[c] <= b.1[c] && b.0[c] <= a.1[c])
+}
+
+/// One direction: the primitives of `own` against the tree of `other`.
+struct Direction<'a> {
+    own: Side<'a>,
+    other: Side<'a>,
+    own_joint: &'a [Vec3],
+    other_joint: &'a [Vec3],
+    frame: NodeFrame,
+}
+
+/// Where a vertex lies, as far as is known.
+#[derive(Clone, Copy, PartialEq)]
+enum Place {
+    Outside,
+    Inside,
+    In(u32),
+}
+
+impl Direction<'_> {
+    /// Whether a vertex lies in the other mesh; and whether that needed a list.
+    fn place(&self, point: [f32; 3], other_normalised: &[Vec3]) -> (Place, bool) {
+        let grid = &self.other.tree.grid;
+        let p = point.map(canonical);
+        if !(0..3).all(|c| grid.lo[c] <= p[c] && p[c] <= grid.hi[c]) {
+            return (Place::Outside, false);
+        }
+        let tree = self.other.tree;
+        match tree.find_leaf(grid.quantize(p)) {
+            None => (Place::Outside, false),
+            Some(leaf) if !tree.is_boundary(leaf) && !tree.p.is_empty() => (Place::Inside, false),
+            Some(leaf) => {
+                let x = grid.normalise(p);
+                let holds = |&&t: &&u32| Tet::new(self.other.mesh.tets[t as usize], other_normalised).weights(x).inside;
+                (tree.primitives(leaf).iter().find(holds).map_or(Place::Outside, |&t| Place::In(t)), true)
+            }
+        }
+    }
+
+    fn own_tet(&self, t: u32) -> [Vec3; 4] {
+        Tet::new(self.own.mesh.tets[t as usize], self.own_joint).v
+    }
+
+    fn other_tet(&self, t: u32) -> [Vec3; 4] {
+        Tet::new(self.other.mesh.tets[t as usize], self.other_joint).v
+    }
+
+    /// Finest cells of the other grid that a box meets.
+    fn cells(&self, bounds: &(Vec3, Vec3)) -> CellRange {
+        CellRange { lo: self.other.tree.grid.quantize(bounds.0), hi: self.other.tree.grid.quantize(bounds.1) }
+    }
+
+    /// Whether primitives with these boxes are compared in that leaf.
+    fn compared_in(&self, leaf: Node, own: &(Vec3, Vec3), other: &(Vec3, Vec3)) -> bool {
+        if !boxes_meet(own, other) {
+            return false;
+        }
+        if self.other.tree.assign != Assign::Aabb {
+            return true;
+        }
+        let corner = [0, 1, 2].map(|c| own.0[c].max(other.0[c]));
+        self.other.tree.grid.quantize(corner).map(|q| q >> (MAX_LEVEL - leaf.level)) == unmorton(leaf.code)
+    }
+
+    /// Steps 2 and 3.
+    fn search(&self, t: u32, effort: &mut Effort) -> bool {
+        let (bounds, v) = (raw_box(self.own.mesh, t), self.own_tet(t));
+        let (cells, tree) = (self.cells(&bounds), self.other.tree);
+        let mut found = false;
+        let inner = |node: Node| {
+            if found || !meets(node, &cells) {
+                return false;
+            }
+            if tree.is_boundary(node.index) {
+                return node.level < tree.grid.level;
+            }
+            let (centre, h) = node_box(&self.frame, node);
+            let half = [[h[0], 0.0, 0.0], [0.0, h[1], 0.0], [0.0, 0.0, h[2]]];
+            found = box_touches(&v.map(|p| sub(p, centre)), &half, [0.0; 3]);
+            false
+        };
+        walk_leaves(tree, inner, |_| false);
+        if found {
+            effort.by_node += 1;
+            return true;
+        }
+        walk_leaves(
+            tree,
+            |node| tree.is_boundary(node.index) && meets(node, &cells),
+            |leaf| {
+                let touches = |&&b: &&u32| {
+                    let compared = self.compared_in(leaf, &bounds, &raw_box(self.other.mesh, b));
+                    effort.narrow += u64::from(compared);
+                    compared && tets_touch(&v, &self.other_tet(b))
+                };
+                found = tree.primitives(leaf.index).iter().find(touches).is_some();
+                found
+            },
+        );
+        found
+    }
+
+    /// Everything that touches primitive `t`, ascending.
+    fn partners(&self, t: u32, effort: &mut Effort) -> Vec<u32> {
+        let (bounds, v) = (raw_box(self.own.mesh, t), self.own_tet(t));
+        let (cells, tree) = (self.cells(&bounds), self.other.tree);
+        let mut partners = Vec::new();
+        walk_leaves(
+            tree,
+            |node| meets(node, &cells),
+            |leaf| {
+                for &b in tree.primitives(leaf.index) {
+                    if self.compared_in(leaf, &bounds, &raw_box(self.other.mesh, b)) {
+                        effort.narrow += 1;
+                        if tets_touch(&v, &self.other_tet(b)) {
+                            partners.push(b);
+                        }
+                    }
+                }
+                false
+            },
+        );
+        partners.sort_unstable();
+        partners.dedup();
+        partners
+    }
+
+    fn bounds_meet(&self, t: u32) -> bool {
+        let grid = &self.other.tree.grid;
+        let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+        boxes_meet(&raw_box(self.own.mesh, t), &(three(grid.lo), three(grid.hi)))
+    }
+}
+
+/// Step 1 of one direction: the places of the vertices of used by valid cells.
+fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
+    let Side { mesh, topology, .. } = direction.own;
+    let mut used = vec![false; mesh.points.len()];
+    for (t, ids) in (0..).zip(&mesh.tets) {
+        if topology.is_valid(t) {
+            for &v in ids {
+                used[v as usize] = true;
+            }
+        }
+    }
+    let normalised: Vec<Vec3> = direction.other.mesh.points.par_iter().map(|&p| direction.other.tree.grid.normalise(p)).collect();
+    let place = |(&p, &used): (&[f32; 3], &bool)| if used { direction.place(p, &normalised) } else { (Place::Outside, false) };
+    let places: Vec<(Place, bool)> = mesh.points.par_iter().zip(&used).map(place).collect();
+    effort.located = places.iter().filter(|p| p.1).count() as u32;
+    places.into_iter().map(|p| p.0).collect()
+}
+
+/// Steps 1 to 3 of one direction, `around`: primitives of its own around a vertex of the other mesh.
+fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Effort) -> Vec<u32> {
+    let Side { mesh, topology, .. } = direction.own;
+    let one = |t: u32| {
+        let mut effort = Effort::default();
+        if !topology.is_valid(t) {
+            return (false, effort);
+        }
+        let ids = mesh.tets[t as usize];
+        if bit(around, t) || ids.iter().any(|&v| places[v as usize] != Place::Outside) {
+            effort.by_vertex = 1;
+            return (true, effort);
+        }
+        if !direction.bounds_meet(t) {
+            return (false, effort);
+        }
+        effort.searched = 1;
+        (direction.search(t, &mut effort), effort)
+    };
+    let answers: Vec<(bool, Effort)> = (0..mesh.tets.len() as u32).into_par_iter().map(one).collect();
+    for (_, e) in &answers {
+        effort.add(e);
+    }
+    (0..).zip(&answers).filter(|(_, answer)| answer.0).map(|(t, _)| t).collect()
+}
+
+impl Effort {
+    fn add(&mut self, other: &Self) {
+        self.by_vertex += other.by_vertex;
+        self.by_node += other.by_node;
+        self.searched += other.searched;
+        self.located += other.located;
+        self.narrow += other.narrow;
+    }
+}
+
+/// Overlap of A and B, with all pairs if `pairs`. The trees must have been built over these meshes.
+pub fn overlap(a: Side, b: Side, pairs: bool) -> Overlap {
+    let mut overlap = Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() };
+    let valid = [a, b].map(|s| s.topology.valid_cells() > 0);
+    if valid.contains(&false) {
+        return overlap;
+    }
+    let joint = joint_grid(&a.tree.grid, &b.tree.grid, valid);
+    let [in_a, in_b] = [a, b].map(|s| s.mesh.points.par_iter().map(|&p| joint.normalise(p)).collect::<Vec<Vec3>>());
+    let forth = Direction { own: a, other: b, own_joint: &in_a, other_joint: &in_b, frame: node_frame(&b.tree.grid, &joint) };
+    let back = Direction { own: b, other: a, own_joint: &in_b, other_joint: &in_a, frame: node_frame(&a.tree.grid, &joint) };
+    if pairs {
+        let one = |t: u32| {
+            let mut effort = Effort::default();
+            let of = if a.topology.is_valid(t) && forth.bounds_meet(t) { forth.partners(t, &mut effort) } else { Vec::new() };
+            (of, effort)
+        };
+        let found: Vec<(Vec<u32>, Effort)> = (0..a.mesh.tets.len() as u32).into_par_iter().map(one).collect();
+        for (_, effort) in &found {
+            overlap.effort[0].add(effort);
+        }
+        let all: Vec<[u32; 2]> = (0..).zip(&found).flat_map(|(t, (of, _))| of.iter().map(move |&b| [t, b])).collect();
+        (overlap.a, overlap.b) = members(&all);
+        overlap.pairs = Some(all);
+        return overlap;
+    }
+    let [mut effort_a, mut effort_b] = overlap.effort;
+    let (places_a, places_b) = (places(&forth, &mut effort_a), places(&back, &mut effort_b));
+    let around = |places: &[Place], tets: usize| {
+        let mut bits = vec![0u32; tets.div_ceil(32)];
+        for place in places {
+            if let Place::In(t) = place {
+                bits[(t / 32) as usize] |= 1 << (t % 32);
+            }
+        }
+        bits
+    };
+    let (around_a, around_b) = (around(&places_b, a.mesh.tets.len()), around(&places_a, b.mesh.tets.len()));
+    overlap.a = sets(&forth, &places_a, &around_a, &mut effort_a);
+    overlap.b = sets(&back, &places_b, &around_b, &mut effort_b);
+    overlap.effort = [effort_a, effort_b];
+    overlap
+}
+
+/// The primitives that occur in pairs, ascending, each once.
+pub fn members(pairs: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
+    let of = |side: usize| {
+        let mut ids: Vec<u32> = pairs.iter().map(|p| p[side]).collect();
+        ids.par_sort_unstable();
+        ids.dedup();
+        ids
+    };
+    (of(0), of(1))
+}

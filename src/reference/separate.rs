@@ -1,0 +1,182 @@
+//! Separating axes of tetrahedra and boxes, and the point of a tetrahedron nearest to another one. Twin of `glsl/shared/separate.glsl`: the same
+//! operations in the same order. All in normalised coordinates (differences below 2^43, multiples of 2^-42: no product of three overflows or becomes
+//! denormal).
+//!
+//! **Box and tetrahedron**, [`box_touches`]: the box has its centre at the origin and half axes h. 25 axes: its three axes, four face normals of the
+//! tetrahedron, 18 crosses of edges and box axes. Axis L separates if the interval of the vertices' products `L·v` lies outside
+//! ±(Σ|L·h| + `bound·slack`), where `bound` sums the absolute products that L consists of. With a slack of [`touch_slack`], 2^-20 of what is
+//! added up in it, that is at least twice the sum of all roundings: a tetrahedron that touches the box is never called apart, and one that is
+//! called touching is apart by no more than about 2^-19 of box and tetrahedron.
+//!
+//! **Two tetrahedra**, [`tets_touch`]: 8 face normals and 36 crosses of edges, no allowance: touching counts. The answer for (a, b) is that for
+//! (b, a) to the bit, because every difference and cross product changes nothing but its sign.
+
+use super::grid::{canonical, reciprocal};
+use super::tet::{Vec3, cross, dot, sub};
+
+const fn two_to(n: i32) -> f32 {
+    f32::from_bits(((n + 127) as u32) << 23)
+}
+
+/// The vertices of the face opposite to vertex i.
+const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+/// Edges, and the two vertices that are not on them.
+const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
+
+fn abs(a: Vec3) -> Vec3 {
+    a.map(f32::abs)
+}
+
+fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
+    let [a, b] = [abs(a), abs(b)];
+    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
+}
+
+/// Smallest and largest of four.
+fn range4(x: [f32; 4]) -> (f32, f32) {
+    (x[0].min(x[1]).min(x[2].min(x[3])), x[0].max(x[1]).max(x[2].max(x[3])))
+}
+
+/// Closed box of four points.
+pub fn bounds(v: &[Vec3; 4]) -> (Vec3, Vec3) {
+    let range = [0, 1, 2].map(|c| range4(v.map(|p| p[c])));
+    (range.map(|r| r.0), range.map(|r| r.1))
+}
+
+/// The allowance of [`box_touches`] for vertices `v` (relative to the centre of the box) and half axes `h`: per axis 2^-20 of the largest coordinate
+/// of a vertex and of the box, and 2^-42.
+pub fn touch_slack(v: &[Vec3; 4], h: &[Vec3; 3]) -> Vec3 {
+    let (lo, hi) = bounds(v);
+    [0, 1, 2].map(|c| {
+        let far = hi[c].abs().max(lo[c].abs());
+        let extent = (h[0][c].abs() + h[1][c].abs()) + h[2][c].abs();
+        (far + extent) * two_to(-20) + two_to(-42)
+    })
+}
+
+/// Whether the closed tetrahedron `v` and the closed box with its centre at 0 and the half axes `h` touch, with that allowance.
+pub fn box_touches(v: &[Vec3; 4], h: &[Vec3; 3], slack: Vec3) -> bool {
+    let apart = |axis: Vec3, bound: Vec3| {
+        let (lo, hi) = range4(v.map(|p| dot(axis, p)));
+        let radius = (dot(axis, h[0]).abs() + dot(axis, h[1]).abs()) + dot(axis, h[2]).abs();
+        let limit = radius + dot(bound, slack);
+        lo > limit || hi < -limit
+    };
+    if h.iter().any(|&a| apart(a, abs(a))) {
+        return false;
+    }
+    let product_apart = |a: Vec3, b: Vec3| apart(cross(a, b), cross_bound(a, b));
+    if FACES.iter().any(|&[p, q, r]| product_apart(sub(v[q], v[p]), sub(v[r], v[p]))) {
+        return false;
+    }
+    !EDGES.iter().any(|&[p, q, ..]| {
+        let along = sub(v[q], v[p]);
+        h.iter().any(|&a| product_apart(along, a))
+    })
+}
+
+/// Whether a face normal of `a` separates it from `b`.
+fn face_separates(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
+    (0..4).any(|i| {
+        let [p, q, r] = FACES[i];
+        let normal = cross(sub(a[q], a[p]), sub(a[r], a[p]));
+        let own = dot(normal, sub(a[i], a[p]));
+        let (lo, hi) = range4(b.map(|x| dot(normal, sub(x, a[p]))));
+        lo > own.max(0.0) || hi < own.min(0.0)
+    })
+}
+
+/// Whether two closed tetrahedra touch.
+pub fn tets_touch(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
+    if face_separates(a, b) || face_separates(b, a) {
+        return false;
+    }
+    for [p, q, m, n] in EDGES {
+        let along_a = sub(a[q], a[p]);
+        let (am, an) = (sub(a[m], a[p]), sub(a[n], a[p]));
+        for [r, s, k, l] in EDGES {
+            let axis = cross(along_a, sub(b[s], b[r]));
+            let (tm, tn) = (dot(axis, am), dot(axis, an));
+            let (uk, ul) = (dot(axis, sub(b[k], b[r])), dot(axis, sub(b[l], b[r])));
+            let (a_lo, a_hi) = (tm.min(tn).min(0.0), tm.max(tn).max(0.0));
+            let (b_lo, b_hi) = (uk.min(ul).min(0.0), uk.max(ul).max(0.0));
+            let offset = dot(axis, sub(b[r], a[p]));
+            if offset > a_hi - b_lo || offset < a_lo - b_hi {
+                return false;
+            }
+        }
+    }
+    true
+}
+
+/// A point of a tetrahedron near 0.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Closest {
+    /// Squared distance, scaled by 2^-42, never below that of the tetrahedron's box.
+    pub square: f32,
+    /// Barycentric coordinates of the point, in the order of the vertices.
+    pub weights: [f32; 4],
+}
+
+/// Squared distance of the box of `v` to 0, scaled by 2^-42.
+pub fn box_square(v: &[Vec3; 4]) -> f32 {
+    let (lo, hi) = bounds(v);
+    let d = [0, 1, 2].map(|c| (lo[c].max(-hi[c]).max(0.0)) * two_to(-21));
+    dot(d, d)
+}
+
+/// The point of the triangle `a b c` nearest to 0, by its weights. (The regions of a triangle as in Ericson, Real-Time Collision Detection, 5.1.5;
+/// quotients by [`reciprocal`], products of products without denormals.)
+fn closest_in_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
+    let (ab, ac) = (sub(b, a), sub(c, a));
+    let (d1, d2) = (-dot(ab, a), -dot(ac, a));
+    if d1 <= 0.0 && d2 <= 0.0 {
+        return [1.0, 0.0, 0.0];
+    }
+    let (d3, d4) = (-dot(ab, b), -dot(ac, b));
+    if d3 >= 0.0 && d4 <= d3 {
+        return [0.0, 1.0, 0.0];
+    }
+    let (d5, d6) = (-dot(ab, c), -dot(ac, c));
+    if d6 >= 0.0 && d5 <= d6 {
+        return [0.0, 0.0, 1.0];
+    }
+    let part = |x: f32, whole: f32| if whole <= 0.0 { 0.0 } else { (x * reciprocal(whole)).clamp(0.0, 1.0) };
+    let area = |x: f32, y: f32, z: f32, w: f32| canonical(x * y) - canonical(z * w);
+    let vc = canonical(area(d1, d4, d3, d2));
+    if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
+        let t = part(d1, d1 - d3);
+        return [1.0 - t, t, 0.0];
+    }
+    let vb = canonical(area(d5, d2, d1, d6));
+    if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
+        let t = part(d2, d2 - d6);
+        return [1.0 - t, 0.0, t];
+    }
+    let va = canonical(area(d3, d6, d5, d4));
+    let (d43, d56) = (d4 - d3, d5 - d6);
+    if va <= 0.0 && d43 >= 0.0 && d56 >= 0.0 {
+        let t = part(d43, d43 + d56);
+        return [0.0, 1.0 - t, t];
+    }
+    let sum = (va + vb) + vc;
+    let (v, w) = (part(vb, sum), part(vc, sum));
+    [(1.0 - v) - w, v, w]
+}
+
+/// The point of the surface of the tetrahedron `v` nearest to 0; of faces equally near, the one opposite to the first vertex.
+pub fn closest(v: &[Vec3; 4]) -> Closest {
+    let s = v.map(|p| p.map(|x| x * two_to(-21)));
+    let mut best = Closest { square: f32::MAX, weights: [0.0; 4] };
+    for [p, q, r] in FACES {
+        let w = closest_in_triangle(s[p], s[q], s[r]);
+        let at = [0, 1, 2].map(|c| (w[0] * s[p][c] + w[1] * s[q][c]) + w[2] * s[r][c]);
+        let square = canonical(canonical(canonical(at[0] * at[0]) + canonical(at[1] * at[1])) + canonical(at[2] * at[2]));
+        if square < best.square {
+            best = Closest { square, weights: [0.0; 4] };
+            [best.weights[p], best.weights[q], best.weights[r]] = w;
+        }
+    }
+    best.square = best.square.max(box_square(v));
+    best
+}

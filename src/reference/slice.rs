@@ -1,0 +1,163 @@
+//! Conservative slicing (SPEC 3.4): value, kind and owner of every voxel. Twin of `glsl/query/slice_locate` and `slice_touch`.
+
+use super::boundary::{NONE, Topology};
+use super::leaf_walk::{meets, reached_cells, walk_leaves};
+use super::locate::{Location, Locator, place};
+use super::separate::{Closest, box_square, box_touches, closest, touch_slack};
+use super::tet::{Tet, Vec3, sub};
+use crate::error::Result;
+use crate::layout::SlicePlan;
+use crate::mesh::{Field, Mesh, On};
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, RUN, Rows, TOUCHED, VoxelGrid, WALK};
+use crate::tree::TreeArrays;
+use rayon::prelude::*;
+
+/// Slices one mesh.
+pub struct Slicer<'a> {
+    mesh: &'a Mesh,
+    topology: &'a Topology,
+    tree: &'a TreeArrays,
+    locator: Locator<'a>,
+    normalised: Vec<Vec3>,
+    field: Option<&'a Field>,
+    extrapolate: Extrapolate,
+    voxels: VoxelGrid,
+    plan: SlicePlan,
+}
+
+/// A voxel's answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Voxel {
+    /// Value, NaN where empty or without field.
+    pub value: f32,
+    /// [`EMPTY`], [`TOUCHED`] or [`INSIDE`].
+    pub kind: u8,
+    /// Tetrahedron that gave the value, or [`NONE`].
+    pub owner: u32,
+}
+
+const NOTHING: Voxel = Voxel { value: f32::NAN, kind: EMPTY, owner: NONE };
+
+impl<'a> Slicer<'a> {
+    /// Prepares slicing of `mesh` by these voxels. `tree` must have been built over it.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] as [`VoxelGrid::plan`] says.
+    pub fn new(
+        mesh: &'a Mesh,
+        topology: &'a Topology,
+        tree: &'a TreeArrays,
+        field: Option<&'a Field>,
+        voxels: VoxelGrid,
+        extrapolate: Extrapolate,
+    ) -> Result<Self> {
+        let plan = voxels.plan(&tree.grid)?;
+        let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
+        Ok(Self { mesh, topology, tree, locator: Locator::new(mesh, tree), normalised, field, extrapolate, voxels, plan })
+    }
+
+    /// The voxels of these rows.
+    pub fn band(&self, rows: Rows) -> Band {
+        let [w, h] = self.voxels.size;
+        let runs = w.div_ceil(RUN);
+        let run = |i: u64| {
+            let [y, layer] = rows.row((i / u64::from(runs)) as u32, h);
+            self.run([(i % u64::from(runs)) as u32 * RUN, y, layer])
+        };
+        let answers: Vec<Vec<Voxel>> = (0..u64::from(rows.count) * u64::from(runs)).into_par_iter().map(run).collect();
+        let all = || answers.iter().flatten();
+        let (values, kinds) = (all().map(|v| v.value).collect(), all().map(|v| v.kind).collect());
+        Band { rows, values, kinds, owners: all().map(|v| v.owner).collect() }
+    }
+
+    /// The voxels of a run: located one after the other, each first in the cell of the one before; then those outside by their boxes.
+    fn run(&self, [begin, y, layer]: [u32; 3]) -> Vec<Voxel> {
+        let mut hint = NONE;
+        let end = self.voxels.size[0].min(begin + RUN);
+        (begin..end)
+            .map(|x| {
+                let centre = self.voxels.centre([x, y, layer]);
+                let location = self.walk(centre, hint).unwrap_or_else(|| self.locator.locate(centre));
+                hint = location.owner;
+                match location.found() {
+                    Some(owner) => Voxel { value: self.value(&location), kind: INSIDE, owner },
+                    None => self.touched(centre),
+                }
+            })
+            .collect()
+    }
+
+    /// The cell that holds `p` clearly, if it is `hint` or a short walk across faces away from it.
+    fn walk(&self, p: [f32; 3], hint: u32) -> Option<Location> {
+        let (_, x) = place(&self.tree.grid, p)?;
+        let mut cell = hint;
+        for _ in 0..WALK {
+            let ids = *self.mesh.tets.get(cell as usize)?;
+            let tet = Tet::new(ids, &self.normalised);
+            let weights = tet.weights(x);
+            if weights.clear {
+                return Some(Location { owner: cell, barycentric: weights.barycentric(tet.rank) });
+            }
+            let own = tet.rank.map(|r| weights.w[r]);
+            let face = (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face });
+            let next = self.topology.neighbours[cell as usize][face];
+            if own[face] >= 0.0 || next == NONE {
+                return None;
+            }
+            cell = next;
+        }
+        None
+    }
+
+    fn value(&self, location: &Location) -> f32 {
+        self.field.map_or(f32::NAN, |field| self.locator.value(field, location))
+    }
+
+    /// The primitive `t` relative to a point in normalised coordinates.
+    fn around(&self, t: u32, x: Vec3) -> (Tet, [Vec3; 4]) {
+        let tet = Tet::new(self.mesh.tets[t as usize], &self.normalised);
+        (tet, tet.v.map(|v| sub(v, x)))
+    }
+
+    /// A voxel whose centre is in no cell.
+    fn touched(&self, centre: [f32; 3]) -> Voxel {
+        let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+        let grid = &self.tree.grid;
+        let Some(cells) = reached_cells(grid, centre, three(self.plan.reach)) else { return NOTHING };
+        let x = grid.normalise(centre);
+        let half = [self.plan.half0, self.plan.half1, self.plan.half2].map(three);
+        let mut best = (f32::MAX, NONE);
+        let enters = |node: super::traverse::Node| self.tree.is_boundary(node.index) && meets(node, &cells);
+        walk_leaves(self.tree, enters, |leaf| {
+            for &t in self.tree.primitives(leaf.index) {
+                if self.topology.is_boundary(t) {
+                    let (_, v) = self.around(t, x);
+                    let closer = touching(&v, &half, best.0).filter(|&square| square < best.0 || t < best.1);
+                    best = closer.map_or(best, |square| (square, t));
+                }
+            }
+            false
+        });
+        if best.1 == NONE { NOTHING } else { Voxel { value: self.extrapolated(best.1, x), kind: TOUCHED, owner: best.1 } }
+    }
+
+    /// The value that the primitive `t` gives a voxel with its centre at `x`.
+    fn extrapolated(&self, t: u32, x: Vec3) -> f32 {
+        let (Some(field), (tet, v)) = (self.field, self.around(t, x)) else { return f32::NAN };
+        let weights = tet.weights(x);
+        let linear = self.extrapolate == Extrapolate::Linear && field.on == On::Points && weights.sum > 0.0;
+        let barycentric = if linear {
+            weights.barycentric(tet.rank)
+        } else {
+            let Closest { weights, .. } = closest(&v);
+            tet.rank.map(|r| weights[r])
+        };
+        self.locator.value(field, &Location { owner: t, barycentric })
+    }
+}
+
+/// The squared distance of the primitive to the centre (at 0) if it touches the box and is not farther than `most`.
+pub fn touching(v: &[Vec3; 4], half: &[Vec3; 3], most: f32) -> Option<f32> {
+    let near = box_square(v) <= most && box_touches(v, half, touch_slack(v, half));
+    near.then(|| closest(v).square).filter(|&square| square <= most)
+}

@@ -1,0 +1,102 @@
+//! Orientation, containment and barycentric coordinates of a tetrahedron in normalised coordinates (SPEC 2.1, 3.1). Twin of
+//! `glsl/shared/tet.glsl`: the same operations in the same order.
+//!
+//! A tetrahedron is looked at with its vertices in ascending global index, so that two neighbours evaluate their common face
+//! bit-identically.
+
+use super::grid::reciprocal;
+
+/// A point in normalised coordinates.
+pub type Vec3 = [f32; 3];
+
+pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
+}
+
+pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// Six times the signed volume of (a, b, c, p).
+pub fn orient(a: Vec3, b: Vec3, c: Vec3, p: Vec3) -> f32 {
+    dot(cross(sub(b, a), sub(c, a)), sub(p, a))
+}
+
+/// A tetrahedron with its vertices in ascending global index.
+#[derive(Clone, Copy, Debug)]
+pub struct Tet {
+    /// Corners by ascending global index.
+    pub v: [Vec3; 4],
+    /// `rank[i]`: place in `v` of the i-th vertex as the caller numbered them.
+    pub rank: [usize; 4],
+}
+
+/// A point relative to a tetrahedron.
+#[derive(Clone, Copy, Debug)]
+pub struct Weights {
+    /// Six times the signed volumes opposite to each vertex in ascending index, positive inside.
+    pub w: [f32; 4],
+    /// Their sum.
+    pub sum: f32,
+    /// Inside the closed box of the four vertices.
+    pub in_box: bool,
+    /// No face says outside, the box agrees, the cell is not flat: the closed cell holds the point.
+    pub inside: bool,
+    /// Inside by so much (2^-16 of the box's volume) that rounding cannot put the point into a neighbour as well: in a mesh whose cells do not
+    /// overlap, this cell is the owner.
+    pub clear: bool,
+}
+
+impl Tet {
+    /// The tetrahedron `ids` (four different vertices) of a mesh with these normalised points.
+    pub fn new(ids: [u32; 4], normalised: &[Vec3]) -> Self {
+        let rank = ids.map(|id| ids.iter().filter(|&&other| other < id).count());
+        let mut v = [[0.0; 3]; 4];
+        for (i, r) in rank.into_iter().enumerate() {
+            v[r] = normalised[ids[i] as usize];
+        }
+        Self { v, rank }
+    }
+
+    /// Six times the signed volume with the vertices in ascending index. Exactly 0: the cell is flat.
+    pub fn volume(&self) -> f32 {
+        orient(self.v[0], self.v[1], self.v[2], self.v[3])
+    }
+
+    /// The four signed volumes of `p`, negative where a face says that `p` lies outside; `sign` is that of the volume.
+    pub fn weights(&self, p: Vec3) -> Weights {
+        let [a, b, c, d] = self.v;
+        let s = if self.volume() < 0.0 { -1.0 } else { 1.0 };
+        // The order of a face's vertices alternates the sign with the opposite vertex.
+        let w = [-s * orient(b, c, d, p), s * orient(a, c, d, p), -s * orient(a, b, d, p), s * orient(a, b, c, p)];
+        let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
+        let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
+        let in_box = (0..3).all(|k| lo[k] <= p[k] && p[k] <= hi[k]);
+        let least = w[0].min(w[1]).min(w[2].min(w[3]));
+        let inside = in_box && self.volume() != 0.0 && least >= 0.0;
+        let size = sub(hi, lo);
+        let clear = inside && least > ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
+        Weights { w, sum: (w[0] + w[1]) + (w[2] + w[3]), in_box, inside, clear }
+    }
+}
+
+impl Weights {
+    /// Smallest barycentric coordinate; −∞ (as `f32::MIN`) for a flat cell.
+    pub fn smallest(&self) -> f32 {
+        if self.sum <= 0.0 {
+            return f32::MIN;
+        }
+        let w = self.w[0].min(self.w[1]).min(self.w[2].min(self.w[3]));
+        w * reciprocal(self.sum)
+    }
+
+    /// Barycentric coordinates in the caller's order of vertices.
+    pub fn barycentric(&self, rank: [usize; 4]) -> [f32; 4] {
+        let r = if self.sum <= 0.0 { 0.0 } else { reciprocal(self.sum) };
+        rank.map(|k| self.w[k] * r)
+    }
+}

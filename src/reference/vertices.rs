@@ -1,0 +1,79 @@
+//! What every stage needs of a vertex, computed once: its finest cell and its normalised coordinates (SPEC 2.1).
+
+use super::grid::Grid;
+use super::tet::{Tet, Vec3};
+use crate::mesh::Mesh;
+use rayon::prelude::*;
+
+/// Quantized and normalised points of a mesh. Points that are not finite have values without meaning.
+#[derive(Clone, Debug)]
+pub struct Vertices {
+    /// Cell of the finest grid per point.
+    pub cell: Vec<[u16; 3]>,
+    /// Normalised coordinates per point.
+    pub normalised: Vec<Vec3>,
+}
+
+/// A box of cells of one level, both corners included.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CellRange {
+    /// Lowest cell.
+    pub lo: [u32; 3],
+    /// Highest cell.
+    pub hi: [u32; 3],
+}
+
+impl Vertices {
+    /// The vertices of `mesh` in `grid`.
+    pub fn new(mesh: &Mesh, grid: &Grid) -> Self {
+        let cell = mesh.points.par_iter().map(|&p| grid.quantize(p).map(|q| q as u16)).collect();
+        let normalised = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
+        Self { cell, normalised }
+    }
+
+    /// The valid tetrahedron `ids` in normalised coordinates.
+    pub fn tet(&self, ids: [u32; 4]) -> Tet {
+        Tet::new(ids, &self.normalised)
+    }
+
+    /// The cells of level `level` that the bounding box of the valid tetrahedron `ids` meets (Eq. 5–6). Quantization is monotone, so the
+    /// cells of the vertices bound those of every point between them.
+    pub fn cells(&self, ids: [u32; 4], level: u32) -> CellRange {
+        let q = ids.map(|id| self.cell[id as usize]);
+        let shift = super::grid::MAX_LEVEL - level;
+        let corner =
+            |pick: fn(u16, u16) -> u16| [0, 1, 2].map(|c| u32::from(pick(pick(q[0][c], q[1][c]), pick(q[2][c], q[3][c]))) >> shift);
+        CellRange { lo: corner(u16::min), hi: corner(u16::max) }
+    }
+}
+
+impl CellRange {
+    /// Number of cells per axis.
+    pub fn size(&self) -> [u32; 3] {
+        [0, 1, 2].map(|c| self.hi[c] - self.lo[c] + 1)
+    }
+
+    /// Number of cells.
+    pub fn count(&self) -> u32 {
+        let [x, y, z] = self.size();
+        x * y * z
+    }
+
+    /// Whether the range holds `cell`.
+    pub fn contains(&self, cell: [u32; 3]) -> bool {
+        (0..3).all(|c| self.lo[c] <= cell[c] && cell[c] <= self.hi[c])
+    }
+
+    /// Cell number `index` of [`CellRange::count`], x fastest: index = (x−x0) + nx·((y−y0) + ny·(z−z0)).
+    pub fn cell(&self, index: u32) -> [u32; 3] {
+        let [nx, ny, _] = self.size();
+        let (x, rest) = (index % nx, index / nx);
+        [self.lo[0] + x, self.lo[1] + rest % ny, self.lo[2] + rest / ny]
+    }
+
+    /// All cells in that order.
+    pub fn iter(&self) -> impl Iterator<Item = [u32; 3]> + use<> {
+        let CellRange { lo, hi } = *self;
+        (lo[2]..=hi[2]).flat_map(move |z| (lo[1]..=hi[1]).flat_map(move |y| (lo[0]..=hi[0]).map(move |x| [x, y, z])))
+    }
+}

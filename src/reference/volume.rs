@@ -1,0 +1,118 @@
+//! Direct volume rendering (SPEC 3.3, the paper's §4.2). Twin of `glsl/query/volume_intervals` and `volume_march`.
+//!
+//! Ray intervals first, from the boundary nodes of the tree alone; then samples within them. What a sample is and how it adds up is said in
+//! [`crate::render`]. The tree decides only where samples need not be taken, so the picture does not depend on it.
+
+mod brute;
+mod interval;
+mod march;
+
+pub use brute::brute_force;
+pub use interval::Intervals;
+pub use march::Marcher;
+
+use super::boundary::Topology;
+use super::locate::Locator;
+use super::tet::Vec3;
+use crate::error::{Error, Result};
+use crate::mesh::{Field, Mesh, On};
+use crate::render::{Bounds, Plan, Prepared, RenderSettings};
+use crate::tree::TreeArrays;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::time::{Duration, Instant};
+
+/// A drawn picture.
+#[derive(Clone, Debug, Default)]
+pub struct Picture {
+    /// Straight RGBA, 8 bits a channel, row 0 on top.
+    pub pixels: Vec<u8>,
+    /// Samples taken within the ray intervals.
+    pub samples: u64,
+    /// Those that lie in the mesh.
+    pub found_samples: u64,
+    /// Milliseconds for the ray intervals.
+    pub interval_ms: f64,
+    /// Milliseconds for marching.
+    pub march_ms: f64,
+}
+
+/// What is drawn: a mesh, its tree, a field.
+pub struct Scene<'a> {
+    pub(crate) mesh: &'a Mesh,
+    pub(crate) topology: &'a Topology,
+    pub(crate) tree: &'a TreeArrays,
+    pub(crate) field: &'a Field,
+    pub(crate) normalised: Vec<Vec3>,
+    pub(crate) prepared: Prepared,
+    /// With tolerance 0: whether a point just outside counts would depend on the leaf that it lies in.
+    pub(crate) locator: Locator<'a>,
+}
+
+impl<'a> Scene<'a> {
+    /// Prepares to draw `field` as `settings` say. `topology` and `tree` must be those of `mesh`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the field has not as many values as the mesh has points or tetrahedra, or the topology is another mesh's; as [`Prepared::new`].
+    pub fn new(mesh: &'a Mesh, topology: &'a Topology, tree: &'a TreeArrays, field: &'a Field, settings: &RenderSettings) -> Result<Self> {
+        let expected = if field.on == On::Points { mesh.points.len() } else { mesh.tets.len() };
+        if field.values.len() != expected || topology.neighbours.len() != mesh.tets.len() {
+            let (name, n) = (&field.name, field.values.len());
+            return Err(Error::Invalid(format!(
+                "field `{name}` has {n} values where the mesh needs {expected}, or the topology is not the mesh's"
+            )));
+        }
+        let (lo, hi) = (tree.grid.lo, tree.grid.hi);
+        let bounds = Bounds { lo: [lo[0], lo[1], lo[2]], hi: [hi[0], hi[1], hi[2]] };
+        let valid = |tet: usize| topology.is_valid(tet as u32);
+        let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
+        let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
+        Ok(Self { mesh, topology, tree, field, normalised, prepared, locator: Locator::new(mesh, tree).with_tolerance(0.0) })
+    }
+
+    /// What is drawn.
+    pub fn plan(&self) -> &Plan {
+        &self.prepared.plan
+    }
+
+    /// The values at the ends of the transfer function.
+    pub fn range(&self) -> [f32; 2] {
+        self.prepared.range
+    }
+}
+
+/// Draws the scene; `report` is told how many rows of how many are done.
+pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
+    let plan = scene.plan();
+    let [width, height] = plan.size;
+    let intervals = Intervals::new(scene.tree, plan);
+    let (done, samples, found) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+    let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
+    let start = Instant::now();
+    let row = |(y, pixels): (usize, &mut [u8])| {
+        let y = y as u32;
+        let begin = Instant::now();
+        let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y))).collect();
+        let middle = Instant::now();
+        let mut marcher = Marcher::new(scene);
+        for (x, (span, pixel)) in spans.into_iter().zip(pixels.chunks_exact_mut(4)).enumerate() {
+            let color = marcher.march(plan.rays.ray(x as u32, y), span);
+            pixel.copy_from_slice(&plan.background.pixel(color, y, height));
+        }
+        interval_ns.fetch_add((middle - begin).as_nanos() as u64, Ordering::Relaxed);
+        march_ns.fetch_add(middle.elapsed().as_nanos() as u64, Ordering::Relaxed);
+        samples.fetch_add(marcher.samples, Ordering::Relaxed);
+        found.fetch_add(marcher.found_samples, Ordering::Relaxed);
+        report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height));
+    };
+    let mut pixels = vec![0; width as usize * height as usize * 4];
+    pixels.par_chunks_exact_mut(width as usize * 4).enumerate().for_each(row);
+    // Both stages run side by side on all threads: the time on the clock is divided as the threads spent theirs.
+    let share = |part: &AtomicU64| {
+        let all = interval_ns.load(Ordering::Relaxed) + march_ns.load(Ordering::Relaxed);
+        part.load(Ordering::Relaxed) as f64 / (all.max(1)) as f64
+    };
+    let ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
+    let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
+    Picture { pixels, samples: samples.into_inner(), found_samples: found.into_inner(), interval_ms, march_ms }
+}

@@ -1,0 +1,94 @@
+//! The oracle of the renderers: another camera formula, every tetrahedron tested at every sample, double precision, no tree, no table.
+
+use super::Scene;
+use crate::mesh::On;
+use crate::render::{Bounds, OPACITY_UNIT, Projection, RenderSettings, Shade};
+use glam::{DMat3, DVec3};
+use rayon::prelude::*;
+
+/// A tetrahedron ready for tests: barycentric coordinates 1 to 3 are `inverse · (p − corner)`.
+struct Cell {
+    id: usize,
+    corner: DVec3,
+    inverse: DMat3,
+}
+
+/// Draws what `settings` say, as [`super::render`] should, in time proportional to samples × tetrahedra. Straight RGBA. `settings` must say how opaque
+/// values are. The scene's plan is asked only for its size and light.
+pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
+    let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.range(), &scene.prepared.camera);
+    let [width, height] = plan.size.map(f64::from);
+    let diagonal = bounds.diagonal();
+    let step = settings.step.unwrap_or(diagonal / 512.0);
+    let corner = |i: u32| DVec3::from_array([0, 1, 2].map(|c| f64::from(if i >> c & 1 == 0 { bounds.lo[c] } else { bounds.hi[c] })));
+    let near = (0..8).map(|i| (corner(i) - camera.eye).dot(camera.forward)).fold(f64::MAX, f64::min);
+    let span = f64::from(range[1]) - f64::from(range[0]);
+    let pixel = |i: u32| {
+        let (x, y) = (f64::from(i % plan.size[0]), f64::from(i / plan.size[0]));
+        let (s, t) = (((x + 0.5) / width * 2.0 - 1.0) * width / height, 1.0 - (y + 0.5) / height * 2.0);
+        let (start, way) = match camera.projection {
+            Projection::Perspective(fov) => {
+                let half = (fov.to_radians() / 2.0).tan();
+                let way = camera.forward + camera.right * (s * half) + camera.up * (t * half);
+                (camera.eye + way * near.max(0.0), way.normalize())
+            }
+            Projection::Orthographic(h) => {
+                (camera.eye + camera.forward * near + (camera.right * s + camera.up * t) * (h / 2.0), camera.forward)
+            }
+        };
+        let half = plan.lighting.map(|light| light.half(way.as_vec3().to_array()));
+        let mut sum = [0.0f64; 4];
+        let samples = ((start - corner(0)).length() + 2.0 * diagonal) / step;
+        for k in 0..samples as u32 {
+            let p = start + way * ((f64::from(k) + 0.5) * step);
+            let Some((value, normal)) = sample(scene, &cells, p) else { continue };
+            let place = ((value - f64::from(range[0])) / span).clamp(0.0, 1.0);
+            let [r, g, b, a] = settings.transfer.at(place as f32);
+            let a = 1.0 - (1.0 - f64::from(a)).powf(f64::from(settings.opacity_scale) * step / (OPACITY_UNIT * diagonal));
+            let shade = match (plan.lighting, half) {
+                (Some(light), Some(half)) if !scene.prepared.normals.is_empty() => light.shade(normal, way.as_vec3().to_array(), half),
+                _ => Shade { factor: 1.0, added: 0.0, rim: 0.0 },
+            };
+            if a <= 0.0 {
+                continue;
+            }
+            let a = a + (1.0 - a) * f64::from(shade.rim);
+            let w = (1.0 - sum[3]) * a;
+            for (sum, c) in sum.iter_mut().zip([r, g, b]) {
+                *sum += w * f64::from((c * shade.factor + shade.added).min(1.0));
+            }
+            sum[3] += w;
+            if sum[3] >= f64::from(settings.termination) {
+                break;
+            }
+        }
+        settings.background.pixel(sum.map(|v| v as f32), y as u32, plan.size[1])
+    };
+    (0..plan.size[0] * plan.size[1]).into_par_iter().flat_map_iter(pixel).collect()
+}
+
+/// The tetrahedra that have a volume.
+fn cells(scene: &Scene<'_>) -> Vec<Cell> {
+    let cell = |(id, ids): (usize, &[u32; 4])| {
+        let [a, b, c, d] = ids.map(|i| DVec3::from_array(scene.mesh.points[i as usize].map(f64::from)));
+        let edges = DMat3::from_cols(b - a, c - a, d - a);
+        (edges.determinant() != 0.0).then(|| Cell { id, corner: a, inverse: edges.inverse() })
+    };
+    scene.mesh.tets.iter().enumerate().filter(|&(t, _)| scene.topology.is_valid(t as u32)).filter_map(cell).collect()
+}
+
+/// Value and normal at a point of the mesh, if it is finite.
+fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, [f32; 3])> {
+    let (id, b) = cells.iter().find_map(|cell| {
+        let b = cell.inverse * (p - cell.corner);
+        (b.min_element() >= 0.0 && b.element_sum() <= 1.0).then(|| (cell.id, [1.0 - b.element_sum(), b.x, b.y, b.z]))
+    })?;
+    let ids = scene.mesh.tets[id].map(|i| i as usize);
+    let mix = |v: [f32; 4]| (0..4).map(|i| b[i] * f64::from(v[i])).sum::<f64>();
+    let value = match scene.field.on {
+        On::Points => mix(ids.map(|i| scene.field.values[i])),
+        On::Cells => f64::from(scene.field.values[id]),
+    };
+    let normal = [0, 1, 2].map(|c| mix(ids.map(|i| scene.prepared.normals.get(i).map_or(0.0, |n| n[c]))) as f32);
+    value.is_finite().then_some((value, normal))
+}

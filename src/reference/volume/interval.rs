@@ -1,0 +1,76 @@
+//! Where a ray can meet the mesh, by the boundary nodes of the tree.
+
+use crate::reference::grid::reciprocal;
+use crate::reference::leaves::{Box6, cell_box};
+use crate::render::{Plan, interval_slack};
+use crate::tree::TreeArrays;
+
+/// Ray intervals of a plan.
+pub struct Intervals<'a> {
+    tree: &'a TreeArrays,
+    inverse_step: f32,
+    /// Boxes are larger by this, so that rounding of samples, boxes and rays loses nothing.
+    slack: [f32; 3],
+}
+
+/// A node still to be visited: index, level, Morton code of its cell.
+type Node = (u32, u32, u32);
+
+/// A component of a direction is at least this large, so that its reciprocal is finite.
+const LEAST: f32 = 1e-20;
+
+impl<'a> Intervals<'a> {
+    /// Prepares the rays of `plan`.
+    pub fn new(tree: &'a TreeArrays, plan: &Plan) -> Self {
+        let (slack, inverse_step) = interval_slack(&tree.grid, plan);
+        Self { tree, inverse_step, slack }
+    }
+
+    /// The samples `[begin, end)` of a ray (origin, unit direction) that the mesh can hold: from the first to the last leaf with the
+    /// boundary flag whose box the ray meets, and one more on either side. A ray that starts in a leaf of the mesh starts at 0.
+    pub fn of(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [u32; 2] {
+        let inverse = direction.map(|d| if d.abs() < LEAST { 1.0 / LEAST.copysign(d) } else { reciprocal(d) });
+        let grid = &self.tree.grid;
+        let (mut first, mut last) = (f32::MAX, -1.0f32);
+        let within = (0..3).all(|c| grid.lo[c] <= origin[c] && origin[c] <= grid.hi[c]);
+        if within && self.tree.find_leaf(grid.quantize(origin)).is_some() {
+            (first, last) = (0.0, 0.0);
+        }
+        // Depth first; what lies within the interval found so far has nothing to add, so the order of the visits does not matter.
+        let mut stack: Vec<Node> = vec![(0, 0, 0)];
+        while let Some((node, level, code)) = stack.pop() {
+            if !self.tree.is_boundary(node) {
+                continue;
+            }
+            let Some([enter, leave]) = self.hit(cell_box(grid, level, code), origin, inverse) else { continue };
+            if first <= enter && leave <= last {
+                continue;
+            }
+            if level == grid.level {
+                (first, last) = (first.min(enter), last.max(leave));
+                continue;
+            }
+            stack.extend((0..8).filter_map(|digit| Some((self.tree.child(node, digit)?, level + 1, code << 3 | digit))));
+        }
+        if last < first {
+            return [0, 0];
+        }
+        // Sample k lies at (k + ½)·Δ.
+        let begin = (first * self.inverse_step - 1.5).max(0.0).floor();
+        let end = (last * self.inverse_step + 1.5).max(0.0).floor();
+        [begin as u32, end as u32]
+    }
+
+    /// Where a ray enters and leaves a box, `None` if it misses it; never before its origin.
+    fn hit(&self, [x0, y0, z0, x1, y1, z1]: Box6, origin: [f32; 3], inverse: [f32; 3]) -> Option<[f32; 2]> {
+        let (lo, hi) = ([x0, y0, z0], [x1, y1, z1]);
+        let (mut enter, mut leave) = (0.0f32, f32::MAX);
+        for c in 0..3 {
+            let a = ((lo[c] - self.slack[c]) - origin[c]) * inverse[c];
+            let b = ((hi[c] + self.slack[c]) - origin[c]) * inverse[c];
+            enter = enter.max(a.min(b));
+            leave = leave.min(a.max(b));
+        }
+        (enter <= leave).then_some([enter, leave])
+    }
+}

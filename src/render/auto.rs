@@ -1,0 +1,74 @@
+//! The opacity of a field that nobody chose one for.
+
+use crate::mesh::{Field, Mesh, On};
+use glam::DVec3;
+
+/// Bins of the histogram.
+const BINS: usize = 64;
+/// Control points of the result.
+const POINTS: usize = 33;
+/// How much rare values gain over common ones; 1 would show every value alike.
+const EQUALITY: f64 = 0.85;
+/// Optical depth of the mesh on an average ray.
+const DEPTH: f64 = 1.4;
+/// The densest that a value gets, per unit.
+const MOST: f64 = 0.85;
+
+/// Opacity points for a field over `range`, from how much of the mesh's volume has which value: common values get faint, so that one looks through
+/// them at the rare ones; and all is scaled so that an average ray (the mean chord of the mesh, four times volume over surface) still passes
+/// for a quarter. High values count somewhat more than low ones. `unit` is the length that opacities belong to; `neighbours` and `valid` are
+/// as for [`shading_normals`](super::shading_normals).
+pub fn auto_opacity(
+    mesh: &Mesh,
+    neighbours: &[[u32; 4]],
+    valid: impl Fn(usize) -> bool,
+    field: &Field,
+    range: [f32; 2],
+    unit: f64,
+) -> Vec<(f32, f32)> {
+    let (lo, span) = (f64::from(range[0]), f64::from(range[1]) - f64::from(range[0]));
+    let mut bins = [0.0f64; BINS];
+    let (mut volume, mut surface) = (0.0, 0.0);
+    for (tet, (ids, across)) in mesh.tets.iter().zip(neighbours).enumerate() {
+        if !valid(tet) {
+            continue;
+        }
+        let p = ids.map(|id| DVec3::from_array(mesh.points[id as usize].map(f64::from)) / unit);
+        let v = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]).abs() / 6.0;
+        volume += v;
+        for (face, &next) in [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)].into_iter().zip(across) {
+            if next == u32::MAX {
+                surface += (p[face.1] - p[face.0]).cross(p[face.2] - p[face.0]).length() / 2.0;
+            }
+        }
+        let value = |i: usize| field.values.get(i).map_or(f64::NAN, |&v| (f64::from(v) - lo) / span);
+        let values = if field.on == On::Points { ids.map(|id| value(id as usize)) } else { [value(tet); 4] };
+        if values.iter().all(|v| (0.0..=1.0).contains(v)) {
+            // As if the values of the cell were spread evenly from the smallest to the largest.
+            let bin = |v: f64| ((v * BINS as f64) as usize).min(BINS - 1);
+            let (first, last) = (bin(values.into_iter().fold(1.0, f64::min)), bin(values.into_iter().fold(0.0, f64::max)));
+            bins[first..=last].iter_mut().for_each(|b| *b += v / (last - first + 1) as f64);
+        }
+    }
+    let total: f64 = bins.iter().sum();
+    if !(total > 0.0 && surface > 0.0 && volume.is_finite()) {
+        return super::transfer::DEFAULT_OPACITY.to_vec();
+    }
+    for _ in 0..3 {
+        let old = bins;
+        for (i, b) in bins.iter_mut().enumerate() {
+            *b = (old[i.saturating_sub(1)] + 2.0 * old[i] + old[(i + 1).min(BINS - 1)]) / 4.0;
+        }
+    }
+    let share = bins.map(|b| b / total);
+    let weight = |i: usize| (share[i] * BINS as f64 + 0.01).powf(-EQUALITY) * (0.5 + (i as f64 + 0.5) / BINS as f64);
+    let mean: f64 = (0..BINS).map(|i| share[i] * weight(i)).sum();
+    // Extinction per unit.
+    let scale = DEPTH / (mean * 4.0 * volume / surface);
+    let opacity = |i: usize| (1.0 - (-scale * weight(i)).exp()).min(MOST) as f32;
+    let point = |k: usize| {
+        let x = k as f64 / (POINTS - 1) as f64;
+        (x as f32, opacity(((x * BINS as f64) as usize).min(BINS - 1)))
+    };
+    (0..POINTS).map(point).collect()
+}

@@ -1,0 +1,201 @@
+//! Cameras, and the ray of each pixel.
+
+mod spec;
+
+use crate::error::{Error, Result};
+use crate::reference::grid::MIN_EXTENT;
+use glam::DVec3;
+
+pub use spec::{CameraSpec, HELP};
+
+/// A closed box in mesh coordinates (relative to [`crate::mesh::Mesh::origin`]).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bounds {
+    /// Lower corner.
+    pub lo: [f32; 3],
+    /// Upper corner.
+    pub hi: [f32; 3],
+}
+
+impl Bounds {
+    /// Lower and upper corner in double precision.
+    pub(crate) fn corners(&self) -> [DVec3; 8] {
+        let (lo, hi) = (DVec3::from_array(self.lo.map(f64::from)), DVec3::from_array(self.hi.map(f64::from)));
+        [0, 1, 2, 3, 4, 5, 6, 7].map(|i| {
+            let pick = |bit: u32, c: usize| if i >> bit & 1 == 0 { lo[c] } else { hi[c] };
+            DVec3::new(pick(0, 0), pick(1, 1), pick(2, 2))
+        })
+    }
+
+    /// Length of the diagonal; 1 for a box that counts as a point (see [`MIN_EXTENT`]), so that steps and units exist.
+    pub fn diagonal(&self) -> f64 {
+        let [lo, hi] = [self.corners()[0], self.corners()[7]];
+        let d = (hi - lo).length();
+        if d >= f64::from(MIN_EXTENT) && d.is_finite() { d } else { 1.0 }
+    }
+}
+
+/// How rays spread.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Projection {
+    /// Rays through one eye; the angle between the top and the bottom of the picture, in degrees.
+    Perspective(f64),
+    /// Parallel rays; the height of the picture in mesh units.
+    Orthographic(f64),
+}
+
+/// A camera in mesh coordinates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Camera {
+    /// Where the eye is.
+    pub eye: DVec3,
+    /// Unit vector into the picture.
+    pub forward: DVec3,
+    /// Unit vector to the right of the picture.
+    pub right: DVec3,
+    /// Unit vector to the top of the picture.
+    pub up: DVec3,
+    /// How rays spread.
+    pub projection: Projection,
+}
+
+/// Perspective angle of a framed camera, degrees.
+pub const DEFAULT_FOV: f64 = 30.0;
+/// Part of the picture that a framed box fills.
+const FILL: f64 = 0.94;
+
+impl Camera {
+    /// A camera at `eye` that looks at `target`. An `up` along the view is replaced by another axis.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if eye and target are the same point, a coordinate is not finite, or the projection has no extent.
+    pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Result<Self> {
+        let forward = (target - eye).try_normalize().filter(|_| eye.is_finite() && target.is_finite());
+        let Some(forward) = forward else {
+            return Err(Error::Invalid(format!("a camera needs an eye and a target that differ, not {eye} and {target}")));
+        };
+        let (size, limit) = match projection {
+            Projection::Perspective(degrees) => (degrees, 179.0),
+            Projection::Orthographic(height) => (height, f64::MAX),
+        };
+        if !(size > 0.0 && size <= limit) {
+            return Err(Error::Invalid("a camera's fov lies between 0 and 179 degrees, its ortho height above 0".into()));
+        }
+        let side = |up: DVec3| up.try_normalize().map(|up| forward.cross(up)).filter(|s| s.length_squared() > 1e-12);
+        let right = side(up).or_else(|| side(DVec3::Z)).or_else(|| side(DVec3::Y)).unwrap_or(DVec3::X).normalize();
+        Ok(Self { eye, forward, right, up: right.cross(forward), projection })
+    }
+
+    /// The default camera: a three-quarter view from the front, z upwards, that shows the larger sides of the box more frontally and
+    /// just holds all of it. `aspect` is width over height.
+    pub fn frame(bounds: &Bounds, aspect: f64) -> Self {
+        Self::frame_from(bounds, &bounds.corners(), aspect, three_quarter(bounds), DVec3::Z, Some(DEFAULT_FOV))
+    }
+
+    /// A camera on the side `from` (a direction, of any length) of the box that just holds all `points` in it; perspective with that
+    /// angle in degrees, `None`: orthographic.
+    pub fn frame_from(bounds: &Bounds, points: &[DVec3], aspect: f64, from: DVec3, up: DVec3, fov: Option<f64>) -> Self {
+        let corners = bounds.corners();
+        let center = (corners[0] + corners[7]) * 0.5;
+        let from = from.try_normalize().unwrap_or(DVec3::NEG_Y);
+        let projection = Projection::Perspective(DEFAULT_FOV);
+        let fallback = Self { eye: center, forward: -from, right: DVec3::X, up: DVec3::Z, projection };
+        let mut camera = Self::look_at(center + from * bounds.diagonal(), center, up, projection).unwrap_or(fallback);
+        let points = if points.is_empty() { &corners[..] } else { points };
+        let place = |p: &DVec3| DVec3::new((p - center).dot(camera.right), (p - center).dot(camera.up), (p - center).dot(camera.forward));
+        let local: Vec<DVec3> = points.iter().map(place).collect();
+        let most = |f: &dyn Fn(DVec3) -> f64| local.iter().copied().map(f).fold(f64::MIN, f64::max);
+        let smallest = bounds.diagonal() * 1e-6;
+        let offset = if let Some(degrees) = fov {
+            let ty = (degrees.clamp(0.01, 179.0).to_radians() * 0.5).tan() * FILL;
+            let tx = ty * aspect;
+            // X − ex ≤ (Z − ez)·tx and its three likes: the eye that two opposite sides of the picture pin, further back wins.
+            let [r, l] = [most(&|p| p.x - p.z * tx), most(&|p| -p.x - p.z * tx)];
+            let [t, b] = [most(&|p| p.y - p.z * ty), most(&|p| -p.y - p.z * ty)];
+            camera.projection = Projection::Perspective(degrees);
+            DVec3::new((r - l) * 0.5, (t - b) * 0.5, (-(r + l) * 0.5 / tx).min(-(t + b) * 0.5 / ty).min(-smallest))
+        } else {
+            let ([r, l], [t, b]) = ([most(&|p| p.x), most(&|p| -p.x)], [most(&|p| p.y), most(&|p| -p.y)]);
+            let (w, h) = (r + l, t + b);
+            camera.projection = Projection::Orthographic((h.max(w / aspect) / FILL).max(smallest));
+            DVec3::new((r - l) * 0.5, (t - b) * 0.5, -bounds.diagonal())
+        };
+        camera.eye = center + camera.right * offset.x + camera.up * offset.y + camera.forward * offset.z;
+        camera
+    }
+
+    /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the nearest corner of
+    /// `bounds`, or at the eye where that lies behind it, so that single precision is spent on the mesh and not on the way to it.
+    pub fn rays(&self, size: [u32; 2], bounds: &Bounds) -> RayGrid {
+        let [w, h] = size.map(f64::from);
+        let depth = |p: DVec3| (p - self.eye).dot(self.forward);
+        let nearest = bounds.corners().into_iter().map(depth).fold(f64::MAX, f64::min);
+        // Half a pixel's place: s = ((x + ½)·2/w − 1) to the right, t = 1 − (y + ½)·2/h upwards.
+        let (s0, ds, t0, dt) = (1.0 / w - 1.0, 2.0 / w, 1.0 - 1.0 / h, -2.0 / h);
+        let (half, perspective) = match self.projection {
+            Projection::Perspective(degrees) => ((degrees.to_radians() * 0.5).tan(), true),
+            Projection::Orthographic(height) => (height * 0.5, false),
+        };
+        let (across, upwards) = (self.right * (half * w / h), self.up * half);
+        let (first, dx, dy) = (across * s0 + upwards * t0, across * ds, upwards * dt);
+        let f = |v: DVec3| v.as_vec3().to_array();
+        if perspective {
+            let near = nearest.max(0.0);
+            let (base, near_dx, near_dy) = (self.eye + (self.forward + first) * near, dx * near, dy * near);
+            RayGrid {
+                origin: f(base),
+                origin_x: f(near_dx),
+                origin_y: f(near_dy),
+                way: f(self.forward + first),
+                way_x: f(dx),
+                way_y: f(dy),
+            }
+        } else {
+            let base = self.eye + self.forward * nearest + first;
+            RayGrid { origin: f(base), origin_x: f(dx), origin_y: f(dy), way: f(self.forward), way_x: [0.0; 3], way_y: [0.0; 3] }
+        }
+    }
+}
+
+/// The direction of the default view: front, right and top sides show, the larger ones more.
+pub fn three_quarter(bounds: &Bounds) -> DVec3 {
+    let e = [0, 1, 2].map(|c| f64::from(bounds.hi[c]) - f64::from(bounds.lo[c]));
+    let largest = e.into_iter().fold(0.0, f64::max);
+    let e = e.map(|x| if largest > 0.0 { (x / largest).max(0.02) } else { 1.0 });
+    let sides = [e[1] * e[2], e[0] * e[2], e[0] * e[1]];
+    let mean = (sides[0] * sides[1] * sides[2]).cbrt();
+    let weight = sides.map(|side| (side / mean).powf(0.35).clamp(0.5, 2.0));
+    DVec3::new(0.58 * weight[0], -weight[1], 0.55 * weight[2])
+}
+
+/// The rays of a picture, ready for a kernel: six vectors.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct RayGrid {
+    /// Origin of the ray of pixel (0, 0).
+    pub origin: [f32; 3],
+    /// What one pixel to the right adds to it.
+    pub origin_x: [f32; 3],
+    /// What one pixel down adds to it.
+    pub origin_y: [f32; 3],
+    /// Direction of the ray of pixel (0, 0), of any length.
+    pub way: [f32; 3],
+    /// What one pixel to the right adds to it.
+    pub way_x: [f32; 3],
+    /// What one pixel down adds to it.
+    pub way_y: [f32; 3],
+}
+
+impl RayGrid {
+    /// Origin and unit direction of the ray of pixel (x, y), row 0 on top. Per component `(origin + x·origin_x) + y·origin_y`, and
+    /// w = `(way + x·way_x) + y·way_y` likewise; direction = w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
+    pub fn ray(&self, x: u32, y: u32) -> ([f32; 3], [f32; 3]) {
+        let (x, y) = (x as f32, y as f32);
+        let origin = [0, 1, 2].map(|c| (self.origin[c] + x * self.origin_x[c]) + y * self.origin_y[c]);
+        let w = [0, 1, 2].map(|c| (self.way[c] + x * self.way_x[c]) + y * self.way_y[c]);
+        let r = super::inverse_sqrt((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]);
+        (origin, w.map(|v| v * r))
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,162 @@
+//! The textual form of a camera.
+
+use super::{Bounds, Camera, DEFAULT_FOV, Projection, three_quarter};
+use crate::error::{Error, Result};
+use glam::DVec3;
+
+/// A camera as a user describes it, in the coordinates of the mesh's source. What is left open is chosen so that the mesh is
+/// framed.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct CameraSpec {
+    /// The side to look from, as a direction from the mesh to the eye; ignored with `eye`.
+    pub from: Option<DVec3>,
+    /// Degrees around the vertical axis, 0 = from −y (front), 90 = from +x (right); ignored with `eye`.
+    pub azimuth: Option<f64>,
+    /// Degrees above the horizon; ignored with `eye`.
+    pub elevation: Option<f64>,
+    /// Where the eye is.
+    pub eye: Option<DVec3>,
+    /// What it looks at; the centre of the mesh by default. Without `eye`, only the framing moves.
+    pub target: Option<DVec3>,
+    /// What is up in the picture; z by default.
+    pub up: Option<DVec3>,
+    /// Perspective angle from top to bottom, degrees.
+    pub fov: Option<f64>,
+    /// Orthographic; with a height in mesh units, or framed.
+    pub ortho: Option<Option<f64>>,
+    /// Magnification.
+    pub zoom: Option<f64>,
+}
+
+/// Named views: the direction from the mesh to the eye. `iso` is the default three-quarter view, and is chosen by the mesh's shape.
+const VIEWS: [(&str, Option<DVec3>); 13] = [
+    ("iso", None),
+    ("front", Some(DVec3::NEG_Y)),
+    ("back", Some(DVec3::Y)),
+    ("left", Some(DVec3::NEG_X)),
+    ("right", Some(DVec3::X)),
+    ("top", Some(DVec3::Z)),
+    ("bottom", Some(DVec3::NEG_Z)),
+    ("+x", Some(DVec3::X)),
+    ("-x", Some(DVec3::NEG_X)),
+    ("+y", Some(DVec3::Y)),
+    ("-y", Some(DVec3::NEG_Y)),
+    ("+z", Some(DVec3::Z)),
+    ("-z", Some(DVec3::NEG_Z)),
+];
+
+/// What the text of a camera may hold, for errors and help.
+pub const HELP: &str = "a view (iso, front, back, left, right, top, bottom, +x, -x, +y, -y, +z, -z) and settings key=value, separated by commas: \
+azimuth, elevation (degrees), zoom, eye=X,Y,Z, target=X,Y,Z, up=X,Y,Z, fov (degrees), ortho or ortho=HEIGHT";
+
+impl std::str::FromStr for CameraSpec {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        let wrong = |part: &str, why: &str| Error::Invalid(format!("camera `{text}`: `{part}` {why}; a camera is {HELP}"));
+        let mut spec = Self::default();
+        let mut parts = text.split(',').map(str::trim).peekable();
+        while let Some(part) = parts.next() {
+            let Some((key, first)) = part.split_once('=') else {
+                if part.eq_ignore_ascii_case("ortho") {
+                    spec.ortho = Some(None);
+                } else if let Some(&(_, from)) = VIEWS.iter().find(|(name, _)| name.eq_ignore_ascii_case(part)) {
+                    spec.from = from;
+                } else {
+                    return Err(wrong(part, "is no view"));
+                }
+                continue;
+            };
+            // The numbers of a vector are separated by commas as well: what follows without a key belongs to this one.
+            let mut values = vec![number(first).ok_or_else(|| wrong(part, "needs a finite number"))?];
+            while let Some(value) = parts.peek().and_then(|next| number(next)) {
+                values.push(value);
+                parts.next();
+            }
+            let vector = || match values[..] {
+                [x, y, z] => Ok(Some(DVec3::new(x, y, z))),
+                _ => Err(wrong(part, "needs three numbers")),
+            };
+            let scalar = |ok: &dyn Fn(f64) -> bool, range: &str| match values[..] {
+                [v] if ok(v) => Ok(Some(v)),
+                _ => Err(wrong(part, &format!("needs one number {range}"))),
+            };
+            match key.trim().to_ascii_lowercase().as_str() {
+                "azimuth" | "az" => spec.azimuth = scalar(&|_| true, "of degrees")?,
+                "elevation" | "el" => spec.elevation = scalar(&|v| v.abs() <= 90.0, "from -90 to 90")?,
+                "zoom" => spec.zoom = scalar(&|v| v > 0.0, "above 0")?,
+                "fov" => spec.fov = scalar(&|v| v > 0.0 && v <= 179.0, "above 0, up to 179")?,
+                "ortho" => spec.ortho = Some(scalar(&|v| v > 0.0, "above 0")?),
+                "eye" => spec.eye = vector()?,
+                "target" => spec.target = vector()?,
+                "up" => spec.up = vector()?,
+                _ => return Err(wrong(part, "has an unknown key")),
+            }
+        }
+        if spec.fov.is_some() && spec.ortho.is_some() {
+            return Err(Error::Invalid(format!("camera `{text}`: either fov or ortho")));
+        }
+        Ok(spec)
+    }
+}
+
+/// A finite number.
+fn number(text: &str) -> Option<f64> {
+    text.trim().parse::<f64>().ok().filter(|v| v.is_finite())
+}
+
+impl CameraSpec {
+    /// The camera for a mesh with these bounds, whose coordinates are relative to `origin`; `aspect` is width over height.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if eye and target are the same point.
+    pub fn resolve(&self, bounds: &Bounds, origin: [f64; 3], aspect: f64) -> Result<Camera> {
+        self.resolve_around(bounds, &bounds.corners(), origin, aspect)
+    }
+
+    /// The same, framed around `points` within the bounds rather than the corners.
+    ///
+    /// # Errors
+    /// As [`CameraSpec::resolve`].
+    pub fn resolve_around(&self, bounds: &Bounds, points: &[DVec3], origin: [f64; 3], aspect: f64) -> Result<Camera> {
+        let local = |p: DVec3| p - DVec3::from_array(origin);
+        let corners = bounds.corners();
+        let center = (corners[0] + corners[7]) * 0.5;
+        let target = self.target.map_or(center, local);
+        let up = self.up.unwrap_or(DVec3::Z);
+        let fov = if self.ortho.is_some() { None } else { Some(self.fov.unwrap_or(DEFAULT_FOV)) };
+        let framed = Camera::frame_from(bounds, points, aspect, self.direction(bounds), up, fov);
+        let mut camera = match self.eye.map(local) {
+            Some(eye) => {
+                let projection = match self.ortho {
+                    None => Projection::Perspective(self.fov.unwrap_or(DEFAULT_FOV)),
+                    Some(_) => framed.projection,
+                };
+                Camera::look_at(eye, target, up, projection)?
+            }
+            None => Camera { eye: framed.eye + (target - center), ..framed },
+        };
+        if let Some(Some(height)) = self.ortho {
+            camera.projection = Projection::Orthographic(height);
+        }
+        let zoom = self.zoom.unwrap_or(1.0);
+        camera.projection = match camera.projection {
+            Projection::Perspective(degrees) => {
+                Projection::Perspective(((degrees.to_radians() * 0.5).tan() / zoom).atan().to_degrees() * 2.0)
+            }
+            Projection::Orthographic(height) => Projection::Orthographic(height / zoom),
+        };
+        Ok(camera)
+    }
+
+    /// Direction from the mesh to the eye.
+    fn direction(&self, bounds: &Bounds) -> DVec3 {
+        let base = self.from.unwrap_or_else(|| three_quarter(bounds)).normalize_or(DVec3::NEG_Y);
+        if self.azimuth.is_none() && self.elevation.is_none() {
+            return base;
+        }
+        let azimuth = self.azimuth.map_or_else(|| base.x.atan2(-base.y), f64::to_radians);
+        let elevation = self.elevation.map_or_else(|| base.z.clamp(-1.0, 1.0).asin(), f64::to_radians);
+        DVec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin())
+    }
+}

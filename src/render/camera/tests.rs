@@ -1,0 +1,97 @@
+use super::*;
+
+const BOX: Bounds = Bounds { lo: [-1.0, 2.0, 0.0], hi: [9.0, 4.0, 1.5] };
+
+/// Place of a point in the picture, −1…1 on both axes.
+fn project(camera: &Camera, p: DVec3, aspect: f64) -> [f64; 2] {
+    let d = p - camera.eye;
+    let scale = match camera.projection {
+        Projection::Perspective(degrees) => 1.0 / ((degrees.to_radians() * 0.5).tan() * d.dot(camera.forward)),
+        Projection::Orthographic(height) => 2.0 / height,
+    };
+    [d.dot(camera.right) * scale / aspect, d.dot(camera.up) * scale]
+}
+
+#[test]
+fn every_view_holds_the_whole_box_and_fills_the_picture() {
+    for text in ["iso", "front", "top", "-x", "azimuth=200,elevation=-35", "iso,ortho", "bottom,ortho", "fov=80", "up=1,0,0"] {
+        for aspect in [0.4, 1.0, 2.5] {
+            let camera = text.parse::<CameraSpec>().unwrap().resolve(&BOX, [0.0; 3], aspect).unwrap();
+            let places = BOX.corners().map(|p| project(&camera, p, aspect));
+            let most = places.iter().flatten().fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!((FILL - 1e-6..=FILL + 1e-6).contains(&most), "{text} {aspect}: {most}");
+        }
+    }
+}
+
+#[test]
+fn origin_of_the_source_is_subtracted() {
+    let spec: CameraSpec = "eye=1e7,0,0,target=1e7,1,0".parse().unwrap();
+    let camera = spec.resolve(&BOX, [1e7, 0.0, 0.0], 1.0).unwrap();
+    assert_eq!(camera.eye, DVec3::ZERO);
+    assert_eq!(camera.forward, DVec3::Y);
+    assert_eq!(camera.right, DVec3::X);
+    assert_eq!(camera.up, DVec3::Z);
+}
+
+#[test]
+fn rays_pass_through_their_pixels() {
+    for text in ["iso", "front,ortho", "eye=3,3,0.5,target=4,3,0.5,fov=90"] {
+        let camera = text.parse::<CameraSpec>().unwrap().resolve(&BOX, [0.0; 3], 1.5).unwrap();
+        let size = [30, 20];
+        let rays = camera.rays(size, &BOX);
+        for (x, y) in [(0, 0), (29, 0), (7, 13), (15, 19)] {
+            let (o, d) = rays.ray(x, y);
+            let at = DVec3::from_array(o.map(f64::from)) + DVec3::from_array(d.map(f64::from)) * 2.0;
+            let [s, t] = project(&camera, at, 1.5);
+            let expected = [(f64::from(x) + 0.5) / 15.0 - 1.0, 1.0 - (f64::from(y) + 0.5) / 10.0];
+            assert!((s - expected[0]).abs() < 1e-5 && (t - expected[1]).abs() < 1e-5, "{text} {x} {y}: {s} {t} {expected:?}");
+            let length: f32 = d.iter().map(|v| v * v).sum();
+            assert!((length - 1.0).abs() < 1e-6);
+        }
+    }
+}
+
+#[test]
+fn rays_start_before_the_box() {
+    let camera = Camera::frame(&BOX, 1.0);
+    let rays = camera.rays([8, 8], &BOX);
+    for p in BOX.corners() {
+        let [o, d] = {
+            let (o, d) = rays.ray(3, 4);
+            [o, d].map(|v| DVec3::from_array(v.map(f64::from)))
+        };
+        assert!((p - o).dot(camera.forward) > -1e-4, "{p} {o} {d}");
+    }
+}
+
+#[test]
+fn bad_texts_are_refused_with_the_part_and_the_help() {
+    for (text, part) in [
+        ("sideways", "sideways"),
+        ("eye=1,2", "eye=1"),
+        ("zoom=0", "zoom=0"),
+        ("fov=200", "fov=200"),
+        ("colour=3", "colour=3"),
+        ("eye=nan,1,2", "eye=nan"),
+    ] {
+        let message = text.parse::<CameraSpec>().unwrap_err().to_string();
+        assert!(message.contains(&format!("`{part}`")) && message.contains("azimuth"), "{message}");
+    }
+    assert!("fov=20,ortho".parse::<CameraSpec>().is_err());
+    let same: CameraSpec = "eye=1,1,1,target=1,1,1".parse().unwrap();
+    assert!(same.resolve(&BOX, [0.0; 3], 1.0).is_err());
+}
+
+#[test]
+fn degenerate_boxes_have_a_camera() {
+    for bounds in
+        [Bounds { lo: [1.0; 3], hi: [1.0; 3] }, Bounds { lo: [0.0; 3], hi: [1e-30, 0.0, 0.0] }, Bounds { lo: [-1e37; 3], hi: [1e37; 3] }]
+    {
+        for text in ["iso", "top", "ortho"] {
+            let camera = text.parse::<CameraSpec>().unwrap().resolve(&bounds, [0.0; 3], 1.0).unwrap();
+            let (o, d) = camera.rays([4, 4], &bounds).ray(2, 2);
+            assert!(o.iter().chain(&d).all(|v| v.is_finite()), "{bounds:?} {text} {o:?} {d:?}");
+        }
+    }
+}

@@ -1,0 +1,224 @@
+//! A picture's settings worked out for one mesh and field: all that the kernels and the reference renderer need to know.
+
+use super::settings::DEFAULT_STEPS;
+use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, shading_normals};
+use crate::error::{Error, Result};
+use crate::layout::Grid;
+use crate::mesh::{Field, Mesh, On};
+use glam::DVec3;
+
+/// Entries of the sampled transfer function.
+pub const TABLE_SIZE: usize = 1024;
+/// A step is at least this part of the diagonal: sample numbers stay exact in single precision.
+const MIN_STEP: f64 = 1.0 / 65_536.0;
+
+/// What is drawn.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Plan {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// The rays.
+    pub rays: RayGrid,
+    /// Distance Δ of two samples.
+    pub step: f32,
+    /// The field's value at place 0 of the table.
+    pub value_lo: f32,
+    /// Places per unit of value.
+    pub value_scale: f32,
+    /// [`TABLE_SIZE`] entries: sRGB colour, and opacity of one step.
+    pub table: Vec<[f32; 4]>,
+    /// A ray ends once it is this opaque.
+    pub termination: f32,
+    /// The light; `None`: colours as they are.
+    pub lighting: Option<Lighting>,
+    /// What is behind the mesh.
+    pub background: Background,
+}
+
+impl Plan {
+    /// Works out `settings` for a mesh with these bounds, whose coordinates are relative to `origin`, and a field with this range.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a setting makes no sense, or the step is below 1/65,536 of the diagonal.
+    pub fn new(settings: &RenderSettings, bounds: &Bounds, origin: [f64; 3], field_range: Option<[f32; 2]>) -> Result<Self> {
+        settings.check()?;
+        let [width, height] = settings.size.map(f64::from);
+        let camera = settings.camera.resolve(bounds, origin, width / height)?;
+        Self::with_camera(settings, &camera, bounds, field_range)
+    }
+
+    /// As [`Plan::new`], with another camera than that of the settings.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn with_camera(settings: &RenderSettings, camera: &Camera, bounds: &Bounds, field_range: Option<[f32; 2]>) -> Result<Self> {
+        settings.check()?;
+        let diagonal = bounds.diagonal();
+        let step = settings.step.unwrap_or(diagonal / DEFAULT_STEPS);
+        if step < diagonal * MIN_STEP || !(step as f32).is_normal() {
+            return Err(Error::Invalid(format!(
+                "a step of {step} is too small for a mesh of diagonal {diagonal}; take at least {}",
+                diagonal * MIN_STEP
+            )));
+        }
+        let [right, up, back] = settings.light.map(f64::from);
+        let to_light = (camera.right * right + camera.up * up - camera.forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
+        let range = value_range(settings.range.or(settings.transfer.range()).or(field_range));
+        let exponent = f64::from(settings.opacity_scale) * step / (diagonal * OPACITY_UNIT);
+        let entry = |i: usize| {
+            let [r, g, b, a] = settings.transfer.at(i as f32 / (TABLE_SIZE - 1) as f32);
+            [r, g, b, (1.0 - (1.0 - f64::from(a)).powf(exponent)) as f32]
+        };
+        Ok(Self {
+            size: settings.size,
+            rays: camera.rays(settings.size, bounds),
+            step: step as f32,
+            value_lo: range[0] as f32,
+            value_scale: (1.0 / (range[1] - range[0])) as f32,
+            table: (0..TABLE_SIZE).map(entry).collect(),
+            termination: settings.termination,
+            lighting: settings.shading.then(|| Lighting::new(to_light, (1.0 - (1.0 - f64::from(settings.outline)).powf(exponent)) as f32)),
+            background: settings.background,
+        })
+    }
+
+    /// Colour, and opacity of one step, at a finite value: with `x = clamp((value − lo)·scale, 0, 1)·1023`, i = min(floor(x), 1022), t = x − i,
+    /// `table[i] + (table[i+1] − table[i])·t`.
+    pub fn lookup(&self, value: f32) -> [f32; 4] {
+        let x = ((value - self.value_lo) * self.value_scale).clamp(0.0, 1.0) * (TABLE_SIZE - 1) as f32;
+        let i = (x as usize).min(TABLE_SIZE - 2);
+        let t = x - i as f32;
+        let (a, b) = (self.table[i], self.table[i + 1]);
+        [0, 1, 2, 3].map(|c| a[c] + (b[c] - a[c]) * t)
+    }
+}
+
+/// How much larger than its cell the box of a node is when rays are tested against it, so that rounding of samples, boxes and rays loses
+/// nothing; and the reciprocal of the step. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is four of its last bits.
+pub fn interval_slack(grid: &Grid, plan: &Plan) -> ([f32; 3], f32) {
+    let (lo, hi) = (grid.lo, grid.hi);
+    let largest = (0..3).map(|c| hi[c] - lo[c]).fold(0.0, f32::max);
+    let power = |n: u32| f32::from_bits((127 - n) << 23);
+    let slack = [0, 1, 2].map(|c| largest * power(18) + (lo[c].abs() + hi[c].abs()) * power(21));
+    (slack, 1.0 / plan.step)
+}
+
+/// A plan and the normals that its light needs.
+#[derive(Clone, Debug)]
+pub struct Prepared {
+    /// What is drawn.
+    pub plan: Plan,
+    /// The camera, framed around the mesh's vertices.
+    pub camera: Camera,
+    /// A normal per point of the mesh; empty without shading.
+    pub normals: Vec<[f32; 3]>,
+    /// The values at the ends of the transfer function.
+    pub range: [f32; 2],
+}
+
+impl Prepared {
+    /// All that has to be known to draw `field` on `mesh`. `neighbours` has four entries per tetrahedron, [`u32::MAX`] where the face opposite to
+    /// that vertex is on the surface; `valid` says which tetrahedra count; `bounds` are theirs.
+    ///
+    /// # Errors
+    /// As [`Plan::new`].
+    pub fn new(
+        settings: &RenderSettings,
+        mesh: &Mesh,
+        bounds: &Bounds,
+        neighbours: &[[u32; 4]],
+        valid: impl Fn(usize) -> bool,
+        field: &Field,
+    ) -> Result<Self> {
+        let own = || used_range(mesh, &valid, field);
+        let range = settings.range.or(settings.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
+        let mut settings = RenderSettings { range: Some(range), ..settings.clone() };
+        settings.check()?;
+        if !settings.transfer.has_opacity() {
+            let unit = bounds.diagonal() * OPACITY_UNIT;
+            settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, neighbours, &valid, field, range, unit))?;
+        }
+        let mut used = vec![false; mesh.points.len()];
+        for (_, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
+            for &id in ids {
+                used[id as usize] = true;
+            }
+        }
+        let points = mesh.points.iter().zip(used).filter(|(_, used)| *used);
+        let points: Vec<DVec3> = points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect();
+        let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
+        let camera = settings.camera.resolve_around(bounds, &points, mesh.origin, aspect)?;
+        let plan = Plan::with_camera(&settings, &camera, bounds, None)?;
+        let normals = if settings.shading { shading_normals(mesh, neighbours, &valid, field, range, bounds) } else { Vec::new() };
+        Ok(Self { plan, camera, normals, range })
+    }
+}
+
+/// Smallest and largest finite value that valid tetrahedra have.
+fn used_range(mesh: &Mesh, valid: &impl Fn(usize) -> bool, field: &Field) -> Option<[f32; 2]> {
+    let mut range: Option<[f32; 2]> = None;
+    for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
+        let ids = if field.on == On::Points { ids.map(|id| id as usize) } else { [tet; 4] };
+        for v in ids.into_iter().filter_map(|i| field.values.get(i).copied()).filter(|v| v.is_finite()) {
+            range = Some(range.map_or([v, v], |[lo, hi]| [lo.min(v), hi.max(v)]));
+        }
+    }
+    range
+}
+
+/// The range of values, never empty: a constant field lies in the middle.
+fn value_range(range: Option<[f32; 2]>) -> [f64; 2] {
+    let [lo, hi] = range.unwrap_or([0.0, 1.0]).map(f64::from);
+    let least = lo.abs().max(hi.abs()).max(1e-30) * 1e-6;
+    if hi - lo < least { [lo - least, hi + least] } else { [lo, hi] }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::TransferFunction;
+
+    const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
+
+    #[test]
+    fn opacity_is_independent_of_the_step() {
+        let through = |step: f64| {
+            let settings = RenderSettings { step: Some(step), ..RenderSettings::default() };
+            let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([0.0, 1.0])).unwrap();
+            // Transparency of one unit (1/100 of 13) at the top of the range.
+            (1.0 - plan.lookup(1.0)[3]).powf(0.13 / plan.step)
+        };
+        let expected = 1.0 - TransferFunction::default().at(1.0)[3];
+        for step in [0.13, 0.01, 0.001] {
+            assert!((through(step) - expected).abs() < 1e-3, "{step}: {} {expected}", through(step));
+        }
+    }
+
+    #[test]
+    fn lookups_follow_the_function_and_clamp() {
+        let settings = RenderSettings { step: Some(0.13), ..RenderSettings::default() };
+        let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([100.0, 300.0])).unwrap();
+        for (value, place) in [(100.0, 0.0), (150.0, 0.25), (213.0, 0.565), (300.0, 1.0), (99.0, 0.0), (f32::MAX, 1.0), (f32::MIN, 0.0)] {
+            let (got, expected) = (plan.lookup(value), settings.transfer.at(place));
+            assert!((0..4).all(|c| (got[c] - expected[c]).abs() < 2e-3), "{value}: {got:?} {expected:?}");
+        }
+    }
+
+    #[test]
+    fn constant_and_odd_ranges_have_lookups() {
+        for range in [None, Some([5.0, 5.0]), Some([0.0, 0.0]), Some([f32::MIN, f32::MAX]), Some([1e-40, 2e-40])] {
+            let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], range).unwrap();
+            for v in [0.0, 5.0, f32::MAX, f32::MIN] {
+                assert!(plan.lookup(v).iter().all(|c| (0.0..=1.0).contains(c)), "{range:?} {v} {:?}", plan.lookup(v));
+            }
+        }
+        let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], Some([5.0, 5.0])).unwrap();
+        assert_eq!(((5.0 - plan.value_lo) * plan.value_scale * 10.0).round(), 5.0);
+    }
+
+    #[test]
+    fn tiny_steps_are_refused() {
+        let settings = RenderSettings { step: Some(1e-5), ..RenderSettings::default() };
+        assert!(Plan::new(&settings, &BOX, [0.0; 3], None).unwrap_err().to_string().contains("0.000198"));
+    }
+}

@@ -1,0 +1,186 @@
+//! Shading: normals at the vertices, and the light.
+//!
+//! A vertex on the surface has the surface's normal, of length 1 (less on coarse meshes, to the same effect); one inside has the field's gradient, as long as it is steep, at most 1.
+//! Interpolated like any field they light the surface and the fronts inside the mesh, and leave even regions alone.
+
+use crate::mesh::{Field, Mesh, On};
+use crate::render::{Bounds, inverse_sqrt};
+use glam::{DVec3, Vec3};
+
+/// Part of light that comes from everywhere.
+const AMBIENT: f32 = 0.42;
+/// Part that depends on the angle between normal and light.
+const DIFFUSE: f32 = 0.72;
+/// Strength of highlights (their exponent is 32).
+const SPECULAR: f32 = 0.18;
+/// A surface's normal is full where the cells on it are at most this thick, in diagonals: the lit skin is as deep on coarse meshes as on fine ones.
+const SKIN: f64 = 0.02;
+/// A gradient is a full normal once it would cross the field's range on this part of the diagonal.
+const STEEP: f64 = 0.12;
+
+/// The light of a picture.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Lighting {
+    /// Unit vector to the light, in mesh coordinates.
+    pub to_light: [f32; 3],
+    /// Ambient, diffuse, specular.
+    pub strength: [f32; 3],
+    /// Opacity of one step on a surface seen exactly from the side.
+    pub rim: f32,
+}
+
+/// What light does to a sample: `lit = min(color·factor + added, 1)`, `opacity' = a + (1 − a)·rim`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shade {
+    /// Factor on the colour.
+    pub factor: f32,
+    /// White added.
+    pub added: f32,
+    /// Opacity added.
+    pub rim: f32,
+}
+
+impl Lighting {
+    /// The usual strengths with the light in that direction (unit vector).
+    pub fn new(to_light: Vec3, rim: f32) -> Self {
+        Self { to_light: to_light.to_array(), strength: [AMBIENT, DIFFUSE, SPECULAR], rim }
+    }
+
+    /// The unit vector halfway between the light and the viewer of a ray with this unit direction, for [`Lighting::shade`].
+    pub fn half(&self, direction: [f32; 3]) -> [f32; 3] {
+        let h = [0, 1, 2].map(|c| self.to_light[c] - direction[c]);
+        let square = dot(h, h).max(1e-12);
+        let r = inverse_sqrt(square);
+        h.map(|v| v * r)
+    }
+
+    /// Light on a sample of a ray with this unit direction and its `half`.
+    ///
+    /// `n` is the interpolated normal, of length up to 1. With m = min(|n|, 1), c = |n·light|/|n|, h = min(|n·half|/|n|, 1) and
+    /// g = 1 − min(|n·direction|/|n|, 1) (the sides of a normal are alike): factor = 1 + m·((ambient + diffuse·c) − 1),
+    /// added = m·(specular·h^32), rim = m·(g⁴·rim).
+    pub fn shade(&self, n: [f32; 3], direction: [f32; 3], half: [f32; 3]) -> Shade {
+        let square = dot(n, n);
+        if square < 1e-8 {
+            return Shade { factor: 1.0, added: 0.0, rim: 0.0 };
+        }
+        let r = inverse_sqrt(square);
+        let m = (square * r).min(1.0);
+        let c = dot(n, self.to_light).abs() * r;
+        let g = 1.0 - (dot(n, direction).abs() * r).min(1.0);
+        let mut h = (dot(n, half).abs() * r).min(1.0);
+        for _ in 0..5 {
+            h *= h;
+        }
+        let [ambient, diffuse, specular] = self.strength;
+        Shade { factor: 1.0 + m * ((ambient + diffuse * c) - 1.0), added: m * (specular * h), rim: m * ((g * g) * (g * g) * self.rim) }
+    }
+}
+
+fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
+    (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// A normal per vertex of the mesh, for shading. `neighbours` has four entries per tetrahedron, [`u32::MAX`] where the face opposite
+/// to that vertex is on the surface; `valid` says which tetrahedra count. A field of cells has no gradient, only the surface is lit.
+pub fn shading_normals(
+    mesh: &Mesh,
+    neighbours: &[[u32; 4]],
+    valid: impl Fn(usize) -> bool,
+    field: &Field,
+    range: [f32; 2],
+    bounds: &Bounds,
+) -> Vec<[f32; 3]> {
+    let span = f64::from(range[1]) - f64::from(range[0]);
+    let length = bounds.diagonal();
+    let scale = if span > 0.0 && field.on == On::Points && field.values.len() == mesh.points.len() { STEEP * length / span } else { 0.0 };
+    // Per vertex: normal times area, volume of the cells below, area.
+    let mut surface = vec![(DVec3::ZERO, 0.0, 0.0); mesh.points.len()];
+    let mut inside = vec![(DVec3::ZERO, 0.0); mesh.points.len()];
+    let tets = mesh.tets.iter().zip(neighbours).enumerate().filter(|&(tet, _)| valid(tet));
+    for (_, (ids, across)) in tets {
+        let ids = ids.map(|id| id as usize);
+        // In diagonals, so that no product overflows on meshes of any size.
+        let p = ids.map(|id| DVec3::from_array(mesh.points[id].map(f64::from)) / length);
+        let volume = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]);
+        for i in 0..4 {
+            let face = [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)][i];
+            let normal = (p[face.1] - p[face.0]).cross(p[face.2] - p[face.0]) * volume.signum();
+            if across[i] == u32::MAX {
+                for k in [face.0, face.1, face.2] {
+                    let (sum, below, area) = &mut surface[ids[k]];
+                    *sum += normal;
+                    *below += volume.abs();
+                    *area += normal.length();
+                }
+            }
+        }
+        if scale > 0.0 && volume != 0.0 {
+            let v = ids.map(|id| f64::from(field.values[id]));
+            if v.iter().all(|v| v.is_finite()) {
+                let (a, b, c) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
+                // The gradient times the volume: averages over the cells round a vertex weigh them by volume.
+                let gradient = (b.cross(c) * (v[1] - v[0]) + c.cross(a) * (v[2] - v[0]) + a.cross(b) * (v[3] - v[0])) * volume.signum();
+                for id in ids {
+                    inside[id].0 += gradient;
+                    inside[id].1 += volume.abs();
+                }
+            }
+        }
+    }
+    let normal = |((sum, below, area), (gradient, volume)): ((DVec3, f64, f64), (DVec3, f64))| {
+        // Volume (sixfold) over area (twofold) is the height of the cells.
+        let skin = |n: DVec3| n * if below > SKIN * area { SKIN * area / below } else { 1.0 };
+        let gradient = || if volume > 0.0 { (gradient / volume * (scale / length)).clamp_length_max(1.0) } else { DVec3::ZERO };
+        let n = sum.try_normalize().map_or_else(gradient, skin);
+        n.as_vec3().to_array()
+    };
+    surface.into_iter().zip(inside).map(normal).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::kuhn;
+
+    #[test]
+    fn normals_of_a_corner_tetrahedron_point_outwards() {
+        let mut mesh = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], vec![[0, 1, 2, 3]]);
+        mesh.fields.push(Field { name: "x".into(), on: On::Points, values: vec![0.0, 1.0, 0.0, 0.0] });
+        let bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+        for ids in [[0, 1, 2, 3], [1, 0, 2, 3]] {
+            mesh.tets = vec![ids];
+            let normals = shading_normals(&mesh, &[[u32::MAX; 4]], |_| true, &mesh.fields[0], [0.0, 1.0], &bounds);
+            let s = normals[0][0];
+            assert!(s < 0.0 && normals[0].iter().all(|v| (v - s).abs() < 1e-5), "{normals:?}");
+            assert!(normals[1][0] > 0.0 && normals[2][1] > 0.0 && normals[3][2] > 0.0);
+        }
+    }
+
+    #[test]
+    fn gradients_inside_do_not_depend_on_scale() {
+        for scale in [1.0, 1e-25, 1e30] {
+            let mut mesh = kuhn([2, 2, 2]).unwrap();
+            mesh.points.iter_mut().for_each(|p| *p = p.map(|v| v * scale));
+            mesh.fields[0].values = mesh.points.iter().map(|p| p[1] / scale).collect();
+            let bounds = Bounds { lo: [0.0; 3], hi: [2.0 * scale; 3] };
+            // Without surface: every vertex has the gradient.
+            let normals = shading_normals(&mesh, &vec![[0; 4]; mesh.tets.len()], |_| true, &mesh.fields[0], [0.0, 2.0], &bounds);
+            let expected = STEEP as f32 * 12f32.sqrt() / 2.0;
+            assert!(normals.iter().all(|n| (n[1] - expected).abs() < 1e-4 && n[0].abs() < 1e-5), "{scale}: {:?} {expected}", normals[13]);
+        }
+    }
+
+    #[test]
+    fn light_on_a_facing_normal_is_brighter_than_on_a_grazing_one() {
+        let light = Lighting::new(Vec3::Z, 0.25);
+        let down = [0.0, 0.0, -1.0];
+        let half = light.half(down);
+        let facing = light.shade([0.0, 0.0, -1.0], down, half);
+        let grazing = light.shade([1.0, 0.0, 0.0], down, half);
+        let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
+        assert!(near(facing.factor, AMBIENT + DIFFUSE) && near(facing.added, SPECULAR) && near(facing.rim, 0.0), "{facing:?}");
+        assert!(near(grazing.factor, AMBIENT) && grazing.added == 0.0 && near(grazing.rim, 0.25), "{grazing:?}");
+        assert_eq!(light.shade([0.0; 3], down, half), Shade { factor: 1.0, added: 0.0, rim: 0.0 });
+    }
+}

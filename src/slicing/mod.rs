@@ -1,0 +1,211 @@
+//! What a slice is (SPEC 3.4): a stack of layers of voxels. Knows no Vulkan: the kernels and the reference both slice a [`VoxelGrid`], with the
+//! same operations in the same order.
+//!
+//! # Definition
+//! - The centre of voxel (x, y) of layer k is `((origin + k·up) + y·down) + x·across`; row 0 of a layer has the lowest coordinate.
+//! - Its box is the centre ± the three half axes of [`VoxelGrid::half`], a closed set; on an oblique plane it is rotated with the plane. The box is
+//!   tested in normalised coordinates, its half axes there rounded to multiples of 2^-42.
+//! - The centre lies in the mesh (it has an owner, SPEC 3.1): kind [`INSIDE`], value interpolated there.
+//! - Else, of the boundary primitives that touch the box, by separating axes with the allowance that [`crate::reference::separate`] states, the
+//!   one nearest to the centre (squared distances as computed; ties: lowest id) is the owner: kind [`TOUCHED`]. Its value is that of its closest
+//!   point, or continued linearly to the centre.
+//! - Else kind [`EMPTY`], value NaN.
+
+pub mod settings;
+pub use settings::{Plane, SliceSettings};
+
+use crate::error::{Error, Result};
+use crate::layout::{Grid, SlicePlan};
+
+/// Kind of a voxel that the mesh does not touch.
+pub const EMPTY: u8 = 0;
+/// Kind of a voxel whose box the mesh touches, its centre being outside.
+pub const TOUCHED: u8 = 1;
+/// Kind of a voxel whose centre lies in the mesh.
+pub const INSIDE: u8 = 2;
+
+/// Voxels of a row whose centres are located together, each from the owner of the one before.
+pub const RUN: u32 = 32;
+/// Steps of a walk across faces before the tree is asked.
+pub const WALK: u32 = 6;
+/// Most voxels along an axis: numbers up to this are exact in single precision.
+pub const MOST: u32 = 1 << 24;
+
+/// What a touched voxel gets.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Extrapolate {
+    /// The value at the closest point of the closest primitive.
+    #[default]
+    Nearest,
+    /// The field of the closest primitive continued to the centre of the voxel. (Of a flat primitive: as `Nearest`.)
+    Linear,
+}
+
+/// Where the voxels of a stack of layers lie.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct VoxelGrid {
+    /// Centre of voxel (0, 0) of layer 0.
+    pub origin: [f32; 3],
+    /// From one voxel to the next in a row.
+    pub across: [f32; 3],
+    /// From one row to the next.
+    pub down: [f32; 3],
+    /// From one layer to the next.
+    pub up: [f32; 3],
+    /// Half axes of a voxel's box.
+    pub half: [[f32; 3]; 3],
+    /// Voxels per row, and rows.
+    pub size: [u32; 2],
+    /// Layers.
+    pub layers: u32,
+}
+
+impl VoxelGrid {
+    /// Centre of a voxel.
+    pub fn centre(&self, [x, y, k]: [u32; 3]) -> [f32; 3] {
+        let (x, y, k) = (x as f32, y as f32, k as f32);
+        [0, 1, 2].map(|c| ((self.origin[c] + k * self.up[c]) + y * self.down[c]) + x * self.across[c])
+    }
+
+    /// Voxels of a layer.
+    pub fn layer_voxels(&self) -> u64 {
+        u64::from(self.size[0]) * u64::from(self.size[1])
+    }
+
+    /// Voxels of all layers.
+    pub fn voxels(&self) -> u64 {
+        self.layer_voxels() * u64::from(self.layers)
+    }
+
+    /// What the kernels and the reference need of these voxels over the mesh with grid `grid`.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if there are no voxels or too many, or if their boxes are flat, not finite, or more than twice as large as the mesh.
+    pub fn plan(&self, grid: &Grid) -> Result<SlicePlan> {
+        let [w, h] = self.size;
+        if w == 0 || h == 0 || self.layers == 0 || w.max(h).max(self.layers) > MOST {
+            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST} along each axis", self.layers)));
+        }
+        let last = self.centre([w - 1, h - 1, self.layers - 1]);
+        let vectors = [self.origin, self.across, self.down, self.up, last, self.half[0], self.half[1], self.half[2]];
+        if vectors.iter().flatten().any(|x| !x.is_finite() || x.abs() >= 1e37) {
+            return Err(Error::Invalid("voxels with coordinates that are not finite or beyond 1e37".into()));
+        }
+        let two_to = |n: i32| 2f64.powi(n);
+        // Half axes in normalised coordinates, in the mesh's units, and their sum per axis.
+        let normalised =
+            self.half.map(|a| a.map(|x| ((f64::from(x) * f64::from(grid.scale) * two_to(40)) * two_to(42)).round() * two_to(-42)));
+        let sum = [0, 1, 2].map(|c| normalised.iter().map(|a| a[c].abs()).sum::<f64>());
+        if normalised.iter().any(|a| a.iter().all(|&x| x == 0.0)) {
+            return Err(Error::Invalid("voxels without volume; size and thickness must be above 0".into()));
+        }
+        if sum.iter().any(|&x| x > two_to(41)) {
+            return Err(Error::Invalid("voxels more than twice as large as the mesh; take a smaller thickness or more voxels".into()));
+        }
+        let largest = (0..3).map(|c| f64::from(grid.hi[c]) - f64::from(grid.lo[c])).fold(0.0, f64::max);
+        let reach = |c: usize| self.half.iter().map(|a| f64::from(a[c].abs())).sum::<f64>() * (1.0 + two_to(-10)) + largest * two_to(-14);
+        let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
+        Ok(SlicePlan {
+            origin: pad(self.origin),
+            across: pad(self.across),
+            down: pad(self.down),
+            up: pad(self.up),
+            half0: pad(normalised[0].map(|x| x as f32)),
+            half1: pad(normalised[1].map(|x| x as f32)),
+            half2: pad(normalised[2].map(|x| x as f32)),
+            reach: pad([0, 1, 2].map(|c| reach(c) as f32)),
+            width: w,
+            height: h,
+            layers: self.layers,
+            pad: 0,
+        })
+    }
+}
+
+/// Consecutive rows of a stack.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Rows {
+    /// Layer of the first row.
+    pub layer: u32,
+    /// Number of the first row in that layer; 0 where there are rows of several layers.
+    pub first: u32,
+    /// Number of rows; behind the last row of a layer comes the first one of the next.
+    pub count: u32,
+}
+
+impl Rows {
+    /// Row and layer of the i-th row.
+    pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
+        let at = self.first + i;
+        [at % height, self.layer + at / height]
+    }
+}
+
+/// Voxels of whole rows: of a part of a layer, or of several whole layers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Band {
+    /// Which rows.
+    pub rows: Rows,
+    /// Value per voxel, NaN where empty or without field.
+    pub values: Vec<f32>,
+    /// Kind per voxel.
+    pub kinds: Vec<u8>,
+    /// Owner per voxel, or all ones.
+    pub owners: Vec<u32>,
+}
+
+/// Voxels by kind.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tally {
+    /// Centre in the mesh.
+    pub inside: u64,
+    /// Touched by the mesh.
+    pub touched: u64,
+    /// Neither.
+    pub empty: u64,
+}
+
+impl Tally {
+    /// Adds the voxels of a band.
+    pub fn add(&mut self, kinds: &[u8]) {
+        for &kind in kinds {
+            match kind {
+                INSIDE => self.inside += 1,
+                TOUCHED => self.touched += 1,
+                _ => self.empty += 1,
+            }
+        }
+    }
+}
+
+/// The parts in which a stack is sliced: as many whole rows as make at most `most` voxels, at least one; several layers only if whole.
+pub fn bands(grid: &VoxelGrid, most: u64) -> impl Iterator<Item = Rows> + use<> {
+    let [w, h] = grid.size;
+    let layers = grid.layers;
+    let whole = (most / grid.layer_voxels().max(1)).min(u64::from(u32::MAX / h.max(1))).min(u64::from(layers)) as u32;
+    let rows = if whole >= 1 { h } else { (most / u64::from(w.max(1))).clamp(1, u64::from(h.max(1))) as u32 };
+    let step = whole.max(1);
+    (0..layers).step_by(step as usize).flat_map(move |layer| {
+        let of_layer = move |first| Rows { layer, first, count: if step > 1 { h * step.min(layers - layer) } else { rows.min(h - first) } };
+        (0..h).step_by(rows.max(1) as usize).map(of_layer)
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bands_cover_a_stack_once() {
+        for (size, layers) in [([7, 5], 11), ([1, 1], 1), ([300, 200], 3), ([1000, 1], 4)] {
+            let voxels = VoxelGrid { origin: [0.0; 3], across: [1.0; 3], down: [1.0; 3], up: [1.0; 3], half: [[1.0; 3]; 3], size, layers };
+            for most in [1, 10, 35, 40, 100, 1000, 100_000] {
+                let rows: Vec<[u32; 2]> = bands(&voxels, most).flat_map(|b| (0..b.count).map(move |i| b.row(i, size[1]))).collect();
+                let expected: Vec<[u32; 2]> = (0..layers).flat_map(|k| (0..size[1]).map(move |y| [y, k])).collect();
+                assert_eq!(rows, expected, "{size:?} {layers} {most}");
+                let largest = bands(&voxels, most).map(|b| u64::from(b.count) * u64::from(size[0])).max();
+                assert!(largest.is_some_and(|n| n <= most.max(u64::from(size[0]))));
+            }
+        }
+    }
+}

@@ -1,0 +1,156 @@
+//! From what a user asks for to a [`VoxelGrid`]: plane, place, layers, size, thickness.
+
+use super::{MOST, VoxelGrid};
+use crate::error::{Error, Result};
+use glam::DVec3;
+
+/// The plane of the layers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Plane {
+    /// Perpendicular to an axis: 0 is x, 1 is y, 2 is z. Rows run along the next axis but one in the order x y z without it: (y, z), (x, z), (x, y).
+    Axis(usize),
+    /// Perpendicular to a direction of any length.
+    Normal([f64; 3]),
+}
+
+/// A stack of layers as a user describes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SliceSettings {
+    /// The plane of the layers.
+    pub plane: Plane,
+    /// Place of the first layer's centre along the (unit) normal, in the coordinates of the source. `None`: the layers fill the mesh.
+    pub at: Option<f64>,
+    /// Number of layers, upwards along the normal.
+    pub layers: u32,
+    /// Voxels per row and rows; 0: as many as make the voxels square.
+    pub size: [u32; 2],
+    /// Size of a voxel along the normal. `None`: with one layer the size of a voxel in the plane, with more their share of the mesh.
+    pub thickness: Option<f64>,
+    /// Distance of two layers; `None`: their thickness.
+    pub spacing: Option<f64>,
+}
+
+impl Default for SliceSettings {
+    fn default() -> Self {
+        Self { plane: Plane::Axis(2), at: None, layers: 1, size: [512, 0], thickness: None, spacing: None }
+    }
+}
+
+/// Two unit vectors that make a right-handed system with the unit normal `n`: the first is perpendicular to the axis that is least along `n`.
+fn in_plane(n: DVec3) -> (DVec3, DVec3) {
+    let a = n.abs();
+    let least = if a.x <= a.y && a.x <= a.z {
+        DVec3::X
+    } else if a.y <= a.z {
+        DVec3::Y
+    } else {
+        DVec3::Z
+    };
+    let u = least.cross(n).normalize_or_zero();
+    (u, n.cross(u))
+}
+
+impl SliceSettings {
+    /// The voxels over a mesh with the bounds `[lo, hi]` relative to `origin`. They cover the bounds as seen along the normal.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for a normal of no length, sizes of 0 or beyond 2^24, a thickness that is not above 0, or a mesh without extent.
+    pub fn voxels(&self, lo: [f32; 3], hi: [f32; 3], origin: [f64; 3]) -> Result<VoxelGrid> {
+        let invalid = |text: &str| Err(Error::Invalid(text.into()));
+        let (n, u, v) = match self.plane {
+            Plane::Axis(0) => (DVec3::X, DVec3::Y, DVec3::Z),
+            Plane::Axis(1) => (DVec3::Y, DVec3::X, DVec3::Z),
+            Plane::Axis(2) => (DVec3::Z, DVec3::X, DVec3::Y),
+            Plane::Axis(_) => return invalid("an axis is x, y or z"),
+            Plane::Normal(n) => {
+                let n = DVec3::from_array(n);
+                let Some(n) = n.try_normalize() else { return invalid("the normal of a slice has no length") };
+                let (u, v) = in_plane(n);
+                (n, u, v)
+            }
+        };
+        let corners = (0..8).map(|i| {
+            let pick = |c: usize| f64::from(if i >> c & 1 == 0 { lo[c] } else { hi[c] });
+            DVec3::new(pick(0), pick(1), pick(2))
+        });
+        let corners: Vec<DVec3> = corners.collect();
+        let span = |d: DVec3| {
+            let along = corners.iter().map(|p| p.dot(d));
+            (along.clone().fold(f64::INFINITY, f64::min), along.fold(f64::NEG_INFINITY, f64::max))
+        };
+        let [(u0, u1), (v0, v1), (n0, n1)] = [u, v, n].map(span);
+        let (wide, high) = (u1 - u0, v1 - v0);
+        let largest = wide.max(high).max(n1 - n0);
+        if !largest.is_finite() || largest <= 0.0 {
+            return invalid("the mesh has no extent; there is nothing to slice");
+        }
+        // A side of no extent gets voxels all the same.
+        let (wide, high) = (wide.max(largest * 1e-6), high.max(largest * 1e-6));
+        let [w, h] = match self.size {
+            [0, 0] => return invalid("a layer needs at least one voxel"),
+            [w, 0] => [w, (f64::from(w) * high / wide).ceil().clamp(1.0, f64::from(MOST)) as u32],
+            [0, h] => [(f64::from(h) * wide / high).ceil().clamp(1.0, f64::from(MOST)) as u32, h],
+            size => size,
+        };
+        if w > MOST || h > MOST || self.layers == 0 || self.layers > MOST {
+            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST} along each axis", self.layers)));
+        }
+        let (du, dv) = if self.size.contains(&0) {
+            let side = if self.size[1] == 0 { wide / f64::from(w) } else { high / f64::from(h) };
+            (side, side)
+        } else {
+            (wide / f64::from(w), high / f64::from(h))
+        };
+        let deep = (n1 - n0).max(largest * 1e-6);
+        let share = deep / f64::from(self.layers);
+        let thickness = self.thickness.or(self.spacing).unwrap_or(if self.layers > 1 && self.at.is_none() { share } else { du.max(dv) });
+        let spacing = self.spacing.unwrap_or(thickness);
+        if !(thickness > 0.0 && thickness.is_finite() && spacing.is_finite()) {
+            return invalid("the thickness of a layer must be above 0");
+        }
+        let middle = f64::midpoint(n0, n1);
+        let at = match self.at {
+            Some(at) if at.is_finite() => at - DVec3::from_array(origin).dot(n),
+            Some(_) => return invalid("the place of a slice must be a number"),
+            None => middle - spacing * (f64::from(self.layers) - 1.0) * 0.5,
+        };
+        // Centred where square voxels overhang.
+        let first = |lo: f64, hi: f64, d: f64, count: u32| f64::midpoint(lo, hi) - d * (f64::from(count) - 1.0) * 0.5;
+        let corner = u * first(u0, u1, du, w) + v * first(v0, v1, dv, h) + n * at;
+        let single = |d: DVec3| d.as_vec3().to_array();
+        Ok(VoxelGrid {
+            origin: single(corner),
+            across: single(u * du),
+            down: single(v * dv),
+            up: single(n * spacing),
+            half: [single(u * (0.5 * du)), single(v * (0.5 * dv)), single(n * (0.5 * thickness))],
+            size: [w, h],
+            layers: self.layers,
+        })
+    }
+
+    /// The same with cubes for voxels, as packages for printers want them: as thick and far apart as they are wide.
+    /// `fill`: as many layers as fill the mesh.
+    ///
+    /// # Errors
+    /// As [`SliceSettings::voxels`]; and [`Error::Invalid`] for settings that make no cubes.
+    pub fn cubes(&self, lo: [f32; 3], hi: [f32; 3], origin: [f64; 3], fill: bool) -> Result<Self> {
+        let mut cubes = Self { size: [self.size[0], 0], ..*self };
+        let flat = cubes.voxels(lo, hi, origin)?;
+        let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
+        let side = length(flat.across);
+        let differs = |given: Option<f64>| given.is_some_and(|t| (t - side).abs() > 1e-3 * side);
+        if differs(self.thickness) || differs(self.spacing) || self.size[1] != 0 {
+            let text =
+                format!("voxels of this package are cubes, here of {side}; leave --thickness, --spacing and the height of --size out");
+            return Err(Error::Invalid(text));
+        }
+        (cubes.thickness, cubes.spacing) = (Some(side), Some(side));
+        if fill {
+            let unit = DVec3::from_array(flat.half[2].map(f64::from)).normalize_or_zero().abs();
+            let deep = (0..3).map(|c| (f64::from(hi[c]) - f64::from(lo[c])) * unit[c]).sum::<f64>();
+            cubes.layers = (deep / side - 1e-6).ceil().clamp(1.0, f64::from(MOST)) as u32;
+        }
+        Ok(cubes)
+    }
+}

@@ -1,0 +1,109 @@
+//! The arrays of a tree in host memory (SPEC 2.5, the paper's §3.1), equal byte for byte to those on a device.
+
+mod stats;
+mod validate;
+pub use stats::{Memory, TreeStats};
+
+use crate::options::Assign;
+use crate::reference::boundary::bit;
+use crate::reference::grid::{Grid, MAX_LEVEL, morton};
+use crate::reference::leaves::Box6;
+use std::ops::Range;
+
+/// An OLBVH: nodes breadth first, node 0 the root on level 0, leaves on level l = `grid.level`.
+///
+/// A mesh without a single valid cell has one node, an empty leaf.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TreeArrays {
+    /// The assignment that the entries follow.
+    pub assign: Assign,
+    /// The grid whose cells the leaves are; its `level` is l.
+    pub grid: Grid,
+    /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
+    pub p: Vec<u32>,
+    /// `PO[n_n + 1]`: node j ends at entry `po[j + 1]`; see [`TreeArrays::entries`] for where it begins.
+    pub po: Vec<u32>,
+    /// `CO[n_ni + 1]`: the children of internal node i are `co[i] + 1 ..= co[i + 1]`.
+    pub co: Vec<u32>,
+    /// `NO[l + 1]`: `no[k]` nodes on levels 0…k.
+    pub no: Vec<u32>,
+    /// Boundary flag per node, bit j % 32 of word j / 32; set if a boundary primitive lies in the node.
+    pub boundary: Vec<u32>,
+    /// Child mask per internal node, byte i % 4 of word i / 4; bit d: the child with the 3-bit Morton digit d exists.
+    pub mask: Vec<u32>,
+    /// Box per node, `[lo, hi]` in the units of the mesh: a leaf's is its cell's, others the union of their children's.
+    pub boxes: Option<Vec<Box6>>,
+}
+
+impl TreeArrays {
+    /// Number of nodes, `n_n`.
+    pub fn nodes(&self) -> u32 {
+        self.no.last().copied().unwrap_or(0)
+    }
+
+    /// Number of nodes that are not leaves, `n_ni`; they come first.
+    pub fn internal_nodes(&self) -> u32 {
+        self.co.len().saturating_sub(1) as u32
+    }
+
+    /// The node indices of the leaves.
+    pub fn leaves(&self) -> Range<u32> {
+        self.internal_nodes()..self.nodes()
+    }
+
+    /// The node indices of a level; empty past the last.
+    pub fn level_nodes(&self, level: u32) -> Range<u32> {
+        let end = |k: u32| self.no.get(k as usize).copied().unwrap_or(self.nodes());
+        if level == 0 { 0..end(0) } else { end(level - 1)..end(level) }
+    }
+
+    /// The level of a node.
+    pub fn level_of(&self, node: u32) -> u32 {
+        self.no.partition_point(|&n| n <= node) as u32
+    }
+
+    /// The children of a node, in the order of their digits; empty for leaves.
+    pub fn children(&self, node: u32) -> Range<u32> {
+        match self.co.get(node as usize..node as usize + 2) {
+            Some(co) => co[0] + 1..co[1] + 1,
+            None => 0..0,
+        }
+    }
+
+    /// Child mask of a node, 0 for leaves.
+    pub fn child_mask(&self, node: u32) -> u32 {
+        if node < self.internal_nodes() { self.mask[node as usize / 4] >> (8 * (node % 4)) & 0xff } else { 0 }
+    }
+
+    /// The child of a node with the 3-bit Morton digit `digit`.
+    pub fn child(&self, node: u32, digit: u32) -> Option<u32> {
+        let mask = self.child_mask(node);
+        let before = (mask & ((1 << digit) - 1)).count_ones();
+        (mask >> digit & 1 != 0).then(|| self.co[node as usize] + 1 + before)
+    }
+
+    /// The slots of a node's entries in `p`: from `po[node]`, or from 0 where `po[node] ≥ po[node + 1]`, because the nodes of the next level
+    /// begin anew. The paper has `>` there (Eq. 9); no node is empty, so equality too means a new level: one of a single node, as meshes
+    /// have whose box is a point.
+    pub fn entries(&self, node: u32) -> Range<usize> {
+        let (begin, end) = (self.po[node as usize], self.po[node as usize + 1]);
+        if begin >= end { 0..end as usize } else { begin as usize..end as usize }
+    }
+
+    /// The primitives of a node: ascending and each once for a leaf; for others the lists of their leaves one after the other.
+    pub fn primitives(&self, node: u32) -> &[u32] {
+        &self.p[self.entries(node)]
+    }
+
+    /// Whether a boundary primitive lies in the node. If not, the node's leaves are full of mesh.
+    pub fn is_boundary(&self, node: u32) -> bool {
+        bit(&self.boundary, node)
+    }
+
+    /// The leaf that stands for a cell of the finest grid (as [`Grid::quantize`] gives it), by descent over the child masks.
+    pub fn find_leaf(&self, finest: [u32; 3]) -> Option<u32> {
+        let level = self.grid.level;
+        let code = morton(finest) >> (3 * (MAX_LEVEL - level));
+        (0..level).try_fold(0, |node, k| self.child(node, code >> (3 * (level - 1 - k)) & 7))
+    }
+}

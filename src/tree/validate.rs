@@ -1,0 +1,202 @@
+//! The rules that every tree keeps (SPEC 2.5).
+
+use super::{TreeArrays, TreeStats};
+use crate::error::{Error, Result};
+use crate::mesh::Mesh;
+use crate::options::Assign;
+use crate::reference::assign::Filter;
+use crate::reference::boundary::Topology;
+use crate::reference::codes::Stage;
+use crate::reference::grid::{MAX_LEVEL, unmorton};
+use crate::reference::leaves::{cell_box, flag};
+use crate::reference::levels::union;
+use crate::reference::vertices::Vertices;
+use rayon::prelude::*;
+
+/// Outcome of a rule: the text names what is wrong, with indices.
+type Rule = Result<(), String>;
+
+/// Breaks the rule unless `holds`.
+fn rule(holds: bool, text: impl FnOnce() -> String) -> Rule {
+    if holds { Ok(()) } else { Err(text()) }
+}
+
+impl TreeArrays {
+    /// Checks every rule of the data structure against the mesh the tree was built over, and gathers statistics. Never panics, whatever the
+    /// arrays hold.
+    ///
+    /// # Errors
+    /// [`Error::BrokenTree`] with the first broken rule and the indices that break it; [`Error::Invalid`] if `topology` is not of `mesh`.
+    pub fn validate(&self, mesh: &Mesh, topology: &Topology) -> Result<TreeStats> {
+        if topology.neighbours.len() != mesh.tets.len() {
+            let (of, is) = (topology.neighbours.len(), mesh.tets.len());
+            return Err(Error::Invalid(format!("the topology is of a mesh of {of} tetrahedra, this mesh has {is}")));
+        }
+        let rules = || -> Rule {
+            self.check_grid(topology)?;
+            self.check_lengths()?;
+            self.check_levels()?;
+            self.check_children()?;
+            let codes = self.check_masks()?;
+            self.check_offsets()?;
+            self.check_lists(mesh, topology, &codes)?;
+            self.check_flags(mesh, topology, &codes)?;
+            self.check_boxes(&codes)
+        };
+        rules().map_err(Error::BrokenTree)?;
+        Ok(self.stats())
+    }
+
+    /// The grid is that of the mesh.
+    fn check_grid(&self, topology: &Topology) -> Rule {
+        let level = self.grid.level;
+        rule(level <= MAX_LEVEL, || format!("grid: level {level} is beyond {MAX_LEVEL}"))?;
+        let mut expected = topology.grid;
+        expected.level = level;
+        rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
+    }
+
+    /// All arrays are as long as NO says; bits and bytes past the last node are 0.
+    fn check_lengths(&self) -> Rule {
+        let (level, nodes) = (self.grid.level as usize, self.nodes() as usize);
+        rule(self.no.len() == level + 1, || format!("NO has {} levels, the grid {}", self.no.len(), level + 1))?;
+        let internal = if level == 0 { 0 } else { self.no[level - 1] as usize };
+        let length =
+            |name: &str, is: usize, needs: usize| rule(is == needs, || format!("{name} has {is} elements, {nodes} nodes need {needs}"));
+        length("PO", self.po.len(), nodes + 1)?;
+        length("CO", self.co.len(), internal + 1)?;
+        length("BF", self.boundary.len(), nodes.div_ceil(32))?;
+        length("mask", self.mask.len(), internal.div_ceil(4))?;
+        length("BV", self.boxes.as_ref().map_or(nodes, Vec::len), nodes)?;
+        let tail = |words: &[u32], used: usize| used == 0 || words.last().is_none_or(|w| w >> used == 0);
+        rule(tail(&self.boundary, nodes % 32), || format!("BF has bits past node {nodes}"))?;
+        rule(tail(&self.mask, internal % 4 * 8), || format!("mask has bits past internal node {internal}"))
+    }
+
+    /// NO: one root; every level has at least a node and at most 8 per node above.
+    fn check_levels(&self) -> Rule {
+        rule(self.no[0] == 1, || format!("NO[0] = {}, there is one root", self.no[0]))?;
+        let mut above = 1;
+        for (k, pair) in self.no.windows(2).enumerate() {
+            let here = i64::from(pair[1]) - i64::from(pair[0]);
+            rule((1..=8 * above).contains(&here), || format!("NO[{}] = {} puts {here} nodes below {above}", k + 1, pair[1]))?;
+            above = here;
+        }
+        Ok(())
+    }
+
+    /// CO: 1 to 8 children, contiguous, those of a level's nodes being exactly the next level.
+    fn check_children(&self) -> Rule {
+        rule(self.co[0] == 0, || format!("CO[0] = {}, children begin at node 1", self.co[0]))?;
+        for (i, pair) in self.co.windows(2).enumerate() {
+            let n = i64::from(pair[1]) - i64::from(pair[0]);
+            rule((1..=8).contains(&n), || format!("node {i} has {n} children: CO[{i}] = {}, CO[{}] = {}", pair[0], i + 1, pair[1]))?;
+        }
+        for pair in self.no.windows(2) {
+            let (last, end) = (pair[0] as usize, self.co[pair[0] as usize]);
+            rule(end == pair[1] - 1, || format!("CO[{last}] = {end}, but the level of its children ends at node {}", pair[1] - 1))?;
+        }
+        Ok(())
+    }
+
+    /// Masks count the children. Returns the Morton codes of all nodes, parents' prefixes included by construction, ascending on each level.
+    fn check_masks(&self) -> Result<Vec<u32>, String> {
+        let mut codes = vec![0; self.nodes() as usize];
+        for i in 0..self.internal_nodes() {
+            let (mask, children) = (self.child_mask(i), self.children(i));
+            let n = children.len() as u32;
+            rule(mask.count_ones() == n, || format!("mask of node {i} is {mask:#010b}, it has {n} children"))?;
+            for (child, digit) in children.zip((0..8).filter(|d| mask >> d & 1 != 0)) {
+                codes[child as usize] = codes[i as usize] << 3 | digit;
+            }
+        }
+        for level in 0..=self.grid.level {
+            for j in self.level_nodes(level).skip(1).map(|j| j as usize) {
+                let (a, b) = (codes[j - 1], codes[j]);
+                rule(a < b, || format!("nodes {} and {j} on level {level} have codes {a:#o} and {b:#o}, not ascending", j - 1))?;
+            }
+        }
+        Ok(codes)
+    }
+
+    /// PO: ascending on each level, up to all entries, and a node ends with its last child.
+    fn check_offsets(&self) -> Rule {
+        let n_m = self.p.len() as u64;
+        rule(self.po[0] == 0, || format!("PO[0] = {}, entries begin at 0", self.po[0]))?;
+        for level in 0..=self.grid.level {
+            let mut begin = 0;
+            let nodes = self.level_nodes(level);
+            for j in nodes.clone() {
+                let end = self.po[j as usize + 1];
+                let room = end > begin || (n_m == 0 && end == 0 && self.nodes() == 1);
+                rule(room, || format!("PO[{}] = {end}: node {j} on level {level} has no entry, the one before ends at {begin}", j + 1))?;
+                begin = end;
+            }
+            rule(u64::from(begin) == n_m, || format!("PO[{}] = {begin}: level {level} ends there, P has {n_m} entries", nodes.end))?;
+        }
+        for i in 0..self.internal_nodes() as usize {
+            let (end, last) = (self.po[i + 1], self.co[i + 1] as usize);
+            let theirs = self.po[last + 1];
+            rule(end == theirs, || format!("node {i} ends at entry {end}, its last child {last} at {theirs}"))?;
+        }
+        Ok(())
+    }
+
+    /// P: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
+    /// duplicates, as often as there are pairs, is every pair once.
+    fn check_lists(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
+        let vertices = Vertices::new(mesh, &self.grid);
+        let check = |leaf: u32| -> Rule {
+            let (slots, cell) = (self.entries(leaf), unmorton(codes[leaf as usize]));
+            let list = &self.p[slots.clone()];
+            for (i, &p) in list.iter().enumerate() {
+                let at = || format!("P[{}] = {p} in leaf {leaf}, cell {cell:?}", slots.start + i);
+                rule(topology.is_valid(p), || format!("{}: no valid cell of the mesh", at()))?;
+                rule(i == 0 || list[i - 1] < p, || format!("{}: not above the {} before it", at(), list[i - 1]))?;
+                let ids = mesh.tets[p as usize];
+                let inside = vertices.cells(ids, self.grid.level).contains(cell);
+                let kept = || Filter::new(&vertices.tet(ids), &self.grid, self.grid.level, self.assign).touches(cell);
+                let belongs = inside && (self.assign == Assign::Aabb || kept());
+                rule(belongs, || format!("{}: by the assignment {} it does not belong there", at(), self.assign))?;
+            }
+            Ok(())
+        };
+        self.leaves().into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)?;
+        let stage = Stage { mesh, topology, vertices: &vertices, grid: &self.grid, assign: self.assign };
+        let pairs: u64 = stage.count().into_par_iter().map(u64::from).sum();
+        let n_m = self.p.len();
+        rule(pairs == n_m as u64, || format!("P has {n_m} entries, the assignment {} makes {pairs}", self.assign))
+    }
+
+    /// BF: a leaf's flag is 0 if its cell is touched, and by no boundary primitive; others' says whether a child has it.
+    fn check_flags(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
+        let internal = self.internal_nodes();
+        let vertices = Vertices::new(mesh, &self.grid);
+        let check = |j: u32| -> Rule {
+            let expected = if j < internal {
+                self.children(j).any(|c| self.is_boundary(c))
+            } else {
+                flag(self.primitives(j), codes[j as usize], mesh, topology, &vertices, &self.grid)
+            };
+            let what = if j < internal { "children" } else { "primitives" };
+            rule(self.is_boundary(j) == expected, || format!("BF[{j}] = {}, its {what} say {expected}", !expected))
+        };
+        (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)
+    }
+
+    /// BV: a leaf's box is its cell's, others' the union of the children's, to the bit.
+    fn check_boxes(&self, codes: &[u32]) -> Rule {
+        let Some(boxes) = &self.boxes else { return Ok(()) };
+        let internal = self.internal_nodes();
+        for (j, found) in boxes.iter().enumerate() {
+            let expected = if (j as u32) < internal {
+                self.children(j as u32).map(|c| boxes[c as usize]).reduce(union).unwrap_or_default()
+            } else {
+                cell_box(&self.grid, self.grid.level, codes[j])
+            };
+            let same = found.map(f32::to_bits) == expected.map(f32::to_bits);
+            rule(same, || format!("BV[{j}] = {found:?}, expected {expected:?}"))?;
+        }
+        Ok(())
+    }
+}

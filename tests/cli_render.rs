@@ -1,0 +1,191 @@
+//! The program as its users run it: exit codes, JSON keys, messages, files.
+
+#![allow(clippy::unwrap_used)]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// Runs the program in `folder`.
+fn olbvh(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_olbvh")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// The JSON object of a run that must succeed.
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let out = olbvh(folder, &[arguments, &["--json"]].concat());
+    assert_eq!(out.status.code(), Some(0), "{arguments:?}: {}", text(&out.stderr));
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+/// A run that must fail with `code`; its message.
+fn fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
+    let out = olbvh(folder, arguments);
+    let message = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked") && !message.is_empty(), "{arguments:?}: {message}");
+    assert!(out.stdout.is_empty(), "{arguments:?} must not print results");
+    message
+}
+
+fn has_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some(), "no {key} in {value:#}");
+    }
+}
+
+const RENDER: &[&str] = &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
+
+#[test]
+fn render_writes_a_picture_and_its_figures() {
+    let folder = TempDir::new().unwrap();
+    let result = json(folder.path(), RENDER);
+    has_keys(&result, &["samples", "found_samples", "interval_ms", "march_ms"]);
+    assert!(result["found_samples"].as_u64() > Some(1000) && result["field"] == "jet", "{result:#}");
+    let file = std::io::BufReader::new(std::fs::File::open(folder.path().join("a.png")).unwrap());
+    let info = png::Decoder::new(file).read_info().unwrap().info().size();
+    assert_eq!(info, (40, 30));
+    let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
+    assert_eq!(names, ["a.png"], "nothing else is left");
+}
+
+#[test]
+fn render_takes_every_setting() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("t.json"), r#"{"map": "magma", "opacity": [[0, 0], [1, 1]]}"#).unwrap();
+    let settings = [
+        "--camera -x,ortho,zoom=2",
+        "--camera azimuth=-40,elevation=10 --tf t.json",
+        "--tf inferno_r --background black --no-shading",
+        "--opacity 0:0,0.5:0.2,1:1 --range -0.5:1.5 --light -1,0,1 --outline 0",
+        "--background #ffffff,#aabbcc --opacity 0.2 --opacity-scale 2 --termination 1 --step 0.2",
+        "--background transparent --alpha 2 --assign exact --field jet --quiet",
+    ];
+    for line in settings {
+        let arguments: Vec<&str> = RENDER.iter().copied().chain(line.split(' ')).collect();
+        let out = olbvh(folder.path(), &arguments);
+        assert_eq!(out.status.code(), Some(0), "{line}: {}", text(&out.stderr));
+        assert_eq!(out.stdout.is_empty(), line.ends_with("--quiet"), "{line}");
+    }
+}
+
+#[test]
+fn info_tells_mesh_and_tree() {
+    let folder = TempDir::new().unwrap();
+    let result = json(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
+    has_keys(&result, &["cells", "points", "bad_cells", "boundary_cells", "fields", "bounds", "tree"]);
+    has_keys(&result["tree"], &["l", "entries", "nodes", "leaves", "bytes", "paper_bytes", "build_ms"]);
+    assert_eq!((result["cells"].as_u64(), result["points"].as_u64()), (Some(720), Some(210)));
+    let bytes = result["tree"]["bytes"].as_object().unwrap();
+    let sum: u64 = bytes.iter().filter(|(name, _)| *name != "total").map(|(_, n)| n.as_u64().unwrap()).sum();
+    assert_eq!(bytes["total"].as_u64(), Some(sum));
+    let page = olbvh(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
+    for part in ["720", "jet", "level of the leaves", "as the paper counts"] {
+        assert!(text(&page.stdout).contains(part), "no {part} in {}", text(&page.stdout));
+    }
+}
+
+#[test]
+fn locate_finds_points_and_values() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("p.csv"), "x,y,z\n0.5,0.25,0.125\n9,9,9\n1,1,1\n").unwrap();
+    let result = json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "o.csv", "--device", "cpu"]);
+    has_keys(&result, &["points", "found", "seconds", "points_per_second"]);
+    assert_eq!((result["points"].as_u64(), result["found"].as_u64()), (Some(3), Some(2)));
+    let table = std::fs::read_to_string(folder.path().join("o.csv")).unwrap();
+    assert_eq!(table.lines().count(), 4, "{table}");
+    json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "all.csv", "--all", "--device", "cpu"]);
+    let table = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
+    let of = |point: &str| table.lines().filter(|l| l.starts_with(point)).count();
+    assert_eq!((of("0,"), of("1,"), of("2,")), (1, 0, 24), "one cell, none, all round an inner vertex: {table}");
+    for ending in ["npy", "npz", "vtu", "json"] {
+        json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", &format!("o.{ending}"), "--device", "cpu"]);
+    }
+}
+
+#[test]
+fn devices_are_listed_or_there_are_none() {
+    let folder = TempDir::new().unwrap();
+    let result = json(folder.path(), &["devices"]);
+    for device in result["devices"].as_array().unwrap() {
+        has_keys(device, &["name", "driver", "api", "subgroup", "qualifies", "missing"]);
+    }
+}
+
+#[test]
+fn help_is_there_for_everything() {
+    let folder = TempDir::new().unwrap();
+    for arguments in [&["--help"][..], &["devices", "--help"], &["info", "-h"], &["locate", "--help"], &["render", "--help"]] {
+        let out = olbvh(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(0));
+        assert!(text(&out.stdout).contains("Example"), "{arguments:?} has no example");
+    }
+    let help = text(&olbvh(folder.path(), &["render", "--help"]).stdout);
+    for part in ["viridis", "\"colors\"", "azimuth", "--opacity"] {
+        assert!(help.contains(part), "no {part} in {help}");
+    }
+}
+
+#[test]
+fn wrong_usage_ends_with_2() {
+    let folder = TempDir::new().unwrap();
+    let with = |more: &[&'static str]| [RENDER, more].concat();
+    let none: [&[&str]; 4] = [&[], &["bake"], &["render", "kuhn:2,2,2"], &["info", "kuhn:2,2,2", "--alpha", "11"]];
+    for arguments in none {
+        fails(folder.path(), 2, arguments);
+    }
+    for (more, part) in [
+        (&["--camera", "sideways"][..], "sideways"),
+        (&["--tf", "jet"], "viridis"),
+        (&["--opacity", "2"], "outside 0 to 1"),
+        (&["--step", "0"], "step"),
+        (&["--background", "pink"], "pink"),
+        (&["--range", "3:1"], "LO:HI"),
+        (&["--field", "pressure"], "jet"),
+        (&["--assign", "boxes"], "planes"),
+    ] {
+        let message = fails(folder.path(), 2, &with(more));
+        assert!(message.contains(part), "{more:?}: {message}");
+    }
+    let message = fails(folder.path(), 2, &["render", "kuhn:2,2,2", "-o", "a.jpg"]);
+    assert!(message.contains(".png"), "{message}");
+    fails(folder.path(), 2, &["render", "kuhn:2,2,2", "-o", "a.png", "--size", "0x5"]);
+    fails(folder.path(), 2, &["info", "kuhn:0,1,2"]);
+    assert!(!folder.path().join("a.png").exists());
+}
+
+#[test]
+fn bad_files_end_with_3_and_are_named() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("bad.vtu"), "<VTKFile type=\"UnstructuredGrid\"><Unstruct").unwrap();
+    std::fs::write(folder.path().join("p.csv"), "x,y\n1,2\n").unwrap();
+    for mesh in ["bad.vtu", "missing.vtu", "."] {
+        let message = fails(folder.path(), 3, &["info", mesh, "--device", "cpu"]);
+        assert!(message.contains(mesh), "{message}");
+    }
+    fails(folder.path(), 3, &["locate", "kuhn:2,2,2", "p.csv", "-o", "o.csv", "--device", "cpu"]);
+    fails(folder.path(), 3, &["render", "kuhn:2,2,2", "-o", "a.png", "--tf", "missing.json"]);
+}
+
+#[test]
+fn unknown_devices_end_with_4_and_failures_with_1() {
+    let folder = TempDir::new().unwrap();
+    fails(folder.path(), 4, &["info", "kuhn:2,2,2", "--device", "no such device"]);
+    fails(folder.path(), 1, &["render", "kuhn:2,2,2", "-o", "no/such/folder/a.png", "--device", "cpu"]);
+}
+
+#[test]
+fn a_closed_pipe_is_no_panic() {
+    let folder = TempDir::new().unwrap();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_olbvh"));
+    child.args(["info", "kuhn:9,9,9", "--device", "cpu"]).current_dir(folder.path());
+    let mut child = child.stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped()).spawn().unwrap();
+    drop(child.stdout.take());
+    let out = child.wait_with_output().unwrap();
+    assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), String::new()));
+}

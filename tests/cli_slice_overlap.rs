@@ -1,0 +1,90 @@
+//! `olbvh slice` and `olbvh overlap` on the command line: files, JSON keys, refusals. On the processor, so that no driver is needed.
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::Command;
+
+fn olbvh(folder: &Path, arguments: &[&str]) -> (i32, Value, String) {
+    let output =
+        Command::new(env!("CARGO_BIN_EXE_olbvh")).current_dir(folder).args(arguments).args(["--device", "cpu", "--json"]).output().unwrap();
+    let json = serde_json::from_slice(&output.stdout).unwrap_or(Value::Null);
+    (output.status.code().unwrap(), json, String::from_utf8_lossy(&output.stderr).into_owned())
+}
+
+fn files(folder: &Path) -> Vec<String> {
+    let mut names: Vec<String> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn slices_become_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let (code, json, text) = olbvh(folder, &["slice", "kuhn:4,3,2", "-o", "a.npy", "--layers", "3", "--size", "10x7", "--owners"]);
+    assert_eq!(code, 0, "{text}");
+    let count = |key: &str| json[key].as_u64().unwrap();
+    assert_eq!((count("layers"), count("inside") + count("touched") + count("empty")), (3, 210));
+    assert!(json["seconds"].is_number());
+    assert_eq!(files(folder), ["a.kind.npy", "a.npy", "a.owner.npy"]);
+    let kinds = std::fs::read(folder.join("a.kind.npy")).unwrap();
+    let inside = kinds[kinds.len() - 210..].iter().map(|&k| u64::from(k == 2)).sum::<u64>();
+    assert_eq!(inside, count("inside"));
+    for (name, layers) in [("b.vti", "2"), ("c.png", "1"), ("d.png", "2")] {
+        assert_eq!(
+            olbvh(folder, &["slice", "kuhn:4,3,2", "-o", name, "--layers", layers, "--size", "8", "--normal", "1,2,3"]).0,
+            0,
+            "{name}"
+        );
+    }
+    let (code, json, text) = olbvh(folder, &["slice", "kuhn:4,3,2", "-o", "e.svx", "--size", "8"]);
+    assert_eq!((code, json["layers"].as_u64(), json["height"].as_u64()), (0, Some(4), Some(6)), "{text}");
+    let made = ["a.kind.npy", "a.npy", "a.owner.npy", "b.vti", "c.png", "d-0000.png", "d-0001.png", "e.svx"];
+    assert_eq!(files(folder), made);
+    for wrong in [
+        &["slice", "kuhn:4,3,2", "-o", "x.obj"][..],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--thickness", "0"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--thickness", "1e9"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--layers", "0"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--normal", "0,0,0"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--field", "heat"],
+        &["slice", "kuhn:4,3,2", "-o", "x.png", "--owners"],
+        &["slice", "kuhn:4,3,2", "-o", "x.svx", "--thickness", "0.1"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--size", "0x4"],
+    ] {
+        let (code, _, text) = olbvh(folder, wrong);
+        assert!(code == 2 && !text.is_empty(), "{wrong:?}: {code} {text}");
+    }
+    assert_eq!(files(folder), made, "a refused slice leaves nothing");
+}
+
+#[test]
+fn overlaps_become_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let read = |name: &str| serde_json::from_slice::<Value>(&std::fs::read(folder.join(name)).unwrap()).unwrap();
+    let (code, json, text) = olbvh(folder, &["overlap", "kuhn:3,3,3", "kuhn:2,2,2", "-o", "a.json", "--pairs", "--move-b", "1.3,1.2,1.1"]);
+    assert_eq!(code, 0, "{text}");
+    let result = read("a.json");
+    let length = |key: &str| result[key].as_array().unwrap().len() as u64;
+    for key in ["a", "b", "pairs"] {
+        assert_eq!(json[key].as_u64().unwrap(), length(key), "{key}");
+        assert!(length(key) > 10, "{key}");
+    }
+    assert!(json["narrow_tests"].as_u64().unwrap() >= length("pairs") && json["seconds"].is_number() && json["narrow_share"].is_number());
+    let (_, sets, _) = olbvh(folder, &["overlap", "kuhn:3,3,3", "kuhn:2,2,2", "-o", "b.json", "--move-b", "1.3,1.2,1.1"]);
+    assert_eq!((&sets["a"], &sets["b"], &sets["pairs"]), (&json["a"], &json["b"], &Value::Null));
+    assert_eq!(read("b.json")["a"], result["a"]);
+    // Turned by 90° about its own centre, a cube covers what it covered; moved away, nothing.
+    let (_, turned, _) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "c.json", "--rotate-b", "z,90"]);
+    assert_eq!((turned["a"].as_u64(), turned["b"].as_u64()), (Some(48), Some(48)));
+    let (code, away, _) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "d.vtu", "--move-b", "0,-9,0"]);
+    assert_eq!((code, away["a"].as_u64(), away["narrow_tests"].as_u64()), (0, Some(0), Some(0)));
+    for wrong in [&["--rotate-b", "z"][..], &["--rotate-b", "0,0,0,5"], &["--move-b", "1,2"], &["--move-b", "1,2,inf"]] {
+        let arguments = [&["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.json"], wrong].concat();
+        assert_eq!(olbvh(folder, &arguments).0, 2, "{wrong:?}");
+    }
+    assert_eq!(files(folder), ["a.json", "b.json", "c.json", "d.vtu"]);
+}

@@ -1,0 +1,170 @@
+//! Every spelling of every format gives the same mesh.
+#![cfg(feature = "formats")]
+#![allow(clippy::unwrap_used, clippy::format_collect, clippy::case_sensitive_file_extension_comparisons)] // Tests and their helpers may.
+
+mod formats_small;
+
+use formats_small::{POINTS, TETS, all, shared};
+use olbvh::Error;
+use olbvh::formats::{Fate, LoadOptions, Loaded, load};
+use olbvh::mesh::On;
+
+fn open(path: impl AsRef<std::path::Path>) -> Loaded {
+    load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn write(folder: &tempfile::TempDir, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+    let path = folder.path().join(name);
+    std::fs::write(&path, bytes).unwrap();
+    path
+}
+
+#[test]
+fn small_files_agree() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, bytes) in all() {
+        write(&folder, name, &bytes);
+    }
+    for (name, _) in all() {
+        let Loaded { mesh, report } = open(folder.path().join(name));
+        let points: Vec<[f32; 3]> = POINTS.iter().map(|p| p.map(|x| x as f32)).collect();
+        assert_eq!((mesh.points, mesh.tets.as_slice()), (points, TETS.as_slice()), "{name}");
+        assert_eq!((mesh.cell_ids, mesh.source_cells, mesh.origin), (None, 6, [0.0; 3]), "{name}");
+        assert_eq!((report.points, report.tetrahedra, report.bounds), (8, 6, [[0.0; 3], [1.0, 1.0, 1.25]]), "{name}: {report}");
+        for (field, on, count) in [("s", On::Points, 8u8), ("c", On::Cells, 6)] {
+            let renamed = ["attribute0", "region", "medit:ref (cells)"];
+            let found = mesh.fields.iter().find(|f| f.on == on && (f.name == field || renamed.contains(&f.name.as_str())));
+            match found {
+                Some(found) => assert_eq!(found.values, (0..count).map(f32::from).collect::<Vec<_>>(), "{name}: {field}"),
+                None => assert!(name.contains("mesh") && on == On::Points, "{name} lost {field}"),
+            }
+        }
+    }
+}
+
+#[test]
+fn shared_spellings_agree() {
+    let Some(folder) = shared("formats") else { return };
+    let reference = open(folder.join("bracket_5k_appraw.vtu")).mesh;
+    let mut n = 0;
+    for entry in std::fs::read_dir(&folder).unwrap() {
+        let path = entry.unwrap().path();
+        let name = path.file_name().unwrap().to_str().unwrap().to_owned();
+        let ending = name.rsplit('.').next().unwrap();
+        if !name.starts_with("bracket_5k") || name.contains("piece") && !name.contains("twopieces") {
+            continue;
+        }
+        if ["e", "inp", "pvtu", "veg", "vtkhdf"].contains(&ending) {
+            let error = load(&path, &LoadOptions::default()).unwrap_err();
+            assert!(matches!(error, Error::File { .. }) && error.to_string().len() > 60, "{error}");
+            continue;
+        }
+        n += 1;
+        let mesh = open(&path).mesh;
+        assert_eq!(mesh.source_cells, 5188, "{name}");
+        let corner = |mesh: &olbvh::mesh::Mesh, tet: [u32; 4]| tet.map(|v| mesh.points[v as usize].map(|x| (x * 1e4).round()));
+        for (a, b) in mesh.tets.iter().zip(&reference.tets) {
+            assert_eq!(corner(&mesh, *a), corner(&reference, *b), "{name}");
+        }
+        for field in &reference.fields {
+            let Some(other) = mesh.fields.iter().find(|f| f.name == field.name && f.on == field.on) else {
+                assert!(!name.ends_with(".vtu"), "{name} lost {}", field.name);
+                continue;
+            };
+            if name.contains("twopieces") && field.on == On::Points {
+                continue;
+            }
+            let close = |(a, b): (&f32, &f32)| (a - b).abs() <= 1e-5 * b.abs().max(1e-3);
+            assert!(other.values.iter().zip(&field.values).all(close), "{name}: {}", field.name);
+        }
+    }
+    assert!(n >= 35, "{n} spellings");
+}
+
+#[test]
+fn pieces_are_joined_or_not() {
+    let Some(folder) = shared("formats") else { return };
+    let path = folder.join("bracket_5k_twopieces.vtu");
+    assert_eq!(open(&path).mesh.points.len(), 1659);
+    let apart = LoadOptions { merge_pieces: false, ..LoadOptions::default() };
+    assert_eq!(load(&path, &apart).unwrap().mesh.points.len(), 1786);
+}
+
+#[test]
+fn ids_count_every_cell_of_the_file() {
+    let Some(folder) = shared("formats") else { return };
+    let loaded = open(folder.join("mixed_hex_pyr_tet_wedge_22a.msh"));
+    assert_eq!(loaded.mesh.source_cells, 16 + 200 + 736 + 524 + 1869 + 512 + 590 + 64);
+    assert_eq!(loaded.report.count(Fate::Boundary), 16 + 200 + 736 + 524);
+    assert_eq!(loaded.report.count(Fate::Split), 512 + 590 + 64);
+    let ids = loaded.mesh.cell_ids.unwrap();
+    assert!(ids.is_sorted() && ids[0] == 16 + 200 + 736 + 524);
+}
+
+#[test]
+fn vectors_become_magnitude_and_components() {
+    let mesh = open(concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bracket_50k.vtu")).mesh;
+    let field = |name: &str| &mesh.field(name).unwrap().values;
+    for i in [0, 777, 12321] {
+        let v = ["displacement.x", "displacement.y", "displacement.z"].map(|n| f64::from(field(n)[i]));
+        let length = (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        assert!((f64::from(field("displacement")[i]) - length).abs() <= 1e-6 * length);
+    }
+    assert_eq!(field("von_mises_cell").len(), mesh.tets.len());
+}
+
+#[test]
+fn far_meshes_keep_their_shape() {
+    let folder = tempfile::tempdir().unwrap();
+    let (_, bytes) = all().swap_remove(4);
+    let text = String::from_utf8(bytes).unwrap();
+    let head = text.find("POINTS").unwrap();
+    let cells = text.find("CELLS").unwrap();
+    let points: String = POINTS.iter().map(|p| format!("{} {} {}\n", p[0] + 1e7 + 0.3, p[1] - 3e7, p[2] + 0.1)).collect();
+    let far = format!("{}POINTS 8 double\n{points}{}", &text[..head], &text[cells..]);
+    let Loaded { mesh, report } = open(write(&folder, "far.vtk", far.as_bytes()));
+    // Steps of 2 are exact in single precision out there, 1 is not; the third axis is near.
+    assert_eq!(mesh.origin, [1e7 + 0.3, -3e7, 0.0]);
+    assert_eq!(report.bounds[0], [1e7 + 0.3, -3e7, 0.1]);
+    for (p, q) in mesh.points.iter().zip(POINTS) {
+        assert!((p[0] - q[0] as f32).abs() < 1e-6);
+        assert_eq!(p[1], q[1] as f32);
+        assert!((p[2] - q[2] as f32 - 0.1).abs() < 1e-6);
+    }
+}
+
+#[test]
+fn kuhn_grids() {
+    let plain = load("kuhn:3,4,5", &LoadOptions::default()).unwrap();
+    assert_eq!((plain.mesh.tets.len(), plain.report.tetrahedra), (360, 360));
+    let jittered = load("kuhn:3,4,5,jitter=0.3,seed=7", &LoadOptions::default()).unwrap();
+    assert_ne!(plain.mesh.points, jittered.mesh.points);
+    for wrong in ["kuhn:", "kuhn:1,2", "kuhn:1,2,x", "kuhn:0,1,1", "kuhn:1,1,1,jitter=9", "kuhn:1,1,1,speed=3", "kuhn:-1,1,1"] {
+        assert!(matches!(load(wrong, &LoadOptions::default()), Err(Error::Invalid(_))), "{wrong}");
+    }
+    assert!(matches!(load("kuhn:4000000000,4000000000,4000000000", &LoadOptions::default()), Err(Error::TooLarge(_))));
+}
+
+#[test]
+fn content_decides_before_the_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let files = all();
+    let bytes = |name: &str| files.iter().find(|f| f.0 == name).unwrap().1.clone();
+    for (content, name) in [("ascii.vtu", "a.vtk"), ("ascii.vtk", "b.mesh"), ("v22.msh", "c.txt"), ("text.mesh", "d.msh")] {
+        assert_eq!(open(write(&folder, name, &bytes(content))).mesh.tets.len(), 6, "{content} as {name}");
+    }
+    for (content, name, word) in [
+        ("MFEM mesh v1.0\n", "e.mesh", "MFEM"),
+        ("*HEADING\nx\n*NODE\n", "f.inp", "Abaqus"),
+        ("# UCD\n8 6 0 0 0\n", "g.inp", "AVS"),
+        ("*VERTICES\n8 3 0 0\n", "h.veg", "Vega"),
+        ("CDF\x01xxxx", "i.e", "Exodus"),
+        ("\u{89}", "j.xyz", ".vtu"),
+        ("<!DOCTYPE html><html>", "k.vtu", "HTML"),
+        ("<svg xmlns=\"x\"/>", "l.vtu", "svg"),
+    ] {
+        let error = load(write(&folder, name, content.as_bytes()), &LoadOptions::default()).unwrap_err();
+        assert!(matches!(&error, Error::File { .. }) && error.to_string().contains(word), "{name}: {error}");
+    }
+    assert!(matches!(load(folder.path().join("none.vtu"), &LoadOptions::default()), Err(Error::Io { .. })));
+}

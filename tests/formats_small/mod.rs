@@ -1,0 +1,260 @@
+//! Small mesh files of every format, made on the spot: a cube of 8 points and 6 tetrahedra with a point field `s` and a cell field `c`.
+#![allow(dead_code)] // Not every test uses all of it.
+#![allow(clippy::format_push_string, clippy::format_collect, clippy::unwrap_used)] // Plain is better than fast here.
+
+use std::path::{Path, PathBuf};
+
+pub const POINTS: [[f64; 3]; 8] =
+    [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.], [1., 1., 1.25]];
+pub const TETS: [[u32; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
+
+/// The folder with the shared meshes, if it is there; says loudly when it is not.
+pub fn shared(folder: &str) -> Option<PathBuf> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
+    let root = if root.is_dir() { root } else { Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes") };
+    if root.is_dir() {
+        return Some(root.join(folder));
+    }
+    eprintln!("NOT RUN: ../shared/meshes/{folder} is missing, so these files were not tested");
+    None
+}
+
+fn join<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
+    values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
+}
+
+/// Every spelling: file name, content; a companion file follows its main file.
+pub fn all() -> Vec<(&'static str, Vec<u8>)> {
+    vec![
+        ("ascii.vtu", vtu_ascii()),
+        ("raw.vtu", vtu_binary(false, false)),
+        ("big.vtu", vtu_binary(true, false)),
+        ("base64.vtu", vtu_binary(false, true)),
+        ("ascii.vtk", vtk_ascii()),
+        ("binary.vtk", vtk_binary()),
+        ("v51.vtk", vtk_51()),
+        ("v22.msh", msh_22()),
+        ("v22b.msh", msh_22_binary()),
+        ("v41.msh", msh_41()),
+        ("v41b.msh", msh_41_binary()),
+        ("text.mesh", medit()),
+        ("binary.meshb", meditb()),
+        ("pair.ele", tetgen(1).1),
+        ("pair.node", tetgen(1).0),
+        ("zero.ele", tetgen(0).1),
+        ("zero.node", tetgen(0).0),
+    ]
+}
+
+fn vtu_ascii() -> Vec<u8> {
+    let array = |kind: &str, name: &str, n: usize, text: String| {
+        format!("<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{n}\" format=\"ascii\">{text}</DataArray>\n")
+    };
+    format!(
+        "<?xml version=\"1.0\"?>\n<VTKFile type=\"UnstructuredGrid\" version=\"1.0\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"8\" NumberOfCells=\"6\">\n<PointData>{}</PointData><CellData>{}</CellData>\n<Points>{}</Points>\n<Cells>{}{}{}</Cells>\n</Piece>\n</UnstructuredGrid>\n</VTKFile>\n",
+        array("Float32", "s", 1, join(0..8)),
+        array("Int16", "c", 1, join(0..6)),
+        array("Float64", "Points", 3, join(POINTS.as_flattened())),
+        array("Int64", "connectivity", 1, join(TETS.as_flattened())),
+        array("Int32", "offsets", 1, join((1..=6).map(|i| 4 * i))),
+        array("UInt8", "types", 1, join([10; 6])),
+    )
+    .into_bytes()
+}
+
+fn base64(bytes: &[u8]) -> Vec<u8> {
+    const TABLE: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    let mut out = Vec::new();
+    for chunk in bytes.chunks(3) {
+        let word = chunk.iter().chain([0, 0].iter()).take(3).fold(0u32, |n, &b| n << 8 | u32::from(b));
+        for i in 0..4 {
+            out.push(if i <= chunk.len() { TABLE[(word >> (18 - 6 * i) & 63) as usize] } else { b'=' });
+        }
+    }
+    out
+}
+
+fn vtu_binary(big: bool, text: bool) -> Vec<u8> {
+    let f = |v: f64| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+    let i = |v: i32| if big { v.to_be_bytes() } else { v.to_le_bytes() };
+    let arrays: [(&str, &str, &str, usize, Vec<u8>); 6] = [
+        ("PointData", "Float64", "s", 1, (0..8).flat_map(|v| f(f64::from(v))).collect()),
+        ("CellData", "Int32", "c", 1, (0..6).flat_map(i).collect()),
+        ("Points", "Float64", "Points", 3, POINTS.as_flattened().iter().flat_map(|v| f(*v)).collect()),
+        ("Cells", "Int32", "connectivity", 1, TETS.as_flattened().iter().flat_map(|v| i(*v as i32)).collect()),
+        ("Cells", "Int32", "offsets", 1, (1..=6).flat_map(|v| i(4 * v)).collect()),
+        ("Cells", "UInt8", "types", 1, vec![10; 6]),
+    ];
+    let order = if big { "BigEndian" } else { "LittleEndian" };
+    let mut xml = format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\" byte_order=\"{order}\" header_type=\"UInt32\">\n<UnstructuredGrid>\n<Piece NumberOfPoints=\"8\" NumberOfCells=\"6\">\n"
+    );
+    let mut data = Vec::new();
+    for (group, kind, name, n, bytes) in arrays {
+        let head = format!("<{group}><DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{n}\" ");
+        let head = if xml.ends_with("</Cells>\n") && group == "Cells" {
+            xml.truncate(xml.len() - "</Cells>\n".len());
+            head["<Cells>".len()..].to_owned()
+        } else {
+            head
+        };
+        xml += &head;
+        let mut block = i(bytes.len() as i32).to_vec();
+        block.extend(bytes);
+        if text {
+            xml += &format!("format=\"binary\">{}</DataArray>", String::from_utf8_lossy(&base64(&block)));
+        } else {
+            xml += &format!("format=\"appended\" offset=\"{}\"/>", data.len());
+            data.extend(block);
+        }
+        xml += &format!("</{group}>\n");
+    }
+    xml += "</Piece>\n</UnstructuredGrid>\n";
+    let mut out = xml.into_bytes();
+    if !text {
+        out.extend(b"<AppendedData encoding=\"raw\">_");
+        out.extend(data);
+        out.extend(b"</AppendedData>");
+    }
+    out.extend(b"</VTKFile>\n");
+    out
+}
+
+fn rows<const N: usize, T: ToString + Copy>(values: &[[T; N]], prefix: &str) -> String {
+    values.iter().map(|v| format!("{prefix}{}\n", join(v.iter().copied()))).collect()
+}
+
+fn vtk_ascii() -> Vec<u8> {
+    let cells = rows(&TETS, "4 ");
+    let types = "10\n".repeat(6);
+    format!("# vtk DataFile Version 3.0\nsmall\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{}CELLS 6 30\n{cells}CELL_TYPES 6\n{types}CELL_DATA 6\nSCALARS c int 1\nLOOKUP_TABLE default\n{}\nPOINT_DATA 8\nFIELD FieldData 1\ns 1 8 float\n{}\n", rows(&POINTS, ""), join(0..6), join(0..8)).into_bytes()
+}
+
+fn vtk_binary() -> Vec<u8> {
+    let mut out = b"# vtk DataFile Version 3.0\nsmall\nBINARY\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n".to_vec();
+    out.extend(POINTS.as_flattened().iter().flat_map(|v| v.to_be_bytes()));
+    out.extend(b"\nCELLS 6 30\n");
+    out.extend(TETS.iter().flat_map(|t| [4, t[0], t[1], t[2], t[3]]).flat_map(u32::to_be_bytes));
+    out.extend(b"\nCELL_TYPES 6\n");
+    out.extend([10i32; 6].into_iter().flat_map(i32::to_be_bytes));
+    out.extend(b"\nPOINT_DATA 8\nSCALARS s float\nLOOKUP_TABLE default\n");
+    out.extend((0..8u8).flat_map(|v| f32::from(v).to_be_bytes()));
+    out.extend(b"\nCELL_DATA 6\nSCALARS c short\nLOOKUP_TABLE default\n");
+    out.extend((0..6i16).flat_map(i16::to_be_bytes));
+    out.push(b'\n');
+    out
+}
+
+fn vtk_51() -> Vec<u8> {
+    let offsets = join((0..=6).map(|i| 4 * i));
+    format!("# vtk DataFile Version 5.1\nsmall\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{}CELLS 7 24\nOFFSETS vtktypeint64\n{offsets}\nCONNECTIVITY vtktypeint64\n{}\nCELL_TYPES 6\n{}\nPOINT_DATA 8\nSCALARS s double\nLOOKUP_TABLE default\n{}\nMETADATA\nINFORMATION 0\n\nCELL_DATA 6\nSCALARS c int\nLOOKUP_TABLE default\n{}\n", rows(&POINTS, ""), join(TETS.as_flattened()), join([10; 6]), join(0..8), join(0..6)).into_bytes()
+}
+
+fn data_22(section: &str, name: &str, count: usize) -> String {
+    let rows: String = (0..count).map(|i| format!("{} {i}\n", 10 * (i + 1))).collect();
+    format!("${section}\n1\n\"{name}\"\n1\n0.0\n3\n0\n1\n{count}\n{rows}$End{section}\n")
+}
+
+fn msh_22() -> Vec<u8> {
+    let nodes: String = POINTS.iter().enumerate().map(|(i, p)| format!("{} {}\n", 10 * (i + 1), join(p))).collect();
+    let cells: String =
+        TETS.iter().enumerate().map(|(i, t)| format!("{} 4 2 0 0 {}\n", 10 * (i + 1), join(t.map(|v| 10 * (v + 1))))).collect();
+    format!(
+        "$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n8\n{nodes}$EndNodes\n$Elements\n6\n{cells}$EndElements\n{}{}",
+        data_22("NodeData", "s", 8),
+        data_22("ElementData", "c", 6)
+    )
+    .into_bytes()
+}
+
+fn msh_22_binary() -> Vec<u8> {
+    let int = |v: i32| v.to_le_bytes();
+    let mut out = b"$MeshFormat\n2.2 1 8\n".to_vec();
+    out.extend(int(1));
+    out.extend(b"\n$EndMeshFormat\n$Nodes\n8\n");
+    for (i, p) in POINTS.iter().enumerate() {
+        out.extend(int(i as i32 + 1));
+        out.extend(p.iter().flat_map(|v| v.to_le_bytes()));
+    }
+    out.extend(b"\n$EndNodes\n$Elements\n6\n");
+    out.extend([4, 6, 2].into_iter().flat_map(int));
+    for (i, t) in TETS.iter().enumerate() {
+        out.extend([i as i32 + 1, 0, 0].into_iter().flat_map(int));
+        out.extend(t.iter().flat_map(|v| int(*v as i32 + 1)));
+    }
+    out.extend(b"\n$EndElements\n");
+    for (section, name, n) in [("NodeData", "s", 8), ("ElementData", "c", 6)] {
+        out.extend(format!("${section}\n1\n\"{name}\"\n1\n0\n3\n0\n1\n{n}\n").bytes());
+        for i in 0..n {
+            out.extend(int(i + 1));
+            out.extend(f64::from(i).to_le_bytes());
+        }
+        out.extend(format!("\n$End{section}\n").bytes());
+    }
+    out
+}
+
+fn msh_41() -> Vec<u8> {
+    let tags: String = (1..=8).map(|i| format!("{}\n", 10 * i)).collect();
+    let cells: String = TETS.iter().enumerate().map(|(i, t)| format!("{} {}\n", 10 * (i + 1), join(t.map(|v| 10 * (v + 1))))).collect();
+    format!("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Nodes\n1 8 10 80\n3 0 0 8\n{tags}{}$EndNodes\n$Elements\n1 6 10 60\n3 0 4 6\n{cells}$EndElements\n{}{}", rows(&POINTS, ""), data_22("NodeData", "s", 8), data_22("ElementData", "c", 6)).into_bytes()
+}
+
+fn msh_41_binary() -> Vec<u8> {
+    let int = |v: i32| v.to_le_bytes();
+    let long = |v: u64| v.to_le_bytes();
+    let mut out = b"$MeshFormat\n4.1 1 8\n".to_vec();
+    out.extend(int(1));
+    out.extend(b"\n$EndMeshFormat\n$Nodes\n");
+    out.extend([1, 8, 1, 8].into_iter().flat_map(long));
+    out.extend([3, 0, 0].into_iter().flat_map(int));
+    out.extend(long(8));
+    out.extend((1..=8).flat_map(long));
+    out.extend(POINTS.as_flattened().iter().flat_map(|v| v.to_le_bytes()));
+    out.extend(b"\n$EndNodes\n$Elements\n");
+    out.extend([1, 6, 1, 6].into_iter().flat_map(long));
+    out.extend([3, 0, 4].into_iter().flat_map(int));
+    out.extend(long(6));
+    for (i, t) in TETS.iter().enumerate() {
+        out.extend(long(i as u64 + 1));
+        out.extend(t.iter().flat_map(|v| long(u64::from(*v) + 1)));
+    }
+    out.extend(b"\n$EndElements\n");
+    let tail = msh_22_binary();
+    let at = tail.windows(9).position(|w| w == b"$NodeData").unwrap();
+    out.extend(&tail[at..]);
+    out
+}
+
+fn medit() -> Vec<u8> {
+    let points: String = POINTS.iter().map(|p| format!("{} 0\n", join(p))).collect();
+    let cells: String = TETS.iter().enumerate().map(|(i, t)| format!("{} {i}\n", join(t.map(|v| v + 1)))).collect();
+    format!("MeshVersionFormatted 2\nDimension 3\nVertices\n8\n{points}Tetrahedra\n6\n{cells}End\n").into_bytes()
+}
+
+fn meditb() -> Vec<u8> {
+    let int = |v: i32| v.to_le_bytes();
+    let mut out: Vec<u8> = [1, 2, 3, 20, 3, 4].into_iter().flat_map(int).collect();
+    out.extend(int(20 + 12 + 8 * 28));
+    out.extend(int(8));
+    for p in POINTS {
+        out.extend(p.iter().flat_map(|v| v.to_le_bytes()));
+        out.extend(int(0));
+    }
+    out.extend(int(8));
+    out.extend(int(out.len() as i32 + 8 + 6 * 20));
+    out.extend(int(6));
+    for (i, t) in TETS.iter().enumerate() {
+        out.extend(t.iter().flat_map(|v| int(*v as i32 + 1)));
+        out.extend(int(i as i32));
+    }
+    out.extend([54, 0].into_iter().flat_map(int));
+    out
+}
+
+fn tetgen(first: u32) -> (Vec<u8>, Vec<u8>) {
+    let points: String = POINTS.iter().enumerate().map(|(i, p)| format!("{} {} {i}\n", i as u32 + first, join(p))).collect();
+    let cells: String =
+        TETS.iter().enumerate().map(|(i, t)| format!("{} {} {i}\n", i as u32 + first, join(t.map(|v| v + first)))).collect();
+    (format!("# points\n8 3 1 0\n{points}").into_bytes(), format!("6 4 1\n{cells}").into_bytes())
+}

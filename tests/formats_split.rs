@@ -1,0 +1,184 @@
+//! Hexahedra, wedges and pyramids become tetrahedra that fit together and fill the same space.
+#![cfg(feature = "formats")]
+#![allow(clippy::unwrap_used)] // In helpers of tests as well.
+#![allow(clippy::format_push_string)] // Plain is better than fast here.
+
+mod formats_small;
+
+use std::collections::HashMap;
+
+use formats_small::shared;
+use olbvh::formats::{LoadOptions, load};
+use olbvh::mesh::Mesh;
+
+fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
+    let [a, b, c, d] = tet.map(|v| mesh.points[v as usize].map(f64::from));
+    let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
+}
+
+/// Faces by how many tetrahedra share them.
+fn faces(mesh: &Mesh) -> HashMap<[u32; 3], u32> {
+    let mut faces = HashMap::new();
+    for t in &mesh.tets {
+        for face in [[t[1], t[2], t[3]], [t[0], t[2], t[3]], [t[0], t[1], t[3]], [t[0], t[1], t[2]]] {
+            let mut face = face;
+            face.sort_unstable();
+            *faces.entry(face).or_insert(0) += 1;
+        }
+    }
+    faces
+}
+
+/// Tetrahedra fit together: no face has more than two, and the boundary is closed.
+fn check(mesh: &Mesh, wanted: f64, boundary: usize) {
+    let total: f64 = mesh.tets.iter().map(|&t| volume(mesh, t)).sum();
+    assert!((total - wanted).abs() < 1e-5 * wanted, "volume {total}, not {wanted}");
+    let faces = faces(mesh);
+    assert!(faces.values().all(|&n| n <= 2));
+    let single: Vec<_> = faces.iter().filter(|f| *f.1 == 1).map(|f| *f.0).collect();
+    assert_eq!(single.len(), boundary, "triangles on the boundary");
+    let mut edges: HashMap<[u32; 2], u32> = HashMap::new();
+    for [a, b, c] in single {
+        for edge in [[a, b], [b, c], [a, c]] {
+            *edges.entry(edge).or_insert(0) += 1;
+        }
+    }
+    assert!(edges.values().all(|&n| n == 2));
+}
+
+/// A grid of hexahedra with shuffled vertex numbers; `diagonal` cells are cut into two wedges, others into six pyramids.
+fn grid(n: usize, seed: u64) -> String {
+    let mut state = seed;
+    let mut random = move |m: usize| {
+        state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as usize % m
+    };
+    let corners = (n + 1).pow(3);
+    let mut name: Vec<usize> = (0..corners).collect();
+    for i in (1..corners).rev() {
+        name.swap(i, random(i + 1));
+    }
+    let mut points = vec![[0.0; 3]; corners];
+    let id = |x: usize, y: usize, z: usize| x + (n + 1) * (y + (n + 1) * z);
+    for (i, &p) in name.iter().enumerate() {
+        points[p] = [i % (n + 1), i / (n + 1) % (n + 1), i / (n + 1) / (n + 1)].map(|v| v as f64);
+    }
+    let (mut cells, mut types) = (Vec::new(), Vec::new());
+    for cell in 0..n * n * n {
+        let (x, y, z) = (cell % n, cell / n % n, cell / n / n);
+        let v = |dx, dy, dz| name[id(x + dx, y + dy, z + dz)];
+        let hex = [v(0, 0, 0), v(1, 0, 0), v(1, 1, 0), v(0, 1, 0), v(0, 0, 1), v(1, 0, 1), v(1, 1, 1), v(0, 1, 1)];
+        match random(4) {
+            0 => {
+                cells.push(vec![hex[0], hex[1], hex[3], hex[2], hex[4], hex[5], hex[7], hex[6]]);
+                types.push(11);
+            }
+            1 => {
+                let centre = points.len();
+                let h = hex.map(|v| points[v]);
+                points.push([0, 1, 2].map(|c| h.iter().map(|p| p[c]).sum::<f64>() / 8.0));
+                for face in [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]] {
+                    cells.push(face.map(|c| hex[c]).into_iter().chain([centre]).collect());
+                    types.push(14);
+                }
+            }
+            _ => {
+                cells.push(hex.to_vec());
+                types.push(12);
+            }
+        }
+    }
+    file(&points, &cells, &types)
+}
+
+fn file(points: &[[f64; 3]], cells: &[Vec<usize>], types: &[u8]) -> String {
+    let mut text = format!("# vtk DataFile Version 3.0\ngrid\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS {} double\n", points.len());
+    for p in points {
+        text += &format!("{} {} {}\n", p[0], p[1], p[2]);
+    }
+    text += &format!("CELLS {} {}\n", cells.len(), cells.iter().map(|c| c.len() + 1).sum::<usize>());
+    for c in cells {
+        text += &format!("{} {}\n", c.len(), c.iter().map(usize::to_string).collect::<Vec<_>>().join(" "));
+    }
+    text += &format!("CELL_TYPES {}\n", cells.len());
+    for t in types {
+        text += &format!("{t}\n");
+    }
+    text
+}
+
+fn read(text: &str) -> Mesh {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("grid.vtk");
+    std::fs::write(&path, text).unwrap();
+    load(path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}")).mesh
+}
+
+#[test]
+fn random_numberings_conform() {
+    let mut counts = [0; 8];
+    for seed in 0..20 {
+        let n = 3;
+        let mesh = read(&grid(n, seed));
+        check(&mesh, 27.0, 2 * 6 * n * n);
+        assert!(mesh.tets.iter().all(|&t| volume(&mesh, t) > 0.0));
+        let ids = mesh.cell_ids.unwrap();
+        for cell in 0..mesh.source_cells {
+            counts[ids.iter().filter(|&&id| id == cell).count()] += 1;
+        }
+    }
+    assert!(counts[2] > 0 && counts[5] > 0 && counts[6] > 0, "pyramids of 2, hexahedra of 5 and of 6 tetrahedra: {counts:?}");
+    assert_eq!(counts.iter().sum::<usize>(), counts[2] + counts[5] + counts[6]);
+}
+
+#[test]
+fn wedges_of_both_orientations() {
+    let p = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.], [1., 1., 0.], [1., 1., 1.]];
+    for second in [[1, 6, 2, 4, 7, 5], [1, 2, 6, 4, 5, 7]] {
+        for first in [[0, 1, 2, 3, 4, 5], [0, 2, 1, 3, 5, 4], [3, 4, 5, 0, 1, 2]] {
+            let mesh = read(&file(&p, &[first.to_vec(), second.to_vec()], &[13, 13]));
+            assert_eq!(mesh.tets.len(), 6);
+            check(&mesh, 1.0, 12);
+        }
+    }
+}
+
+#[test]
+fn collapsed_cells_lose_their_empty_pieces() {
+    let p = [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.]];
+    for hex in [[0, 1, 2, 2, 3, 4, 5, 5], [2, 2, 0, 1, 5, 5, 3, 4]] {
+        let mesh = read(&file(&p, &[hex.to_vec()], &[12]));
+        assert_eq!(mesh.tets.len(), 3);
+        check(&mesh, 0.5, 8);
+    }
+}
+
+/// A box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little is counted twice.
+const MIXED: f64 = 2.501_392_23;
+
+#[test]
+fn shared_meshes_conform() {
+    let Some(folder) = shared("formats") else { return };
+    // Boundary triangles: those of the meshes plus two for each quadrilateral.
+    for (name, wanted) in [
+        ("mixed_hex_pyr_tet_wedge.vtu", MIXED),
+        ("mixed_hex_pyr_tet_wedge_interleaved.vtu", MIXED),
+        ("mixed_hex_pyr_tet_wedge.mesh", MIXED),
+        ("mixed_hex_pyr_tet_wedge_22a.msh", MIXED),
+        ("mixed_hex_pyr_tet_wedge_41b.msh", MIXED),
+        ("mixed_quadratic.vtu", MIXED),
+        ("voxel_8k.vtu", 1.0),
+    ] {
+        let mesh = load(folder.join(name), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}")).mesh;
+        let boundary = faces(&mesh).values().filter(|&&n| n == 1).count();
+        check(&mesh, wanted, boundary);
+    }
+    for name in ["hex_wavy_8k.vtu", "wedge_boundarylayer_32k.vtu"] {
+        let mesh = load(folder.join(name), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}")).mesh;
+        let faces = faces(&mesh);
+        assert!(faces.values().all(|&n| n <= 2), "{name}");
+        let per_face = if name.starts_with("hex") { 2 * 2400 } else { faces.values().filter(|&&n| n == 1).count() };
+        assert_eq!(faces.values().filter(|&&n| n == 1).count(), per_face, "{name}");
+    }
+}

@@ -1,0 +1,247 @@
+//! What is written can be read back.
+#![cfg(feature = "formats")]
+#![allow(clippy::unwrap_used)] // In helpers of tests as well.
+
+use std::io::Write as _;
+use std::path::Path;
+
+use olbvh::Error;
+use olbvh::formats::{
+    LoadOptions, Located, OutputFile, OutputFormat, SliceGrid, SliceWriter, load, load_points, write_json, write_located, write_mesh,
+    write_npy, write_png,
+};
+use olbvh::mesh::{Field, Mesh, On};
+
+fn names(folder: &Path) -> Vec<String> {
+    let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+    names.sort();
+    names
+}
+
+/// Text of the header and the data of a `.npy`.
+fn split_npy(bytes: &[u8]) -> (String, &[u8]) {
+    assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
+    let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
+    assert_eq!(end % 64, 0);
+    assert_eq!(bytes[end - 1], b'\n');
+    (String::from_utf8(bytes[10..end].to_vec()).unwrap(), &bytes[end..])
+}
+
+#[test]
+fn meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.vtu");
+    let mut mesh = load("kuhn:20,20,20,jitter=0.3,seed=3", &LoadOptions::default()).unwrap().mesh;
+    let ugly = "a\nb\t<x attr=\"1\">&amp; \u{1}'\u{202e}🚀";
+    let cells = (0..mesh.tets.len()).map(|i| if i == 3 { f32::NAN } else { i as f32 }).collect();
+    mesh.fields.push(Field { name: ugly.into(), on: On::Cells, values: cells });
+    write_mesh(&path, &mesh).unwrap();
+    let read = load(&path, &LoadOptions::default()).unwrap();
+    let bits = |m: &Mesh| m.fields.iter().map(|f| (f.on, f.values.iter().map(|v| v.to_bits()).collect::<Vec<_>>())).collect::<Vec<_>>();
+    assert_eq!((&read.mesh.points, &read.mesh.tets), (&mesh.points, &mesh.tets));
+    assert_eq!(bits(&read.mesh), bits(&mesh));
+    assert_eq!(read.mesh.fields[1].name, ugly.replace('\u{1}', "\u{fffd}"));
+    let far = Mesh { origin: [1e7, 0.25, -3e8], ..mesh };
+    write_mesh(&path, &far).unwrap();
+    let read = load(&path, &LoadOptions::default()).unwrap();
+    assert_eq!(read.report.bounds[0], [1e7, 0.25, -3e8]);
+    assert_eq!(read.mesh.points[100][0], far.points[100][0]);
+    assert_eq!(names(folder.path()), ["out.vtu"]);
+}
+
+#[test]
+fn arrays_of_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.npy");
+    let points: Vec<f64> = (0..30).map(|i| f64::from(i) * 0.1 - 1e9).collect();
+    let wanted: Vec<[f64; 3]> = points.chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
+    write_npy(&path, &[10, 3], &points).unwrap();
+    assert_eq!(load_points(&path).unwrap(), wanted);
+    // The same as Fortran-ordered big-endian and as single precision.
+    let bytes = std::fs::read(&path).unwrap();
+    let header = bytes[..bytes.len() - 240].to_vec();
+    let text = String::from_utf8_lossy(&header[10..]).replace("<f8", ">f8").replace("False", "True ");
+    let mut fortran = [&header[..10], text.as_bytes()].concat();
+    for c in 0..3 {
+        fortran.extend(wanted.iter().flat_map(|p| p[c].to_be_bytes()));
+    }
+    std::fs::write(&path, fortran).unwrap();
+    assert_eq!(load_points(&path).unwrap(), wanted);
+    write_npy(&path, &[1, 3], &[0.5f32, -2.0, 1e30]).unwrap();
+    assert_eq!(load_points(&path).unwrap(), [[0.5, -2.0, f64::from(1e30f32)]]);
+    for (shape, data) in [(vec![2, 2], vec![0.0f32; 4]), (vec![3, 1], vec![0.0; 3]), (vec![1, 1, 3], vec![0.0; 3])] {
+        write_npy(&path, &shape, &data).unwrap();
+        assert!(matches!(load_points(&path), Err(Error::File { .. })), "{shape:?}");
+    }
+    assert!(matches!(write_npy(&path, &[2, 3], &[0.0f32; 5]), Err(Error::Invalid(_))));
+}
+
+#[test]
+fn tables_of_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.csv");
+    let wanted = [[1.0, 2.5, -3.0], [4.0, 5.0, 6e3]];
+    for text in [
+        "1,2.5,-3\n4,5,6e3\n",
+        "x,y,z\r\n1,2.5,-3\r\n4,5,6e3",
+        "# comment\n\n  1 2.5\t-3\n4 5 6e3\n",
+        "\u{feff}x;y;z\n1;2,5;-3\n4;5;6e3\n",
+        "id,\"Z\",\"X\",\"Y\"\n7,-3,1,2.5\n8,6e3,4,5\n",
+        "Points:0,Points:1,Points:2,v\n1,2.5,-3,0\n4,5,6e3,0\n",
+    ] {
+        std::fs::write(&path, text).unwrap();
+        assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
+    }
+    for (text, place) in [
+        ("1,2,3\n4,5\n", "line 2"),
+        ("x,y,z\n1,2,3\n4,five,6\n", "line 3"),
+        ("1,2,3,4\n", "line 1"),
+        ("a,b,c,d\n1,2,3,4\n", "line 1"),
+        ("", "no points"),
+        ("1,2\0,3", "byte 3"),
+    ] {
+        std::fs::write(&path, text).unwrap();
+        let error = load_points(&path).unwrap_err().to_string();
+        assert!(error.contains(place), "{text}: {error}");
+    }
+    assert!(matches!(load_points(folder.path().join("none.csv")), Err(Error::Io { .. })));
+}
+
+#[test]
+fn located_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let points = [[0.5, 1.5, 2.5], [9.0, 9.0, 9.0]];
+    let bary = [[0.25f32, 0.25, 0.25, 0.25], [f32::NAN; 4]];
+    let located = Located { points: &points, owner: &[7, u32::MAX], bary: &bary, value: Some(&[1.5, f32::NAN]) };
+    for ending in ["npy", "npz", "csv", "vtu", "json"] {
+        write_located(folder.path().join(format!("out.{ending}")), &located).unwrap();
+    }
+    assert_eq!(names(folder.path()), ["out.csv", "out.json", "out.npy", "out.npz", "out.vtu"]);
+    let read = |ending: &str| std::fs::read(folder.path().join(format!("out.{ending}"))).unwrap();
+    let bytes = read("npy");
+    let (header, data) = split_npy(&bytes);
+    assert!(header.contains("[('owner', '<u4'), ('bary', '<f4', (4,)), ('value', '<f4')]") && header.contains("(2,)"), "{header}");
+    assert_eq!(data.len(), 48);
+    assert_eq!((&data[..4], &data[20..24], &data[24..28]), (&7u32.to_le_bytes()[..], &1.5f32.to_le_bytes()[..], &[255u8; 4][..]));
+    assert_eq!(
+        String::from_utf8(read("csv")).unwrap(),
+        "owner,b0,b1,b2,b3,value\n7,0.25,0.25,0.25,0.25,1.5\n4294967295,NaN,NaN,NaN,NaN,NaN\n"
+    );
+    let json: serde_json::Value = serde_json::from_slice(&read("json")).unwrap();
+    assert_eq!((&json["owner"][0], &json["value"][0], &json["value"][1]), (&7.into(), &1.5.into(), &serde_json::Value::Null));
+    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(read("npz"))).unwrap();
+    for (name, shape, size) in [("owner.npy", "(2,)", 8), ("bary.npy", "(2, 4)", 32), ("value.npy", "(2,)", 8)] {
+        let mut bytes = Vec::new();
+        std::io::copy(&mut zip.by_name(name).unwrap(), &mut bytes).unwrap();
+        let (header, data) = split_npy(&bytes);
+        assert!(header.contains(shape) && data.len() == size, "{name}: {header}");
+    }
+    // Vertices alone are no mesh to this program, and the message says so.
+    let error = load(folder.path().join("out.vtu"), &LoadOptions::default()).unwrap_err().to_string();
+    assert!(error.contains("2 vertex"), "{error}");
+    assert!(matches!(write_located(folder.path().join("out.txt"), &located), Err(Error::Invalid(m)) if m.contains(".npz")));
+    let short = Located { owner: &[7], ..located };
+    assert!(matches!(write_located(folder.path().join("out.npy"), &short), Err(Error::Invalid(_))));
+}
+
+fn slices(path: &Path, owners: bool) {
+    let grid = SliceGrid {
+        size: [3, 2, 2],
+        origin: [0.5, 1.0, 2.0],
+        spacing: [1.0, 1.0, 0.5],
+        axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+    };
+    let mut writer = SliceWriter::create(path, grid, owners).unwrap();
+    for layer in 0..2u8 {
+        let values: Vec<f32> = (0..6).map(|i| f32::from(i + 6 * layer)).collect();
+        let ids = [u32::from(layer); 6];
+        writer.layer(&values, &[layer + 1; 6], owners.then_some(&ids[..])).unwrap();
+    }
+    assert!(writer.layer(&[0.0; 6], &[0; 6], None).is_err());
+    writer.finish().unwrap();
+}
+
+#[test]
+fn stacks_of_slices() {
+    let folder = tempfile::tempdir().unwrap();
+    slices(&folder.path().join("s.npy"), true);
+    slices(&folder.path().join("s.vti"), false);
+    assert_eq!(names(folder.path()), ["s.kind.npy", "s.npy", "s.owner.npy", "s.vti"]);
+    let values: Vec<u8> = (0..12u8).flat_map(|i| f32::from(i).to_ne_bytes()).collect();
+    let bytes = std::fs::read(folder.path().join("s.npy")).unwrap();
+    let (header, data) = split_npy(&bytes);
+    assert!(header.contains("(2, 2, 3)") && data == values, "{header}");
+    let bytes = std::fs::read(folder.path().join("s.kind.npy")).unwrap();
+    assert_eq!(split_npy(&bytes).1, [[1; 6], [2; 6]].concat());
+    let image = std::fs::read(folder.path().join("s.vti")).unwrap();
+    let start = image.windows(2).position(|w| w == b"\n_").unwrap() + 2;
+    let text = String::from_utf8_lossy(&image[..start]);
+    assert!(text.contains("WholeExtent=\"0 2 0 1 0 1\" Origin=\"0.5 1 2\" Spacing=\"1 1 0.5\" Direction=\"0 0 1 1 0 0 0 1 0\""), "{text}");
+    assert!(text.contains("Name=\"kind\" format=\"appended\" offset=\"56\""), "{text}");
+    assert_eq!(image[start..start + 8], 48u64.to_ne_bytes());
+    assert_eq!(image[start + 8..start + 56], values);
+    assert_eq!(image[start + 56..start + 64], 12u64.to_ne_bytes());
+    assert_eq!(image[start + 64..start + 76], [[1; 6], [2; 6]].concat());
+    assert!(image.ends_with(b"\n</AppendedData>\n</VTKFile>\n"));
+}
+
+#[test]
+fn pictures_and_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.png");
+    let pixels: Vec<u8> = (0..24).map(|i| i * 10).collect();
+    write_png(&path, 3, 2, &pixels).unwrap();
+    let mut reader = png::Decoder::new(std::io::Cursor::new(std::fs::read(&path).unwrap())).read_info().unwrap();
+    let mut read = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut read).unwrap();
+    assert_eq!(read, pixels);
+    assert!(matches!(write_png(&path, 3, 3, &pixels), Err(Error::Invalid(_))));
+    write_json(folder.path().join("j.json"), &vec![1, 2]).unwrap();
+    assert_eq!(std::fs::read_to_string(folder.path().join("j.json")).unwrap(), "[1,2]\n");
+    assert_eq!(OutputFormat::of("A.PNG", &[OutputFormat::Png]).unwrap(), OutputFormat::Png);
+    assert!(matches!(OutputFormat::of("a.png", &[OutputFormat::Npy]), Err(Error::Invalid(m)) if m.contains(".npy")));
+}
+
+#[test]
+fn no_half_written_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.bin");
+    std::fs::write(&path, "old").unwrap();
+    let mut file = OutputFile::create(&path).unwrap();
+    file.write_all(b"new").unwrap();
+    file.flush().unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    drop(file);
+    assert_eq!(names(folder.path()), ["out.bin"]);
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
+    let mut file = OutputFile::create(&path).unwrap();
+    file.write_all(b"new").unwrap();
+    file.commit().unwrap();
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
+    assert_eq!(names(folder.path()), ["out.bin"]);
+    assert!(matches!(OutputFile::create(folder.path().join("no/such/out.bin")), Err(Error::Io { .. })));
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::PermissionsExt as _;
+        let plain = folder.path().join("plain");
+        std::fs::write(&plain, "").unwrap();
+        let mode = |p: &Path| std::fs::metadata(p).unwrap().permissions().mode();
+        assert_eq!(mode(&path), mode(&plain), "permissions as of any other new file");
+        let link = folder.path().join("link");
+        std::os::unix::fs::symlink(&path, &link).unwrap();
+        let file = OutputFile::create(&link).unwrap();
+        file.commit().unwrap();
+        assert!(link.is_symlink() && std::fs::read(&path).unwrap().is_empty());
+        // A pipe is written to; it is not replaced by a file.
+        let pipe = folder.path().join("pipe");
+        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+        let reader = std::thread::spawn({
+            let pipe = pipe.clone();
+            move || std::fs::read(pipe).unwrap()
+        });
+        let mut file = OutputFile::create(&pipe).unwrap();
+        file.write_all(b"x").unwrap();
+        file.commit().unwrap();
+        assert_eq!(reader.join().unwrap(), b"x");
+    }
+}

@@ -1,0 +1,54 @@
+//! What a build allocates.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::build::{BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, SortedScratch, Tree};
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::mesh::kuhn;
+use olbvh::options::{Assign, BuildOptions};
+use olbvh::primitives::Arena;
+
+fn allocated(gpu: &Gpu) -> u64 {
+    gpu.allocator().lock().unwrap().generate_report().total_allocated_bytes
+}
+
+/// The paper's largest mesh at α = 0: 12,290,298 tetrahedra, 98,322,384 entries, level 7, 2,396,745 nodes.
+#[test]
+fn jets_fits_in_two_gibibytes() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let (tets, entries, level, nodes) = (12_290_298, 98_322_384, 7, 2_396_745u64);
+    let capacity = Capacity { candidates: entries, entries, nodes: nodes as u32, level };
+    let counts = Arena::measure(|a| CountScratch::carve(&gpu, a, tets)).unwrap();
+    let sorted = Arena::measure(|a| SortedScratch::carve(&gpu, a, &capacity)).unwrap();
+    let tree = 4 * u64::from(entries) + nodes * (4 + 4 + 1 + 1 + 24);
+    let total = counts + sorted + tree;
+    println!("counts {counts}, sort and splits {sorted}, tree {tree}, together {total} bytes");
+    assert!(total < 2 << 30, "{total} bytes");
+}
+
+/// After a build only the tree is left, and the peak is what the plan says.
+#[test]
+fn a_build_allocates_what_it_needs() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([12; 3]).unwrap();
+    let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    for assign in Assign::ALL {
+        let before = allocated(&gpu);
+        let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).unwrap();
+        let status = *tree.status();
+        let capacity = Capacity { candidates: status.candidates, entries: status.entries, nodes: status.nodes, level: status.level };
+        let planned = Arena::measure(|a| {
+            CountScratch::carve(&gpu, a, on_device.input().tets)?;
+            FilterScratch::carve(&gpu, a, assign, status.candidates)?;
+            SortedScratch::carve(&gpu, a, &capacity)
+        });
+        // The head of 512 bytes and the rounding of each buffer beside it.
+        let slack = 8192;
+        assert!(tree.scratch_bytes() <= planned.unwrap() + slack, "{assign}: {} scratch bytes", tree.scratch_bytes());
+        let host = tree.download().unwrap();
+        let kept = allocated(&gpu) - before;
+        assert!(kept <= host.memory().total() + slack, "{assign}: {kept} bytes kept for a tree of {}", host.memory().total());
+        drop(tree);
+        assert_eq!(allocated(&gpu), before, "{assign}");
+    }
+}

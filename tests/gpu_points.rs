@@ -1,0 +1,117 @@
+//! Ten million points on faces, edges and vertices and at random in a jittered Kuhn grid: none is lost, and every tree names the same owners.
+//!
+//! `OLBVH_TEST_POINTS=10000000` runs them all; without it a part, to keep the suite short, and the output says so.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::mesh::{Mesh, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions};
+use olbvh::query::{LocateOptions, locate};
+use std::env;
+
+const FULL: usize = 10_000_000;
+const SOME: usize = 100_000;
+
+fn points() -> usize {
+    env::var("OLBVH_TEST_POINTS").ok().and_then(|n| n.parse().ok()).unwrap_or(SOME)
+}
+
+fn mix(mut h: u32) -> u32 {
+    h ^= h >> 16;
+    h = h.wrapping_mul(0x7feb_352d);
+    h ^= h >> 15;
+    h = h.wrapping_mul(0x846c_a68b);
+    h ^ (h >> 16)
+}
+
+/// Point number `i`: a vertex, on an edge, on a face, or anywhere, in turns; never outside the grid.
+fn point(mesh: &Mesh, cells: f32, i: usize) -> [f32; 3] {
+    let mut state = mix(i as u32 ^ 0x51ed_270b);
+    let mut next = || {
+        state = mix(state.wrapping_add(0x9e37_79b9));
+        state
+    };
+    let unit = |next: &mut dyn FnMut() -> u32| (next() >> 8) as f32 / 16_777_216.0;
+    if i % 4 == 3 {
+        return [0; 3].map(|_| unit(&mut next) * cells);
+    }
+    let tet = mesh.tets[next() as usize % mesh.tets.len()];
+    let turn = next() as usize;
+    let v = [0, 1, 2].map(|k| mesh.points[tet[(turn + k) % 4] as usize]);
+    let [a, b] = match i % 4 {
+        0 => [1.0, 0.0],
+        1 => {
+            let t = if turn & 8 == 0 { 0.5 } else { unit(&mut next) };
+            [t, 1.0 - t]
+        }
+        _ => {
+            let (s, t) = (unit(&mut next), unit(&mut next));
+            if s + t > 1.0 { [1.0 - s, 1.0 - t] } else { [s, t] }
+        }
+    };
+    let c = 1.0 - a - b;
+    [0, 1, 2].map(|k| (a * v[0][k] + b * v[1][k] + c * v[2][k]).clamp(0.0, cells))
+}
+
+/// α, and how many of a thousand points its trees are asked for: lists grow with α, to thousands of cells at 4.
+const SHARES: [(f32, usize); 4] = [(0.0, 450), (1.0, 400), (2.0, 145), (4.0, 5)];
+
+/// The share of `n` points in the trees of one α and every assignment, a third each, beside a tree of α = 0: each point is located twice.
+fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
+    let (alpha, share) = SHARES[which];
+    let before: usize = SHARES[..which].iter().map(|s| s.1).sum();
+    let (begin, count) = (n / 1000 * before, n / 1000 * share);
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    let side = 40;
+    let mesh = kuhn_jittered([side; 3], 0.3, 11).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let build = |alpha, assign| Tree::build(&gpu, &device, &BuildOptions { alpha, assign, ..BuildOptions::default() }).unwrap();
+    let first = build(0.0, Assign::Exact);
+    let third = count.div_ceil(3);
+    let mut located = 0;
+    for (k, assign) in Assign::ALL.into_iter().enumerate() {
+        let from = begin + k * third;
+        let points: Vec<_> = (from..(from + third).min(begin + count)).map(|i| point(&mesh, side as f32, i)).collect();
+        let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners;
+        let expected = find(&first);
+        let found = find(&build(alpha, assign));
+        for (i, (a, b)) in expected.iter().zip(&found).enumerate() {
+            assert_ne!(*a, u32::MAX, "point {} {:?} is lost", from + i, points[i]);
+            assert_eq!(a, b, "owner of point {} {:?} with alpha {alpha}, {assign}", from + i, points[i]);
+        }
+        located += points.len();
+    }
+    println!("{located} points located by {binding:?} with alpha {alpha} as with alpha 0, none lost");
+    if n < FULL {
+        println!("NOT ALL: {n} of {FULL} points in the four tests; OLBVH_TEST_POINTS={FULL} runs them all");
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn alpha_0() {
+    no_point_is_lost(Binding::Address, points(), 0);
+}
+
+#[test]
+fn alpha_1() {
+    no_point_is_lost(Binding::Address, points(), 1);
+}
+
+#[test]
+fn alpha_2() {
+    no_point_is_lost(Binding::Address, points(), 2);
+}
+
+#[test]
+fn alpha_4() {
+    no_point_is_lost(Binding::Address, points(), 3);
+}
+
+#[test]
+fn by_descriptors() {
+    no_point_is_lost(Binding::Descriptors, SOME.min(points()) / 4, 1);
+}

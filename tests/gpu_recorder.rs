@@ -1,0 +1,135 @@
+//! The recorder's own hazard check: whichever barrier is left out, it objects. So no barrier is missing where the check looks, and none is superfluous.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::Error;
+use olbvh::build::{
+    BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh,
+};
+use olbvh::gpu::{Buffer, BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::kernels::{SortTarget, Target};
+use olbvh::mesh::kuhn_jittered;
+use olbvh::options::{Assign, BuildOptions};
+use olbvh::primitives::{
+    Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
+};
+
+/// Copies each part, as a caller would use it next.
+fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
+    for (i, part) in parts.iter().enumerate() {
+        let n = part.size.min(4);
+        r.copy(part.part(0, n), sink.all().part(16 * i as u64, n));
+    }
+}
+
+/// Records `work` once as it is, then once without each of its barriers: the first must pass, the others must be refused.
+fn every_barrier_counts(gpu: &Gpu, what: &str, work: impl Fn(&mut Recorder<'_>) -> olbvh::Result<()>) -> usize {
+    let labels = gpu
+        .run("olbvh.test.whole", |r| {
+            work(r)?;
+            Ok(r.barriers().to_vec())
+        })
+        .unwrap_or_else(|e| panic!("{what}: {e}"))
+        .0;
+    let mut wrong = Vec::new();
+    for (n, label) in labels.iter().enumerate() {
+        let result = gpu.run("olbvh.test.dropped", |r| {
+            r.drop_barrier(Some(n as u32));
+            work(r)
+        });
+        match result {
+            Err(Error::Invalid(message)) => assert!(message.contains("no barrier between them"), "{what}: {message}"),
+            Err(other) => wrong.push(format!("{what}: without barrier {n} `{label}`: {other}")),
+            Ok(_) => wrong.push(format!("{what}: nothing needs barrier {n} `{label}`")),
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+    labels.len()
+}
+
+fn targets(gpu: &Gpu) -> Vec<Gpu> {
+    let subgroup = gpu.subgroup_size();
+    let serial = Target::select(subgroup, true);
+    let few_bits = Target { sort: SortTarget { digit_bits: 4, ..serial.sort }, ..serial };
+    let open = |target| Gpu::new(&GpuOptions { target: Some(target), ..Default::default() }).unwrap();
+    vec![open(serial), open(Target::select(subgroup, false)), open(few_bits)]
+}
+
+#[test]
+fn primitives() {
+    for gpu in targets(&Gpu::new(&GpuOptions::default()).unwrap()) {
+        let n = 50_000;
+        let words = |n: u64| gpu.upload("olbvh.test.words", &vec![3u32; n as usize]).unwrap();
+        let (a, b, total, count, sink) = (words(n), words(n), words(1), words(1), words(64));
+        let carve = |a: &mut Arena| {
+            Ok((ScanScratch::carve(&gpu, a, n as u32)?, SortScratch::carve(&gpu, a, n as u32, 21)?, a.take(REDUCE_SCRATCH)?))
+        };
+        let scratch = gpu.buffer("olbvh.test.scratch", Arena::measure(carve).unwrap()).unwrap();
+        let (scan, sort, reduce) = carve(&mut Arena::new(scratch.all())).unwrap();
+        for count in [Count::host(n as u32), Count::device(n as u32, count.all())] {
+            let what = format!("{} {count:?}", gpu.target().name);
+            every_barrier_counts(&gpu, &format!("reduce {what}"), |r| {
+                cmd_reduce(r, Reduction::Add, a.all(), total.all(), count, reduce)?;
+                r.barrier("reduce → caller");
+                read(r, &[total.all()], &sink);
+                Ok(())
+            });
+            every_barrier_counts(&gpu, &format!("scan {what}"), |r| {
+                r.fill(a.all(), 1);
+                cmd_exclusive_scan(r, a.all(), b.all(), total.all(), count, &scan)?;
+                r.barrier("scan → caller");
+                read(r, &[total.all(), b.all()], &sink);
+                Ok(())
+            });
+            every_barrier_counts(&gpu, &format!("sort {what}"), |r| {
+                r.fill(a.all(), 1);
+                cmd_sort_pairs(r, a.all(), b.all(), 21, count, &sort)?;
+                r.barrier("sort → caller");
+                read(r, &[a.all(), b.all()], &sink);
+                Ok(())
+            });
+        }
+    }
+}
+
+#[test]
+fn construction() {
+    let mesh = kuhn_jittered([6, 5, 4], 0.3, 1).unwrap();
+    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+    for gpu in targets(&Gpu::new(&GpuOptions::default()).unwrap()) {
+        let sink = gpu.buffer("olbvh.test.sink", 4096).unwrap();
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let carve = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?));
+        let memory = gpu.buffer("olbvh.test.mesh", Arena::measure(carve).unwrap()).unwrap();
+        let (arrays, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
+        let barriers = every_barrier_counts(&gpu, "mesh", |r| {
+            cmd_prepare_mesh(r, device.input(), &arrays, &scratch)?;
+            r.barrier("mesh → caller");
+            read(r, &[arrays.status, arrays.grid, arrays.bad, arrays.boundary, arrays.vertices, arrays.neighbours], &sink);
+            Ok(())
+        });
+        assert!(barriers >= 5);
+        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+        for assign in Assign::ALL {
+            for (boxes, capacity) in [
+                (false, Capacity::for_entries(60_000, 8)),
+                (true, Capacity::for_entries(60_000, 1)),
+                (true, Capacity::for_entries(tets, 0)),
+            ] {
+                let options = BuildOptions { assign, boxes, ..Default::default() };
+                let carve = |a: &mut Arena| {
+                    Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?))
+                };
+                let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
+                let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
+                let barriers = every_barrier_counts(&gpu, &format!("build {assign} {boxes} {}", gpu.target().name), |r| {
+                    cmd_build(r, &view, &tree, &capacity, &options, &scratch)?;
+                    let arrays = [tree.status, tree.grid, tree.p, tree.po, tree.co, tree.flags, tree.masks];
+                    read(r, &arrays.into_iter().chain(tree.boxes).collect::<Vec<_>>(), &sink);
+                    Ok(())
+                });
+                assert!(barriers >= 12, "{barriers}");
+            }
+        }
+    }
+}

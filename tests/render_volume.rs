@@ -1,0 +1,143 @@
+//! Pictures of the reference renderer: independent of the tree, equal to brute force, equal to the one kept.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::mesh::{Field, Mesh, On, cases, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions};
+use olbvh::reference::boundary::{Topology, topology};
+use olbvh::reference::build::build;
+use olbvh::reference::volume::{Picture, Scene, brute_force, render};
+use olbvh::render::{Background, Bounds, RenderSettings, TransferFunction};
+
+/// A jittered grid with the analytic field, moved off the origin.
+fn grid(cells: [u32; 3]) -> Mesh {
+    let mut mesh = kuhn_jittered(cells, 0.3, 5).unwrap();
+    mesh.points.iter_mut().for_each(|p| *p = [p[0] * 0.7 - 3.0, p[1] + 11.0, p[2] * 1.3]);
+    mesh
+}
+
+fn settings(camera: &str) -> RenderSettings {
+    let opacity = TransferFunction::parse_opacity("0:0.05,0.4:0.2,1:0.9").unwrap();
+    let transfer = TransferFunction::named("viridis").unwrap().with_opacity(opacity).unwrap();
+    RenderSettings { size: [36, 30], camera: camera.parse().unwrap(), transfer, ..RenderSettings::default() }
+}
+
+fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &RenderSettings) -> Picture {
+    let tree = build(mesh, topology, options).unwrap();
+    let scene = Scene::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap();
+    render(&scene, &|_, _| ())
+}
+
+/// How far apart two pictures are at most.
+fn distance(a: &[u8], b: &[u8]) -> u8 {
+    assert_eq!(a.len(), b.len());
+    a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+}
+
+#[test]
+fn the_picture_does_not_depend_on_the_tree() {
+    let mesh = grid([9, 7, 6]);
+    let topology = topology(&mesh).unwrap();
+    for camera in ["iso", "top,ortho", "eye=-0.5,14,4,target=0,15,4,fov=100"] {
+        let settings = settings(camera);
+        let first = draw(&mesh, &topology, &BuildOptions::default(), &settings);
+        assert!(first.found_samples > 5_000 && first.samples >= first.found_samples, "{camera}: {} {}", first.samples, first.found_samples);
+        for assign in Assign::ALL {
+            for alpha in [0.0, 1.0, 2.0] {
+                let other = draw(&mesh, &topology, &BuildOptions { alpha, assign, ..BuildOptions::default() }, &settings);
+                let d = distance(&first.pixels, &other.pixels);
+                assert!(d <= 1, "{camera}, alpha {alpha}, {assign}: pixels differ by {d}");
+                assert_eq!(first.found_samples, other.found_samples, "{camera}, alpha {alpha}, {assign}");
+            }
+        }
+    }
+}
+
+/// The picture and the oracle differ by more than 2/255 in at most a thousandth of the pixels.
+fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
+    let topology = topology(mesh).unwrap();
+    let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
+    let scene = Scene::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
+    let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+    let bounds = Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) };
+    let expected = brute_force(&scene, settings, &bounds);
+    let picture = render(&scene, &|_, _| ());
+    let off = picture.pixels.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
+    assert!(off * 1000 <= expected.len() / 4, "{what}: {off} of {} pixels differ", expected.len() / 4);
+    assert!(picture.found_samples > 1000, "{what}: an empty picture proves nothing");
+}
+
+#[test]
+fn pictures_agree_with_brute_force() {
+    let mesh = grid([4, 3, 3]);
+    for camera in ["iso", "front,ortho", "azimuth=210,elevation=-40,zoom=2", "eye=-2,13,2,target=0,12,2,fov=80"] {
+        assert_as_brute_force(camera, &mesh, &settings(camera));
+    }
+    let plain = RenderSettings { shading: false, background: Background::Transparent, opacity_scale: 3.0, ..settings("iso") };
+    assert_as_brute_force("without shading", &mesh, &plain);
+    assert_as_brute_force("coarse step", &mesh, &RenderSettings { step: Some(0.21), termination: 0.7, ..settings("iso") });
+}
+
+#[test]
+fn fields_of_cells_and_holes_in_fields_agree_with_brute_force() {
+    let mut mesh = grid([3, 3, 2]);
+    let n = mesh.tets.len();
+    mesh.fields = vec![Field { name: "id".into(), on: On::Cells, values: (0..n).map(|i| (i % 7) as f32).collect() }];
+    assert_as_brute_force("cells", &mesh, &settings("iso"));
+    for (i, v) in mesh.fields[0].values.iter_mut().enumerate() {
+        *v = if i % 3 == 0 { f32::NAN } else { *v };
+    }
+    assert_as_brute_force("cells with NaN", &mesh, &settings("iso"));
+}
+
+#[test]
+fn every_odd_mesh_has_a_picture() {
+    for case in cases::cases().unwrap() {
+        let mut mesh = case.mesh;
+        let values = mesh.points.iter().map(|p| p[0]).collect();
+        mesh.fields = vec![Field { name: "x".into(), on: On::Points, values }];
+        let topology = topology(&mesh).unwrap();
+        for camera in ["iso", "+z,ortho"] {
+            let settings = RenderSettings { size: [16, 12], camera: camera.parse().unwrap(), ..RenderSettings::default() };
+            let picture = draw(&mesh, &topology, &BuildOptions::default(), &settings);
+            assert_eq!(picture.pixels.len(), 16 * 12 * 4, "{}", case.name);
+            if topology.valid_cells() == topology.counts.flat {
+                assert!(picture.pixels.iter().all(|&p| p == 255), "{}: nothing to see", case.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn size_and_place_of_the_mesh_do_not_matter() {
+    let topology_of = |mesh: &Mesh| topology(mesh).unwrap();
+    let small = grid([5, 5, 4]);
+    let settings = settings("iso");
+    let expected = draw(&small, &topology_of(&small), &BuildOptions::default(), &settings);
+    for scale in [2f32.powi(90), 2f32.powi(-90)] {
+        let mut mesh = small.clone();
+        mesh.points.iter_mut().for_each(|p| *p = p.map(|v| v * scale));
+        let picture = draw(&mesh, &topology_of(&mesh), &BuildOptions::default(), &settings);
+        let off = picture.pixels.chunks(4).zip(expected.pixels.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
+        assert!(off <= 2, "{scale:e}: {off} pixels differ");
+    }
+}
+
+#[test]
+fn the_picture_is_the_one_kept() {
+    let path = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/golden/jet.png");
+    let mesh = kuhn_jittered([12, 12, 12], 0.2, 1).unwrap();
+    let settings = RenderSettings { size: [96, 96], ..RenderSettings::default() };
+    let picture = draw(&mesh, &topology(&mesh).unwrap(), &BuildOptions::default(), &settings);
+    if std::env::var_os("OLBVH_BLESS").is_some() {
+        let mut encoder = png::Encoder::new(std::fs::File::create(path).unwrap(), 96, 96);
+        encoder.set_color(png::ColorType::Rgba);
+        encoder.write_header().unwrap().write_image_data(&picture.pixels).unwrap();
+    }
+    let file = std::io::BufReader::new(std::fs::File::open(path).unwrap());
+    let mut reader = png::Decoder::new(file).read_info().unwrap();
+    let mut golden = vec![0; reader.output_buffer_size().unwrap()];
+    reader.next_frame(&mut golden).unwrap();
+    let d = distance(&picture.pixels, &golden);
+    assert!(d <= 1, "differs from tests/golden/jet.png by {d}; if that is meant, look at the new one made with OLBVH_BLESS=1");
+}

@@ -1,0 +1,191 @@
+//! Rules of the source: who may use whom, and how things are named.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What each module may use, itself aside (DESIGN §3: dependencies point one way). `error` and `lib.rs` are everybody's.
+const LAYERS: &[(&str, &[&str])] = &[
+    ("error", &[]),
+    ("layout", &[]),
+    ("options", &["error"]),
+    ("mesh", &["error"]),
+    ("slicing", &["error", "layout", "mesh", "options"]),
+    ("reference", &["error", "layout", "mesh", "options", "tree", "render", "slicing"]),
+    ("tree", &["error", "layout", "mesh", "options", "reference"]),
+    ("render", &["error", "layout", "mesh", "options", "reference", "tree"]),
+    ("formats", &["error", "layout", "mesh", "options", "reference", "render"]),
+    // `kernels` holds what is generated for `gpu`'s pipelines, and `gpu` runs the self-test of `primitives` before it trusts a device.
+    ("gpu", &["error", "kernels", "primitives"]),
+    ("kernels", &["error", "gpu", "layout"]),
+    ("primitives", &["error", "gpu", "kernels", "layout"]),
+    ("build", &["error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
+    ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
+    ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),
+    (
+        "conformance",
+        &[
+            "baseline",
+            "build",
+            "error",
+            "gpu",
+            "kernels",
+            "layout",
+            "mesh",
+            "options",
+            "primitives",
+            "query",
+            "reference",
+            "render",
+            "tree",
+        ],
+    ),
+];
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files(&path, found);
+        } else if path.extension().is_some_and(|e| e == "rs") {
+            found.push(path);
+        }
+    }
+}
+
+fn sources() -> Vec<(PathBuf, String)> {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut found = Vec::new();
+    files(&root, &mut found);
+    found.sort();
+    found.into_iter().map(|f| (f.strip_prefix(&root).unwrap().to_path_buf(), fs::read_to_string(f).unwrap())).collect()
+}
+
+/// The module that a file belongs to; `None` for the program and `lib.rs`.
+fn module(file: &Path) -> Option<String> {
+    let first = file.components().next()?.as_os_str().to_string_lossy().into_owned();
+    let name = first.strip_suffix(".rs").unwrap_or(&first);
+    (name != "bin" && name != "lib").then(|| name.to_string())
+}
+
+/// The identifiers behind every `crate::`, groups in braces included.
+fn used(text: &str) -> Vec<String> {
+    let ident = |s: &str| s.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
+    let mut used = Vec::new();
+    let code = text.lines().filter(|l| !l.trim_start().starts_with("//")).collect::<Vec<_>>().join("\n");
+    for rest in code.split("crate::").skip(1) {
+        match rest.strip_prefix('{') {
+            Some(group) => {
+                let mut depth = 0;
+                let mut item = String::new();
+                for c in group.chars() {
+                    match c {
+                        '{' => depth += 1,
+                        '}' if depth == 0 => break,
+                        '}' => depth -= 1,
+                        ',' if depth == 0 => used.push(ident(&std::mem::take(&mut item))),
+                        _ => {}
+                    }
+                    if depth == 0 && c != ',' {
+                        item.push(c);
+                    }
+                }
+                used.push(ident(&item));
+            }
+            None => used.push(ident(rest)),
+        }
+    }
+    used.retain(|u| u.chars().next().is_some_and(char::is_lowercase));
+    used
+}
+
+#[test]
+fn dependencies_point_one_way() {
+    let mut wrong = Vec::new();
+    for (file, text) in sources() {
+        let Some(module) = module(&file) else { continue };
+        let Some((_, allowed)) = LAYERS.iter().find(|l| l.0 == module) else {
+            wrong.push(format!("{}: module `{module}` has no layer", file.display()));
+            continue;
+        };
+        for other in used(&text) {
+            if other != module && !allowed.contains(&other.as_str()) {
+                wrong.push(format!("{}: `{module}` may not use `{other}`", file.display()));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
+
+#[test]
+fn the_rule_sees_uses() {
+    assert_eq!(used("use crate::gpu::{A, B};\nuse crate::{error::Error, tree, mesh::{x, y}};"), ["gpu", "error", "tree", "mesh"]);
+    assert!(used("// crate::gpu\nuse crate::Error;").is_empty());
+}
+
+/// `olbvh.<stage>.<thing>`, thing may have parts.
+fn is_name(name: &str) -> bool {
+    let parts: Vec<&str> = name.split('.').collect();
+    let word =
+        |p: &&str| !p.is_empty() && p.chars().all(|c| c.is_ascii_lowercase() || c.is_ascii_digit() || c == '_' || c == '{' || c == '}');
+    parts.len() >= 3 && parts[0] == "olbvh" && parts.iter().all(word)
+}
+
+#[test]
+fn kernels_are_named_by_stage_and_thing() {
+    let mut n = 0;
+    for (kernel, buffers) in olbvh::kernels::interfaces() {
+        assert!(is_name(kernel), "{kernel}");
+        assert!(!buffers.is_empty() && buffers.iter().all(|b| !b.is_empty()), "{kernel}: {buffers:?}");
+        n += 1;
+    }
+    assert!(n > 20, "{n} kernels");
+}
+
+/// The string literals that directly follow `call`, after an optional first argument such as `gpu`.
+fn literals<'a>(text: &'a str, call: &str) -> Vec<&'a str> {
+    let follows = |rest: &'a str| {
+        let rest = rest.trim_start();
+        let rest = rest.strip_prefix("self,").or_else(|| rest.strip_prefix("gpu,")).unwrap_or(rest).trim_start();
+        rest.strip_prefix('"').and_then(|r| r.split('"').next())
+    };
+    text.split(call).skip(1).filter_map(follows).collect()
+}
+
+#[test]
+fn buffers_submissions_and_stages_are_named() {
+    let mut wrong = Vec::new();
+    let mut n = 0;
+    for (file, text) in sources() {
+        let text = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for call in [".buffer(", ".upload(", "Buffer::new(", "Buffer::staging(", "reserve(", "Guarded::new(", "Guarded::scratch("] {
+            for name in literals(text, call) {
+                n += 1;
+                if !is_name(name) {
+                    wrong.push(format!("{}: buffer `{name}`", file.display()));
+                }
+            }
+        }
+        for name in literals(text, ".stage(") {
+            n += 1;
+            if !is_name(&format!("olbvh.{name}")) {
+                wrong.push(format!("{}: stage `{name}`", file.display()));
+            }
+        }
+        for name in literals(text, "gpu.run(") {
+            n += 1;
+            if !name.starts_with("olbvh.") {
+                wrong.push(format!("{}: submission `{name}`", file.display()));
+            }
+        }
+        for label in literals(text, "r.barrier(") {
+            n += 1;
+            if !label.contains(" → ") {
+                wrong.push(format!("{}: barrier `{label}` does not say by whom and for whom", file.display()));
+            }
+        }
+    }
+    assert!(n > 50, "{n} names found");
+    assert!(wrong.is_empty(), "{}", wrong.join("\n"));
+}
