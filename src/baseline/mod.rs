@@ -1,5 +1,8 @@
-//! The structures that the paper compares with, built and queried on the same device, with the same answers (SPEC 3.6).
+//! The structures that the paper compares with, built and queried on the same device (SPEC 3.6): the LBVH with the same answers, and the device's
+//! own ray tracing with what it does not lose.
 
 mod lbvh;
+mod ray_query;
 
 pub use lbvh::Lbvh;
+pub use ray_query::RayQuery;

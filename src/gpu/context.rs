@@ -1,5 +1,6 @@
 //! The device: chosen, checked, opened, with its queue, allocator and pipelines.
 
+use super::acceleration::Acceleration;
 use super::debug::DebugUtils;
 use super::failed;
 use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
@@ -59,6 +60,7 @@ struct Inner {
     queue: Mutex<vk::Queue>,
     family: u32,
     debug_device: Option<ash::ext::debug_utils::Device>,
+    acceleration: Option<Acceleration>,
     device: ash::Device,
     debug: Option<DebugUtils>,
     instance: ash::Instance,
@@ -192,6 +194,11 @@ impl Gpu {
         if requirements.subgroup_size_control {
             info = info.push_next(&mut control);
         }
+        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+        if requirements.ray_query() {
+            info = info.push_next(&mut structures).push_next(&mut ray_queries);
+        }
         // SAFETY: only features and extensions that the device reported are enabled; all structs outlive the calls.
         let (device, queue, limits) = unsafe {
             let device = instance.create_device(physical, &info, None).map_err(failed("vkCreateDevice"))?;
@@ -200,6 +207,7 @@ impl Gpu {
         };
         let debug_utils = if debug { DebugUtils::new(&entry, &instance) } else { None };
         let debug_device = debug.then(|| ash::ext::debug_utils::Device::new(&instance, &device));
+        let acceleration = requirements.ray_query().then(|| Acceleration::new(&instance, physical, &device));
         let allocator = Allocator::new(&AllocatorCreateDesc {
             instance: instance.clone(),
             device: device.clone(),
@@ -228,6 +236,7 @@ impl Gpu {
             queue: Mutex::new(queue),
             family,
             debug_device,
+            acceleration,
             device,
             debug: debug_utils,
             instance,
@@ -333,6 +342,11 @@ impl Gpu {
 
     pub(crate) fn has_addresses(&self) -> bool {
         self.0.requirements.buffer_addresses
+    }
+
+    /// Functions for acceleration structures, where the device has ray queries.
+    pub(super) fn acceleration(&self) -> Option<&Acceleration> {
+        self.0.acceleration.as_ref()
     }
 
     pub(crate) fn pipeline_cache(&self) -> vk::PipelineCache {

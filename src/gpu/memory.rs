@@ -63,20 +63,24 @@ impl Buffer {
     /// # Errors
     /// [`Error::Memory`] names the buffer and its size.
     pub fn new(gpu: &Gpu, name: &str, size: u64) -> Result<Self> {
-        Self::with_location(gpu, name, size, MemoryLocation::GpuOnly)
+        Self::with_usage(gpu, name, size, MemoryLocation::GpuOnly, vk::BufferUsageFlags::empty())
     }
 
     /// A host-visible buffer for transfers.
     pub(crate) fn staging(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation) -> Result<Self> {
-        Self::with_location(gpu, name, size, location)
+        Self::with_usage(gpu, name, size, location, vk::BufferUsageFlags::empty())
     }
 
-    fn with_location(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation) -> Result<Self> {
+    /// A buffer with usage flags beside those of every buffer.
+    pub(super) fn with_usage(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation, more: vk::BufferUsageFlags) -> Result<Self> {
         let device = gpu.device();
         let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
-        let mut usage = USAGE;
+        let mut usage = USAGE | more;
         if gpu.has_addresses() {
             usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+        }
+        if gpu.acceleration().is_some() {
+            usage |= vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
         }
         let info = vk::BufferCreateInfo::default().size(size.max(16)).usage(usage);
         // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.

@@ -1,6 +1,7 @@
 //! The Vulkan layer, and the only folder with `unsafe`: device, memory, pipelines, and the recorder of commands.
 #![allow(unsafe_code)]
 
+mod acceleration;
 mod context;
 mod debug;
 mod kernel;
@@ -9,12 +10,13 @@ mod recorder;
 mod requirements;
 mod submit;
 
+pub use acceleration::{AccelerationStructure, Triangles};
 pub use context::{Binding, Gpu, GpuOptions, list_devices};
 pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer, BufferRef, USAGE};
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
-pub use requirements::{DeviceReport, Requirements};
+pub use requirements::{DeviceReport, RayTracing, Requirements};
 pub use submit::{Readback, StageTime};
 
 use crate::error::Error;

@@ -39,7 +39,7 @@ struct Use {
 /// Records into one command buffer.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
-    commands: vk::CommandBuffer,
+    pub(super) commands: vk::CommandBuffer,
     uses: Vec<Use>,
     hazard: Option<String>,
     timestamps: Option<(vk::QueryPool, u32)>,
@@ -126,21 +126,25 @@ impl<'a> Recorder<'a> {
 
     /// Makes everything written so far visible to everything after; `label` says by whom and for whom.
     pub fn barrier(&mut self, label: &'static str) {
+        let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+        let reads = vk::AccessFlags::SHADER_READ | vk::AccessFlags::TRANSFER_READ | vk::AccessFlags::INDIRECT_COMMAND_READ;
+        self.barrier_between(label, (stages, writes), (stages | vk::PipelineStageFlags::DRAW_INDIRECT, writes | reads));
+    }
+
+    /// A barrier between these stages and accesses.
+    pub(super) fn barrier_between(
+        &mut self,
+        label: &'static str,
+        (source, written): (vk::PipelineStageFlags, vk::AccessFlags),
+        (target, used): (vk::PipelineStageFlags, vk::AccessFlags),
+    ) {
         self.barriers.push(label);
         if self.drop_barrier == Some(self.barriers.len() as u32 - 1) {
             return;
         }
         self.uses.clear();
-        let source = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
-        let target = source | vk::PipelineStageFlags::DRAW_INDIRECT;
-        let barrier =
-            vk::MemoryBarrier::default().src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE).dst_access_mask(
-                vk::AccessFlags::SHADER_READ
-                    | vk::AccessFlags::SHADER_WRITE
-                    | vk::AccessFlags::TRANSFER_READ
-                    | vk::AccessFlags::TRANSFER_WRITE
-                    | vk::AccessFlags::INDIRECT_COMMAND_READ,
-            );
+        let barrier = vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(used);
         self.label(label);
         // SAFETY: the caller of `new` vouches for the command buffer.
         unsafe {

@@ -3,6 +3,17 @@
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
+/// How a device traces rays.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayTracing {
+    /// Not at all.
+    None,
+    /// In ray-tracing pipelines only, which are not supported here.
+    Pipelines,
+    /// From any shader (`VK_KHR_ray_query`).
+    Queries,
+}
+
 /// What the engine needs of a physical device, checked against one.
 #[derive(Clone, Debug)]
 pub struct Requirements {
@@ -14,6 +25,8 @@ pub struct Requirements {
     pub buffer_addresses: bool,
     /// Subgroup sizes can be required per pipeline.
     pub subgroup_size_control: bool,
+    /// Whether the device traces rays; a baseline uses that, nothing else does.
+    pub ray_tracing: RayTracing,
     /// Smallest, usual and largest subgroup size.
     pub subgroup_sizes: [u32; 3],
     /// A queue family with compute, and the number of valid bits of its timestamps.
@@ -86,13 +99,18 @@ fn missing(offer: &Offer) -> Vec<String> {
 }
 
 impl Requirements {
+    /// The device traces rays from compute shaders.
+    pub fn ray_query(&self) -> bool {
+        self.ray_tracing == RayTracing::Queries
+    }
+
     /// Checks a physical device: Vulkan 1.2, a compute queue, subgroup basic, vote, arithmetic and ballot in compute, 256 invocations per
-    /// workgroup; buffer addresses and subgroup size control are preferred.
+    /// workgroup; buffer addresses and subgroup size control are preferred, ray queries optional.
     pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
         // SAFETY: the handle is one of this instance; the structs live until the calls return.
-        let (properties, extensions, families) = unsafe {
+        let (properties, listed, families) = unsafe {
             let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut control);
             instance.get_physical_device_properties2(device, &mut properties);
             (
@@ -111,7 +129,7 @@ impl Requirements {
             subgroup: if in_compute { subgroup.supported_operations } else { vk::SubgroupFeatureFlags::empty() },
             compute_queue: queue_family.is_some(),
         });
-        let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+        let has = |name: &CStr| listed.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
         let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
         let can_control = has(ash::ext::subgroup_size_control::NAME);
@@ -123,22 +141,42 @@ impl Requirements {
             }
             instance.get_physical_device_features2(device, &mut features);
         }
+        let ray_extensions = [ash::khr::ray_query::NAME, ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
+        let ray_query = addresses.buffer_device_address != 0 && ray_extensions.iter().all(|e| has(e)) && can_query_rays(instance, device);
         let subgroup_size_control = can_control && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
         let sizes = if can_control {
             [control.min_subgroup_size, subgroup.subgroup_size, control.max_subgroup_size]
         } else {
             [subgroup.subgroup_size; 3]
         };
-        let preferred = [ash::ext::subgroup_size_control::NAME];
+        let mut extensions: Vec<_> = [ash::ext::subgroup_size_control::NAME].into_iter().filter(|e| has(e)).collect();
+        if ray_query {
+            extensions.extend(ray_extensions);
+        }
         Self {
             missing,
-            extensions: preferred.into_iter().filter(|e| has(e)).collect(),
+            extensions,
             buffer_addresses: addresses.buffer_device_address != 0,
             subgroup_size_control,
+            ray_tracing: match ray_query {
+                true => RayTracing::Queries,
+                false if has(ash::khr::ray_tracing_pipeline::NAME) => RayTracing::Pipelines,
+                false => RayTracing::None,
+            },
             subgroup_sizes: sizes,
             queue_family,
         }
     }
+}
+
+/// Whether the features of the ray query extensions, which the device must list, are there.
+fn can_query_rays(instance: &ash::Instance, device: vk::PhysicalDevice) -> bool {
+    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
+    let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut structures).push_next(&mut queries);
+    // SAFETY: the handle is one of this instance; the structs live until the call returns.
+    unsafe { instance.get_physical_device_features2(device, &mut features) };
+    structures.acceleration_structure != 0 && queries.ray_query != 0
 }
 
 impl DeviceReport {

@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use crate::{output, text};
 use olbvh::error::Error;
-use olbvh::gpu::list_devices;
+use olbvh::gpu::{RayTracing, list_devices};
 use serde_json::json;
 use std::fmt::Write as _;
 
@@ -29,9 +29,14 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
     for (i, d) in devices.iter().enumerate() {
         let missing = &d.requirements.missing;
         let verdict = if missing.is_empty() { "qualifies".to_owned() } else { format!("cannot be used; it lacks {}", missing.join(", ")) };
+        let rays = match d.requirements.ray_tracing {
+            RayTracing::Queries => "; ray queries",
+            RayTracing::Pipelines => "; ray-tracing pipelines without ray queries, which are not supported",
+            RayTracing::None => "",
+        };
         let _ = writeln!(
             lines,
-            "{i:>3}  {}\n     {}; Vulkan {}; subgroups of {}; {} of memory; {}\n     {verdict}",
+            "{i:>3}  {}\n     {}; Vulkan {}; subgroups of {}; {} of memory; {}{rays}\n     {verdict}",
             d.name,
             d.driver,
             d.api,
@@ -45,6 +50,7 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
         json!({
             "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
             "qualifies": d.requirements.missing.is_empty(), "missing": d.requirements.missing,
+            "ray_query": d.requirements.ray_query(),
         })
     };
     let json = json!({ "devices": devices.iter().enumerate().map(entry).collect::<Vec<_>>() });

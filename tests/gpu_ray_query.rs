@@ -1,0 +1,127 @@
+//! The ray query baseline, where the device has ray queries: what it finds is right, and what it loses is counted.
+#![allow(clippy::unwrap_used)]
+
+use olbvh::baseline::RayQuery;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
+use olbvh::options::BuildOptions;
+use olbvh::query::{LocateOptions, LocateOutput, PointInput, locate};
+use olbvh::reference::locate::Locator;
+
+/// Whether the device has ray queries; says so loudly where not. The reference driver must have them.
+fn has_rays(gpu: &Gpu) -> bool {
+    let has = gpu.report().requirements.ray_query();
+    if !has {
+        println!("NOT RUN: {} has no ray queries", gpu.report().name);
+        let driver = std::env::var("OLBVH_TEST_DRIVER").unwrap_or_default();
+        assert!(!driver.starts_with("lavapipe25"), "{driver} is expected to have ray queries");
+    }
+    has
+}
+
+fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, points: &[[f32; 3]]) -> (RayQuery, Vec<u32>, Vec<[f32; 4]>) {
+    let rays = RayQuery::build(gpu, mesh).unwrap().unwrap();
+    let n = points.len() as u64;
+    let input = gpu.upload("olbvh.test.points", points).unwrap();
+    let (owners, weights) = (gpu.buffer("olbvh.test.owners", 4 * n).unwrap(), gpu.buffer("olbvh.test.weights", 16 * n).unwrap());
+    let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: None };
+    let output = LocateOutput { owners: owners.all(), barycentrics: weights.all() };
+    gpu.run("olbvh.test.rays", |r| rays.cmd_locate(r, mesh, &input, &output)).unwrap();
+    (rays, gpu.download(&owners, owners.all()).unwrap(), gpu.download(&weights, weights.all()).unwrap())
+}
+
+/// The mesh with its coordinates multiplied, and points in and around it.
+fn scaled(mut mesh: Mesh, by: [f32; 3]) -> (Mesh, Vec<[f32; 3]>) {
+    mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] * by[c]));
+    let hi = mesh.points.iter().fold([0.0f32; 3], |hi, p| [0, 1, 2].map(|c| hi[c].max(p[c])));
+    let mut h = 1u32;
+    let mut next = |c: usize| {
+        h = h.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        ((h >> 8) as f32 / 16_777_216.0 * 1.2 - 0.1) * hi[c]
+    };
+    let points = (0..20_000).map(|_| [next(0), next(1), next(2)]).collect();
+    (mesh, points)
+}
+
+fn what_rays_find_is_right(binding: Binding) {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..Default::default() }).unwrap();
+    if !has_rays(&gpu) {
+        return;
+    }
+    let meshes = [
+        ("jittered", scaled(kuhn_jittered([10, 11, 9], 0.3, 1).unwrap(), [1.0; 3])),
+        ("regular", scaled(kuhn([16; 3]).unwrap(), [1.0; 3])),
+        ("huge", scaled(kuhn_jittered([8; 3], 0.3, 2).unwrap(), [1e30; 3])),
+        ("plate", scaled(kuhn_jittered([20, 20, 2], 0.3, 3).unwrap(), [1.0, 1.0, 1e-3])),
+    ];
+    for (name, (mesh, mut points)) in meshes {
+        let inside = points.len();
+        points.extend_from_slice(&mesh.points);
+        points.extend([[f32::NAN; 3], [f32::INFINITY; 3], [-1e38; 3]]);
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+        let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, &|_, _| {}).unwrap();
+        let (rays, owners, weights) = by_rays(&gpu, &device, &points);
+        let host = tree.download().unwrap();
+        let locator = Locator::new(&mesh, &host);
+        let mut lost = [0; 2];
+        for (i, (&owner, &octree)) in owners.iter().zip(&expected.owners).enumerate() {
+            if owner == u32::MAX {
+                lost[usize::from(i >= inside)] += usize::from(octree != owner);
+                assert_eq!(weights[i], [0.0; 4]);
+                continue;
+            }
+            let all = locator.owners(points[i]);
+            assert!(all.contains(&owner), "{name} point {i} {:?}: {owner} is none of {all:?}", points[i]);
+            if all.len() == 1 {
+                assert_eq!((owner, weights[i]), (octree, expected.barycentrics[i]), "{name} point {i}");
+            }
+        }
+        let structure = rays.structure();
+        println!(
+            "{binding:?} {name}: {} faces, {} bytes ({} before compaction), lost {} of {inside} points and {} of {} vertices",
+            rays.faces(),
+            structure.bytes(),
+            structure.built_bytes(),
+            lost[0],
+            lost[1],
+            mesh.points.len()
+        );
+        assert!(lost[0] * 1000 <= inside, "{name}: {} of {inside} points are lost", lost[0]);
+        // Every face once: two of the four of each tetrahedron, and half of those on the surface again.
+        let surface = device.neighbours().unwrap().iter().flatten().filter(|&&n| n == u32::MAX).count();
+        assert_eq!(2 * rays.faces() as usize, 4 * mesh.tets.len() + surface);
+        assert!(structure.bytes() <= structure.built_bytes() + 4096 && rays.bytes() > structure.bytes());
+        let stages: Vec<&str> = rays.stages().iter().map(|s| s.name.as_str()).collect();
+        let faces = "ray_query.faces";
+        assert_eq!(stages, [faces, faces, "acceleration.build", "acceleration.compact", "acceleration.scene"]);
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn what_rays_find_is_right_by_address() {
+    what_rays_find_is_right(Binding::Address);
+}
+
+#[test]
+fn what_rays_find_is_right_by_descriptors() {
+    what_rays_find_is_right(Binding::Descriptors);
+}
+
+#[test]
+fn meshes_without_cells_have_no_owners() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    if !has_rays(&gpu) {
+        return;
+    }
+    for mesh in [Mesh::default(), Mesh::new(vec![[0.0; 3]; 4], vec![[0, 1, 1, 9]; 3])] {
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let (rays, owners, _) = by_rays(&gpu, &device, &[[0.0; 3], [0.5; 3]]);
+        assert_eq!((rays.faces(), owners), (0, vec![u32::MAX; 2]));
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
