@@ -1,24 +1,22 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
-#include "shared/grid.glsl"
 // LBVH baseline, hierarchy: every leaf climbs; at each node the first to arrive leaves its half and stops, the second goes on (Apetrei 2014).
-// Nobody waits for anybody, so no forward progress between workgroups is needed.
-ARGUMENTS(7)
-    uint tets;  // valid ones
-    uint stride;
+// Nobody waits for anybody, so no forward progress between workgroups is needed. On Mesa 22.3 lavapipe a memory barrier suspends the whole workgroup
+// as a control barrier does, which this loop does not survive: on processors a workgroup is one subgroup.
+ARGUMENTS(8)
+    uint tets; // valid ones
 END_ARGUMENTS
-BUFFER(0, readonly, float, positions)
+BUFFER16(0, readonly, vec4, vertices)
 BUFFER16(1, readonly, uvec4, cells)
-BUFFER(2, readonly, uint, codes)
-BUFFER(3, readonly, uint, ids)
-BUFFER16(4, coherent, LbvhNode, nodes)
-BUFFER(5, coherent, uint, arrivals) // per internal node, filled with all ones: the other end of the half that came first
-BUFFER(6, writeonly, uint, root)    // child reference of the root
+BUFFER(2, readonly, uint, boundary)
+BUFFER(3, readonly, uint, codes)
+BUFFER(4, readonly, uint, ids)
+BUFFER16(5, coherent, LbvhNode, nodes)
+BUFFER(6, coherent, uint, arrivals) // per internal node, filled with all ones: the other end of the half that came first
+BUFFER(7, writeonly, uint, root)    // reference of the root
 
-const uint LEAF = 0x80000000u;
-
-vec3 position(uint v) { return vec3(positions.at[v * stride], positions.at[v * stride + 1u], positions.at[v * stride + 2u]); }
+#include "shared/binary_tree.glsl"
 
 // Whether places i and i + 1 are closer together than j and j + 1: the smaller difference of codes, then of places.
 bool closer(uint i, uint j) {
@@ -28,51 +26,54 @@ bool closer(uint i, uint j) {
     return c != d ? c < d : i < j;
 }
 
-void leaf_box(uint place, out vec3 lo, out vec3 hi) {
-    uvec4 v = cells.at[ids.at[place]];
-    vec3 a = position(v.x), b = position(v.y), c = position(v.z), d = position(v.w);
-    lo = min(min(a, b), min(c, d));
-    hi = max(max(a, b), max(c, d));
+// Box of a leaf or of a node that is done, in normalised coordinates.
+void box_of(uint reference, out vec3 lo, out vec3 hi) {
+    uint i = reference & BINARY_INDEX;
+    if ((reference & BINARY_LEAF) != 0u) {
+        uvec4 v = cells.at[ids.at[i]];
+        vec3 a = vertices.at[v.x].xyz, b = vertices.at[v.y].xyz, c = vertices.at[v.z].xyz, d = vertices.at[v.w].xyz;
+        lo = min(min(a, b), min(c, d));
+        hi = max(max(a, b), max(c, d));
+    } else {
+        node_box(i, lo, hi);
+    }
 }
 
 void main() {
-    uint place = item_index();
-    if (place >= tets) return;
+    uint first = item_index(), last = first, me = first | BINARY_LEAF;
     vec3 lo, hi;
-    leaf_box(place, lo, hi);
-    uint first = place, last = place, me = place | LEAF;
-    // A code has 30 bits and a place 29: the tree is no deeper.
-    for (uint depth = 0u; depth < 64u; ++depth) {
+    bool climbs = first < tets;
+    if (climbs) {
+        box_of(me, lo, hi);
+        uint t = ids.at[first];
+        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) me |= BINARY_BOUNDARY;
+    }
+    for (uint depth = 0u; climbs && depth < BINARY_DEPTH; ++depth) {
         if (first == 0u && last == tets - 1u) {
             root.at[0] = me;
-            return;
+            climbs = false;
+            continue;
         }
-        bool left_child = first == 0u || (last != tets - 1u && closer(last, first - 1u));
-        uint parent = left_child ? last : first - 1u;
-        if (left_child) nodes.at[parent].left = me;
+        bool left = first == 0u || (last != tets - 1u && closer(last, first - 1u));
+        uint parent = left ? last : first - 1u;
+        if (left) nodes.at[parent].left = me;
         else nodes.at[parent].right = me;
         memoryBarrierBuffer();
-        uint other_end = atomicExchange(arrivals.at[parent], left_child ? first : last);
-        if (other_end == NONE) return;
+        uint other_end = atomicExchange(arrivals.at[parent], left ? first : last);
+        climbs = other_end != NONE;
+        if (!climbs) continue;
         memoryBarrierBuffer();
-        uint sibling = left_child ? nodes.at[parent].right : nodes.at[parent].left;
+        uint sibling = left ? nodes.at[parent].right : nodes.at[parent].left;
         vec3 sibling_lo, sibling_hi;
-        if ((sibling & LEAF) != 0u) {
-            leaf_box(sibling & ~LEAF, sibling_lo, sibling_hi);
-        } else {
-            for (uint k = 0u; k < 3u; ++k) {
-                sibling_lo[k] = nodes.at[sibling].lo[k];
-                sibling_hi[k] = nodes.at[sibling].hi[k];
-            }
-        }
+        box_of(sibling, sibling_lo, sibling_hi);
         lo = min(lo, sibling_lo);
         hi = max(hi, sibling_hi);
         for (uint k = 0u; k < 3u; ++k) {
             nodes.at[parent].lo[k] = lo[k];
             nodes.at[parent].hi[k] = hi[k];
         }
-        if (left_child) last = other_end;
+        if (left) last = other_end;
         else first = other_end;
-        me = parent;
+        me = parent | ((me | sibling) & BINARY_BOUNDARY);
     }
 }

@@ -3,37 +3,54 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// LBVH baseline, point location: every primitive whose box holds the point, in any order; the owner is the one that the octree finds.
-// Boxes are grown by GROW of their size, so that cells that hold the point within the tolerance are met too.
-ARGUMENTS(9)
+// LBVH baseline, point location: every primitive whose box holds the point. What a dispatch leaves undone waits in the outputs for the next.
+ARGUMENTS(11)
     uint count;
-    uint stride;
+    uint fresh;  // not 0: nothing has been done yet
+    uint budget; // nodes and candidates per point and dispatch
     float tolerance;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, LbvhNode, nodes)
-BUFFER(2, readonly, uint, ids)
-BUFFER(3, readonly, uint, root)
-BUFFER16(4, readonly, uvec4, cells)
-BUFFER16(5, readonly, vec4, vertices)
-BUFFER(6, readonly, float, points)
-BUFFER(7, writeonly, uint, owners)
-BUFFER16(8, writeonly, vec4, barycentrics)
-#include "shared/lbvh.glsl"
+BUFFER(2, readonly, uint, root)
+BUFFER(3, readonly, uint, ids)
+BUFFER(4, readonly, uint, boundary)
+BUFFER16(5, readonly, uvec4, cells)
+BUFFER16(6, readonly, vec4, vertices)
+BUFFER(7, readonly, float, points)
+BUFFER(8, READ_WRITE, uint, owners)
+BUFFER16(9, READ_WRITE, uvec4, barycentrics) // of points not done: all ones, where to go on, what is known of the best candidate
+BUFFER(10, READ_WRITE, uint, unfinished)
+#include "shared/binary_owner.glsl"
 
 void main() {
     uint i = item_index();
-    if (i >= count) return;
-    Grid g = grid.at[0];
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
-    vec3 x = normalise(g, at);
-    uint owner = NONE;
-    if (near_bounds(g, at)) owner = lbvh_owner(at, x, tolerance);
-    vec4 b = vec4(0.0);
-    if (owner != NONE) {
-        Tet tet = load_tet(cells.at[owner]);
-        b = barycentric(weights(tet, x), tet.rank);
+    uint waits = 0u;
+    uvec4 state = uvec4(0u);
+    if (i < count && fresh == 0u) state = barycentrics.at[i];
+    // No weight has these bits, which are a NaN that no operation makes.
+    if (i < count && (fresh != 0u || state.x == NONE)) {
+        Grid g = grid.at[0];
+        vec3 at = vec3(points.at[3u * i], points.at[3u * i + 1u], points.at[3u * i + 2u]);
+        vec3 x = normalise(g, at);
+        OwnerSearch s = no_search();
+        if (fresh == 0u) s = OwnerSearch(state.y, Best(owners.at[i], (state.z & 2u) != 0u, (state.z & 1u) != 0u, uintBitsToFloat(state.w)));
+        uint owner, work = 0u;
+        if (find_owner(s, g, at, x, tolerance, work, budget, owner)) {
+            vec4 b = vec4(0.0);
+            if (owner != NONE) {
+                Tet tet = load_tet(cells.at[owner]);
+                b = barycentric(weights(tet, x), tet.rank);
+            }
+            state = floatBitsToUint(b);
+        } else {
+            waits = 1u;
+            owner = s.best.owner;
+            state = uvec4(NONE, s.cursor, uint(s.best.in_box) | uint(s.best.inside) << 1, floatBitsToUint(s.best.smallest));
+        }
+        owners.at[i] = owner;
+        barycentrics.at[i] = state;
     }
-    owners.at[i] = owner;
-    barycentrics.at[i] = b;
+    waits = subgroupAdd(waits);
+    if (subgroupElect() && waits > 0u) atomicAdd(unfinished.at[0], waits);
 }

@@ -19,3 +19,11 @@ struct Best {
 };
 
 Best no_best() { return Best(NONE, false, false, SMALLEST_FLOAT); }
+
+// Where the search for an owner stands, if it takes more than one dispatch.
+struct OwnerSearch {
+    uint cursor; // what has been searched
+    Best best;
+};
+
+OwnerSearch no_search() { return OwnerSearch(0u, no_best()); }

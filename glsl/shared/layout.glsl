@@ -82,12 +82,13 @@ struct RenderStatus {
     uint pad;        // Unused.
 };
 
-// A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i.
+// A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31
+// says that the rest is a place in the sorted primitives, bit 30 that a boundary primitive is below, the rest is an internal node or that place.
 struct LbvhNode {
-    float lo[3];   // Lower corner of the box.
-    uint left;     // Left child: an internal node, or with the highest bit set a place in the sorted primitives.
+    float lo[3];   // Lower corner of the box in normalised coordinates.
+    uint left;     // Reference to the left child.
     float hi[3];   // Upper corner of the box.
-    uint right;    // Right child.
+    uint right;    // Reference to the right child.
 };
 
 // A stack of layers of voxels over a mesh; see src/slicing.

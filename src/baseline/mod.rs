@@ -4,5 +4,5 @@
 mod lbvh;
 mod ray_query;
 
-pub use lbvh::Lbvh;
+pub use lbvh::{Lbvh, LbvhArrays};
 pub use ray_query::RayQuery;

@@ -1,0 +1,64 @@
+// Point location in the baseline's binary tree: the owner that the octree finds. Needs grid.glsl, tet.glsl, and nodes, root, ids, boundary, cells,
+// vertices.
+#include "shared/binary_tree.glsl"
+#include "shared/candidates.glsl"
+
+// Boxes are grown by this share of their size, so that cells that hold a point within the tolerance are met too.
+const float GROW = 4e-5;
+// So far off may a point lie that rounding puts beside all cells around it.
+const float ROUNDING = 1e-5;
+
+vec3 sought;
+
+bool holds(vec3 lo, vec3 hi) {
+    precise vec3 grow = (hi - lo) * GROW;
+    precise vec3 least = lo - grow, most = hi + grow;
+    return all(lessThanEqual(least, sought)) && all(lessThanEqual(sought, most));
+}
+
+bool enters(uint reference) {
+    if ((reference & BINARY_LEAF) != 0u) return true; // the candidate's own box decides
+    vec3 lo, hi;
+    node_box(reference & BINARY_INDEX, lo, hi);
+    return holds(lo, hi);
+}
+#include "shared/binary_walk.glsl"
+
+// The lowest cell that contains the point, else the one that misses it by least.
+void consider(inout Best best, uint t) {
+    if (best.inside && best.owner < t) return;
+    Tet tet = load_tet(cells.at[t]);
+    if (!holds(min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3])))) return;
+    Weights w = weights(tet, sought);
+    float s = smallest(w);
+    bool nearer = best.owner == NONE || (w.in_box && !best.in_box)
+        || (w.in_box == best.in_box && (s > best.smallest || (s == best.smallest && t < best.owner)));
+    if (w.inside) best = Best(t, true, true, 0.0);
+    else if (!best.inside && nearer && volume(tet) != 0.0) best = Best(t, false, w.in_box, s);
+}
+
+// Goes on with a search for the owner of a point, `x` in normalised coordinates; false: the share of work is done before it has ended.
+bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
+    owner = NONE;
+    if (!near_bounds(g, at)) return true;
+    sought = x;
+    BinaryWalk walk = binary_walk_from(s.cursor);
+    budget = binary_budget(work, budget);
+    uint place = WALK_PAUSED;
+    while (work < budget) {
+        place = next_place(walk, work, budget);
+        if (place >= WALK_PAUSED) break;
+        consider(s.best, ids.at[place]);
+        ++work;
+        place = WALK_PAUSED;
+    }
+    s.cursor = resume_place(walk);
+    if (place == WALK_PAUSED && s.cursor != NONE) return false;
+    Best best = s.best;
+    s = no_search();
+    if (best.owner == NONE) return true;
+    // A cell without boundary faces has neighbours all around: what lies next to it lies in the mesh.
+    bool surrounded = (boundary.at[best.owner >> 5u] >> (best.owner & 31u) & 1u) == 0u;
+    if (best.inside || best.smallest >= -(surrounded ? max(tolerance, ROUNDING) : tolerance)) owner = best.owner;
+    return true;
+}

@@ -1,0 +1,133 @@
+//! The LBVH baseline: a proper tree, the same on every device, and the answers of the octree.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use olbvh::baseline::{Lbvh, LbvhArrays};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::mesh::cases::cases;
+use olbvh::mesh::{Mesh, kuhn_jittered};
+use olbvh::options::{BuildOptions, TOLERANCE};
+use olbvh::query::{self, LocateOptions};
+use olbvh::reference::boundary::NONE;
+
+/// A mesh with both structures over it.
+struct Both {
+    mesh: Mesh,
+    device: DeviceMesh,
+    tree: Tree,
+    lbvh: Lbvh,
+}
+
+impl Both {
+    fn new(gpu: &Gpu, mesh: Mesh) -> Self {
+        let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap();
+        let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
+        let lbvh = Lbvh::build(gpu, &device).unwrap();
+        Self { mesh, device, tree, lbvh }
+    }
+}
+
+/// All degenerate meshes, a jittered grid, and more equal cells than a dispatch can look at.
+fn meshes() -> Vec<(&'static str, Mesh)> {
+    let mut meshes: Vec<_> = cases().unwrap().into_iter().map(|c| (c.name, c.mesh)).collect();
+    meshes.push(("jittered", kuhn_jittered([9, 8, 7], 0.3, 5).unwrap()));
+    let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
+    meshes.push(("equal-20000", Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000])));
+    meshes
+}
+
+const LEAF: u32 = 1 << 31;
+const BOUNDARY: u32 = 1 << 30;
+
+/// Checks the subtree of a reference; its places, box, and depth.
+fn check_subtree(at: u32, tree: &LbvhArrays, mesh: &Mesh, vertices: &[[f32; 4]], boundary: &[u32]) -> ([u32; 2], [[f32; 3]; 2], u32) {
+    let i = at & (BOUNDARY - 1);
+    if at & LEAF != 0 {
+        let t = tree.ids[i as usize];
+        let corners = mesh.tets[t as usize].map(|v| [0, 1, 2].map(|c| vertices[v as usize][c]));
+        let fold = |f: fn(f32, f32) -> f32| corners.iter().copied().reduce(|a, b| [0, 1, 2].map(|c| f(a[c], b[c]))).unwrap();
+        assert_eq!(at & BOUNDARY != 0, boundary[t as usize / 32] >> (t % 32) & 1 != 0, "flag of leaf {i}");
+        return ([i; 2], [fold(f32::min), fold(f32::max)], 0);
+    }
+    let node = &tree.nodes[i as usize];
+    let (left, left_box, left_depth) = check_subtree(node.left, tree, mesh, vertices, boundary);
+    let (right, right_box, right_depth) = check_subtree(node.right, tree, mesh, vertices, boundary);
+    assert_eq!([left[1], right[0]], [i, i + 1], "places of node {i}");
+    let lo = [0, 1, 2].map(|c| left_box[0][c].min(right_box[0][c]));
+    let hi = [0, 1, 2].map(|c| left_box[1][c].max(right_box[1][c]));
+    assert_eq!([lo, hi], [node.lo, node.hi], "box of node {i}");
+    assert_eq!(at & BOUNDARY, (node.left | node.right) & BOUNDARY, "flag of node {i}");
+    ([left[0], right[1]], [lo, hi], 1 + left_depth.max(right_depth))
+}
+
+fn check_tree(name: &str, b: &Both) {
+    let tree = b.lbvh.download().unwrap();
+    let valid = b.device.input().tets - b.device.status().bad;
+    let mut ids = tree.ids.clone();
+    ids.sort_unstable();
+    let bad = b.device.bad_cells().unwrap();
+    assert!(ids.iter().eq((0..b.device.input().tets).filter(|t| bad.binary_search(t).is_err()).collect::<Vec<_>>().iter()), "{name}");
+    assert_eq!(tree.root == NONE, valid == 0, "{name}");
+    if valid > 0 {
+        let (vertices, boundary) = (b.device.vertices().unwrap(), b.device.boundary_bits().unwrap());
+        let (places, _, depth) = check_subtree(tree.root, &tree, &b.mesh, &vertices, &boundary);
+        assert_eq!(places, [0, valid - 1], "{name}");
+        assert!(depth < 60, "{name}: {depth} levels");
+    }
+}
+
+/// Vertices, middles of faces and cells, and points all over the bounds.
+fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
+    let corner = |v: u32| mesh.points.get(v as usize).copied().unwrap_or([f32::NAN; 3]);
+    let middle = |of: &[u32]| [0, 1, 2].map(|c| of.iter().map(|&v| corner(v)[c] / of.len() as f32).sum::<f32>());
+    let mut points = mesh.points.clone();
+    points.extend(mesh.tets.iter().take(3000).flat_map(|t| [middle(t), middle(&t[..3]), middle(&t[2..])]));
+    let (lo, hi) = mesh.points.iter().fold(([0f32; 3], [1f32; 3]), |(lo, hi), p| {
+        if p.iter().all(|x| x.abs() < 1e37) { ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))) } else { (lo, hi) }
+    });
+    let mut state = 1u32;
+    let mut random = || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 16_777_216.0
+    };
+    points.extend((0..2000).map(|_| [0, 1, 2].map(|c| lo[c] + (random() * 1.2 - 0.1) * (hi[c] - lo[c]))));
+    points.extend([[f32::NAN; 3], [f32::INFINITY; 3], [1e38; 3], [-1e38, 1.0, 1.0]]);
+    points
+}
+
+fn check_owners(name: &str, b: &Both) {
+    let mut points = points(&b.mesh);
+    if name == "equal-20000" {
+        points = points.into_iter().step_by(97).collect(); // each looks at 20,000 cells
+    }
+    let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
+    let found = b.lbvh.locate(&b.device, &points, TOLERANCE).unwrap();
+    for (i, p) in points.iter().enumerate() {
+        let of = |l: &query::Located| (l.owners[i], l.barycentrics[i]);
+        assert_eq!(of(&expected), of(&found), "{name}: point {i} {p:?}");
+    }
+    if name == "equal-20000" {
+        assert!(found.stages.len() > 1, "the search of a point was never resumed");
+    }
+}
+
+fn everything(binding: Binding) {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    for (name, mesh) in meshes() {
+        let both = Both::new(&gpu, mesh);
+        check_tree(name, &both);
+        check_owners(name, &both);
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn by_address() {
+    everything(Binding::Address);
+}
+
+#[test]
+fn by_descriptors() {
+    everything(Binding::Descriptors);
+}
