@@ -1,9 +1,8 @@
-//! Slices on the device are the reference's, kinds and owners to the bit, values but for flushed denormals.
+//! Slices on the device are the reference's, kinds and owners to the bit, values but for flushed denormals: meshes that the conformance suite lacks.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
-use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::slice;
@@ -61,22 +60,11 @@ fn settings() -> Vec<SliceSettings> {
         SliceSettings { plane: Plane::Axis(0), ..default },
         SliceSettings { plane: Plane::Axis(1), layers: 4, size: [9, 7], ..default },
         SliceSettings { plane: Plane::Normal([1.0, -2.0, 0.7]), layers: 3, ..default },
-        SliceSettings { plane: Plane::Axis(2), layers: 2, size: [3, 2], ..default },
     ]
 }
 
 fn everything(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
-    let mut touched = 0;
-    for case in cases().unwrap() {
-        // Voxels of a mesh 1e-37 wide have denormal centres, and this driver flushes denormals to 0.
-        if case.name == "near-denormal" && std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") {
-            println!("NOT RUN: slices of `near-denormal` on SwiftShader, which flushes denormal numbers");
-            continue;
-        }
-        touched += check(&gpu, case.name, &case.mesh, &settings());
-    }
-    touched += check(&gpu, "jittered", &kuhn_jittered([12, 9, 10], 0.3, 4).unwrap(), &settings());
     if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") {
         println!("NOT RUN: slices with lists of 20,000 entries and of flow_sphere_50k on SwiftShader, where they take many minutes");
         return;
@@ -84,10 +72,10 @@ fn everything(binding: Binding) {
     // Lists that no dispatch can search at once.
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     let many = Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]);
-    touched += check(&gpu, "long lists", &many, &[SliceSettings { size: [5, 5], ..SliceSettings::default() }]);
+    let mut touched = check(&gpu, "long lists", &many, &[SliceSettings { size: [5, 5], ..SliceSettings::default() }]);
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/flow_sphere_50k.vtu");
     let loaded = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap();
-    touched += check(&gpu, "flow_sphere_50k", &loaded.mesh, &settings()[..3]);
+    touched += check(&gpu, "flow_sphere_50k", &loaded.mesh, &settings());
     assert!(touched > 1000, "{touched}");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");

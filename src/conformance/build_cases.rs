@@ -45,6 +45,17 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
 }
 
+/// Trees over a mesh of the caller's.
+pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    for assign in Assign::ALL {
+        for alpha in [0.0, 1.0, 2.0] {
+            let case = BuildCase { mesh, alpha, assign, boxes: alpha == 0.0, way: Way::Owned, target: TargetKind::Device };
+            build(cases, Group::Quick, case);
+        }
+        build(cases, Group::Quick, BuildCase { mesh, alpha: 0.0, assign, boxes: false, way: Way::Tight, target: TargetKind::Device });
+    }
+}
+
 fn build(cases: &mut Vec<Case>, group: Group, case: BuildCase) {
     let boxes = if case.boxes { "/boxes" } else { "" };
     let (mesh, assign, alpha, way) = (case.mesh.name, case.assign, case.alpha, case.way.name());

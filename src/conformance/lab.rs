@@ -1,7 +1,7 @@
 //! Runs cases on a device.
 
 use super::failure::Stop;
-use super::{Case, Failure, TargetKind, Work, build, locate, picture, primitives, topology};
+use super::{Case, Failure, TargetKind, Work, build, locate, overlap, picture, primitives, slice, topology};
 use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions};
 use std::collections::HashMap;
@@ -100,6 +100,8 @@ impl Lab {
             Work::Build(case) => build::check(&self.gpu(case.target)?, case),
             Work::Locate(case) => locate::check(&self.device, case),
             Work::Picture(case) => picture::check(&self.device, case),
+            Work::Slice(case) => slice::check(&self.device, case),
+            Work::Overlap(case) => overlap::check(&self.device, case),
         }
     }
 }

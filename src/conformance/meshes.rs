@@ -10,13 +10,29 @@ use crate::mesh::{Mesh, kuhn, kuhn_jittered};
 pub(crate) struct MeshRecipe {
     pub name: &'static str,
     pub group: Group,
-    make: fn() -> Result<Mesh>,
+    source: Source,
+}
+
+/// Where a mesh comes from.
+#[derive(Clone, Copy, Debug)]
+enum Source {
+    Made(fn() -> Result<Mesh>),
+    Given(&'static Mesh),
 }
 
 impl MeshRecipe {
+    /// A mesh that is not of the suite.
+    pub(crate) fn given(name: &str, mesh: Mesh) -> Self {
+        let name = Box::leak(name.to_owned().into_boxed_str());
+        Self { name, group: Group::Quick, source: Source::Given(Box::leak(Box::new(mesh))) }
+    }
+
     /// Makes the mesh.
     pub(crate) fn mesh(&self) -> Result<Mesh> {
-        (self.make)()
+        match self.source {
+            Source::Made(make) => make(),
+            Source::Given(mesh) => Ok(mesh.clone()),
+        }
     }
 }
 
@@ -80,7 +96,7 @@ const RECIPES: &[Entry] = &[
 
 /// Every mesh.
 pub(crate) fn recipes() -> impl Iterator<Item = MeshRecipe> {
-    RECIPES.iter().map(|&(name, group, make)| MeshRecipe { name, group, make })
+    RECIPES.iter().map(|&(name, group, make)| MeshRecipe { name, group, source: Source::Made(make) })
 }
 
 /// The wrapper makes the table above short.

@@ -12,6 +12,8 @@
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment, α [, boxes], how it is built [, target]
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment, α, path
 //! render/one-tet/iso/points/shaded         mesh, camera, field [, light]
+//! slice/plate/aabb/alpha-2/oblique         mesh, assignment, α, stack of layers
+//! overlap/cloud/exact/alpha-1/grid         mesh, assignment, α, the other mesh
 //! ```
 
 mod buffers;
@@ -23,10 +25,12 @@ mod failure;
 mod lab;
 mod locate;
 mod meshes;
+mod overlap;
 mod picture;
 mod primitive_cases;
 mod primitives;
 mod query_cases;
+mod slice;
 mod topology;
 
 pub use failure::Failure;
@@ -36,8 +40,12 @@ pub use primitives::TargetKind;
 use build::BuildCase;
 use locate::LocateCase;
 use meshes::MeshRecipe;
+use overlap::OverlapCase;
 use picture::PictureCase;
 use primitives::{ReduceCase, ScanCase, SortCase};
+use slice::SliceCase;
+
+use crate::mesh::Mesh;
 
 /// How often a case is worth its time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -82,6 +90,8 @@ enum Work {
     Build(BuildCase),
     Locate(LocateCase),
     Picture(PictureCase),
+    Slice(SliceCase),
+    Overlap(OverlapCase),
 }
 
 impl Case {
@@ -110,6 +120,15 @@ pub fn cases() -> Vec<Case> {
     primitive_cases::add(&mut cases);
     build_cases::add(&mut cases);
     query_cases::add(&mut cases);
+    cases
+}
+
+/// The cases of one mesh of the caller's: its topology, trees of every assignment, every query. The mesh is kept until the program ends.
+pub fn cases_of(name: &str, mesh: Mesh) -> Vec<Case> {
+    let mesh = MeshRecipe::given(name, mesh);
+    let mut cases = vec![Case { name: format!("mesh/{name}"), group: Group::Quick, work: Work::Topology(mesh) }];
+    build_cases::add_given(&mut cases, mesh);
+    query_cases::add_given(&mut cases, mesh);
     cases
 }
 

@@ -2,14 +2,20 @@
 
 use super::locate::{How, LocateCase};
 use super::meshes::{MeshRecipe, recipes};
+use super::overlap::{Other, OverlapCase};
 use super::picture::PictureCase;
 use super::primitive_cases::push;
+use super::slice::{STACKS, SliceCase};
 use super::{Case, Group, Work};
 use crate::mesh::On;
 use crate::options::Assign;
 
 /// Meshes that fill their space without overlap: every point of a cell has an owner, the same whatever the tree.
 const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
+/// Meshes so small that voxels have denormal centres, which devices may flush to 0.
+const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
+/// A mesh whose overlap keeps the reference busy for minutes.
+const LARGE: &str = "jitter-30x30x30";
 /// Meshes that are drawn.
 const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
 
@@ -34,7 +40,26 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         if DRAWN.contains(&mesh.name) {
             add_pictures(cases, mesh);
         }
+        add_slices(cases, mesh);
+        if mesh.name != LARGE {
+            add_overlaps(cases, mesh);
+        }
     }
+}
+
+/// Queries of a mesh of the caller's.
+pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    for how in [How::Descent, How::Traversal(8), How::Hints, How::All] {
+        add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, how });
+    }
+    push(
+        cases,
+        format!("render/{}/iso/points/shaded", mesh.name),
+        Group::Quick,
+        Work::Picture(PictureCase { mesh, camera: "iso", on: On::Points, shading: true }),
+    );
+    add_slices(cases, mesh);
+    add_overlap(cases, OverlapCase { mesh, alpha: 0.0, assign: Assign::Aabb, other: Other::Itself });
 }
 
 fn add_location(cases: &mut Vec<Case>, quick: bool, case: LocateCase) {
@@ -56,4 +81,31 @@ fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
             );
         }
     }
+}
+
+fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    if NEAR_DENORMAL.contains(&mesh.name) {
+        return;
+    }
+    for (i, stack) in STACKS.into_iter().enumerate() {
+        for (k, (alpha, assign)) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact)].into_iter().enumerate() {
+            let group = if (i + k) % 3 == 0 { mesh.group } else { Group::Full };
+            let name = format!("slice/{}/{assign}/alpha-{alpha}/{}", mesh.name, stack.name);
+            push(cases, name, group, Work::Slice(SliceCase { mesh, alpha, assign, stack }));
+        }
+    }
+}
+
+fn add_overlaps(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (2.0, Assign::Planes)] {
+        for other in [Other::Grid, Other::Itself] {
+            add_overlap(cases, OverlapCase { mesh, alpha, assign, other });
+        }
+    }
+}
+
+fn add_overlap(cases: &mut Vec<Case>, case: OverlapCase) {
+    let OverlapCase { mesh, alpha, assign, other } = case;
+    let group = if (alpha == 1.0) == (other == Other::Grid) { mesh.group } else { Group::Full };
+    push(cases, format!("overlap/{}/{assign}/alpha-{alpha}/{}", mesh.name, other.name()), group, Work::Overlap(case));
 }

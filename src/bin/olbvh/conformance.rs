@@ -1,8 +1,9 @@
 //! `olbvh conformance`.
 
 use crate::common::{Common, Failure, Outcome};
+use crate::input;
 use crate::output::{self, Progress};
-use olbvh::conformance::{Case, Lab, Outcome as Ending, Report, cases};
+use olbvh::conformance::{Case, Lab, Outcome as Ending, Report, cases, cases_of};
 use olbvh::gpu::{Binding, GpuOptions};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -18,11 +19,14 @@ use std::time::Duration;
 #[command(after_help = "Examples:
   olbvh conformance --filter quick                   under two minutes on a software device
   olbvh conformance --filter sort/21-bits            the cases whose name contains that
+  olbvh conformance bracket.vtu                      trees and queries of that mesh
   olbvh conformance --filter large                   buffers past 2^26 words, which no other filter includes
   olbvh conformance --device 1 --junit report.xml    all but the large ones on device 1, with a report for CI
 
 Exit codes: 0 all passed, 1 a case failed, 2 wrong usage, 4 no suitable device.")]
 pub struct Args {
+    /// Meshes (files or kuhn:NX,NY,NZ) to run the cases of instead of the built-in ones. The reference takes its time on large ones.
+    meshes: Vec<PathBuf>,
     /// List the cases and run none.
     #[arg(long)]
     list: bool,
@@ -57,7 +61,8 @@ fn name(binding: Binding) -> &'static str {
 
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let chosen: Vec<Case> = cases().into_iter().filter(|c| c.matches(args.filter.as_deref())).collect();
+    let all = if args.meshes.is_empty() { cases() } else { cases_of_meshes(&args.meshes, common)? };
+    let chosen: Vec<Case> = all.into_iter().filter(|c| c.matches(args.filter.as_deref())).collect();
     if chosen.is_empty() {
         let filter = args.filter.as_deref().unwrap_or_default();
         return Err(Failure::Usage(format!("no case is called `{filter}`; `olbvh conformance --list` names them all")));
@@ -72,6 +77,16 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let (device, runs) = run_cases(args, common, &chosen)?;
     finish(args, common, &device, &runs)
+}
+
+/// The cases of files, each named by its file.
+fn cases_of_meshes(meshes: &[PathBuf], common: &Common) -> Outcome<Vec<Case>> {
+    let mut all = Vec::new();
+    for file in meshes {
+        let stem = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy();
+        all.extend(cases_of(&stem, input::mesh(file, common)?.mesh));
+    }
+    Ok(all)
 }
 
 /// Runs the cases by each binding.

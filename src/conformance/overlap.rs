@@ -1,0 +1,99 @@
+//! Mesh overlap against the reference (SPEC 3.5): sets, pairs, and what they took.
+
+use super::failure::{Verdict, compare, compare_one};
+use super::meshes::MeshRecipe;
+use crate::build::{BadCells, DeviceMesh, Tree};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::mesh::{Mesh, kuhn_jittered};
+use crate::options::{Assign, BuildOptions};
+use crate::query::{Party, overlap};
+use crate::reference::boundary::{Topology, topology};
+use crate::reference::overlap::{Side, overlap as reference};
+use crate::tree::TreeArrays;
+
+/// A mesh against another.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OverlapCase {
+    pub mesh: MeshRecipe,
+    pub alpha: f32,
+    pub assign: Assign,
+    pub other: Other,
+}
+
+/// What a mesh is held against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Other {
+    /// A jittered grid near the origin.
+    Grid,
+    /// Itself, moved by a part of its extent.
+    Itself,
+}
+
+impl Other {
+    pub(crate) fn name(self) -> &'static str {
+        match self {
+            Self::Grid => "grid",
+            Self::Itself => "itself",
+        }
+    }
+}
+
+/// A mesh on host and device.
+struct Both {
+    mesh: Mesh,
+    topology: Topology,
+    host: TreeArrays,
+    device: DeviceMesh,
+    tree: Tree,
+}
+
+impl Both {
+    fn new(gpu: &Gpu, mesh: Mesh, options: &BuildOptions) -> Result<Self> {
+        let topology = topology(&mesh)?;
+        let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+        let tree = Tree::build(gpu, &device, options)?;
+        Ok(Self { topology, host: tree.download()?, mesh, device, tree })
+    }
+
+    fn side(&self) -> Side<'_> {
+        Side { mesh: &self.mesh, topology: &self.topology, tree: &self.host }
+    }
+
+    fn party(&self) -> Party<'_> {
+        Party { mesh: &self.device, tree: &self.tree }
+    }
+}
+
+pub(crate) fn check(gpu: &Gpu, case: &OverlapCase) -> Verdict {
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() };
+    let own = Both::new(gpu, case.mesh.mesh()?, &options)?;
+    let other = match case.other {
+        Other::Grid => kuhn_jittered([6, 5, 4], 0.3, 9)?,
+        Other::Itself => {
+            let grid = own.host.grid;
+            let mut mesh = own.mesh.clone();
+            mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + [0.37, 0.11, -0.23][c] * (grid.hi[c] - grid.lo[c])));
+            mesh
+        }
+    };
+    let other = Both::new(gpu, other, &options)?;
+    compare_overlaps(&own, &other)?;
+    compare_overlaps(&other, &own)
+}
+
+fn compare_overlaps(a: &Both, b: &Both) -> Verdict {
+    for pairs in [false, true] {
+        let expected = reference(a.side(), b.side(), pairs);
+        let found = overlap(a.party(), b.party(), pairs, &|_, _| {})?.overlap;
+        let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
+        compare(stage, "a", &expected.a, &found.a)?;
+        compare(stage, "b", &expected.b, &found.b)?;
+        compare(stage, "pairs", expected.pairs.as_deref().unwrap_or_default(), found.pairs.as_deref().unwrap_or_default())?;
+        compare_one(stage, "narrow tests", &expected.effort[0].narrow, &found.effort[0].narrow)?;
+        if !pairs {
+            compare_one(stage, "effort", &expected.effort, &found.effort)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,102 @@
+//! Conservative slicing against the reference (SPEC 3.4): kinds and owners to the bit.
+
+use super::failure::{Stop, Verdict, compare_one, fail};
+use super::meshes::MeshRecipe;
+use crate::build::{BadCells, DeviceMesh, Tree};
+use crate::gpu::Gpu;
+use crate::mesh::{Field, Mesh, On};
+use crate::options::{Assign, BuildOptions};
+use crate::query::slice;
+use crate::reference::boundary::topology;
+use crate::reference::slice::Slicer;
+use crate::slicing::{Band, Extrapolate, Plane, SliceSettings};
+
+/// A small stack of layers.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct SliceCase {
+    pub mesh: MeshRecipe,
+    pub alpha: f32,
+    pub assign: Assign,
+    pub stack: Stack,
+}
+
+/// Plane, layers, voxels, and what is interpolated in them.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stack {
+    pub name: &'static str,
+    plane: Plane,
+    layers: u32,
+    size: [u32; 2],
+    field: Option<On>,
+    extrapolate: Extrapolate,
+}
+
+/// The stacks of the suite: every plane, field and extrapolation, voxels from fine to coarser than cells.
+pub(crate) const STACKS: [Stack; 4] = [
+    Stack { name: "x", plane: Plane::Axis(0), layers: 1, size: [37, 21], field: None, extrapolate: Extrapolate::Nearest },
+    Stack { name: "y", plane: Plane::Axis(1), layers: 4, size: [9, 7], field: Some(On::Points), extrapolate: Extrapolate::Nearest },
+    Stack {
+        name: "oblique",
+        plane: Plane::Normal([1.0, -2.0, 0.7]),
+        layers: 3,
+        size: [37, 21],
+        field: Some(On::Points),
+        extrapolate: Extrapolate::Linear,
+    },
+    Stack { name: "z", plane: Plane::Axis(2), layers: 2, size: [3, 2], field: Some(On::Cells), extrapolate: Extrapolate::Nearest },
+];
+
+/// A ramp over the points, or the ids of the cells.
+fn field(mesh: &Mesh, on: On) -> Field {
+    let values = match on {
+        On::Points => mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect(),
+        On::Cells => (0..mesh.tets.len()).map(|t| t as f32).collect(),
+    };
+    Field { name: "ramp".into(), on, values }
+}
+
+pub(crate) fn check(gpu: &Gpu, case: &SliceCase) -> Verdict {
+    let mesh = case.mesh.mesh()?;
+    let topology = topology(&mesh)?;
+    let Stack { plane, layers, size, extrapolate, .. } = case.stack;
+    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+    let tree = Tree::build(gpu, &device, &BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() })?;
+    let host = tree.download()?;
+    let corner = |v: [f32; 4]| [v[0], v[1], v[2]];
+    let settings = SliceSettings { plane, layers, size, ..SliceSettings::default() };
+    // A mesh without extent, or as large as numbers go, has no slices.
+    let voxels = settings.voxels(corner(host.grid.lo), corner(host.grid.hi), mesh.origin);
+    let Some(voxels) = voxels.ok().filter(|v| v.plan(&host.grid).is_ok()) else { return Ok(()) };
+    let field = case.stack.field.map(|on| field(&mesh, on));
+    let slicer = Slicer::new(&mesh, &topology, &host, field.as_ref(), voxels, extrapolate)?;
+    let mut verdict = Ok(());
+    let mut hold = |found: Band| {
+        if verdict.is_ok() {
+            verdict = compare_bands(&slicer.band(found.rows), &found);
+        }
+        Ok(())
+    };
+    let values = field.as_ref().map(|f| (&f.values[..], f.on));
+    let sliced = slice(&device, &tree, values, &voxels, extrapolate, &|_, _| {}, &mut hold)?;
+    verdict?;
+    let tally = sliced.tally;
+    compare_one("query.slice", "voxels", &voxels.voxels(), &(tally.inside + tally.touched + tally.empty))
+}
+
+fn compare_bands(expected: &Band, found: &Band) -> Result<(), Stop> {
+    let decided = |band: &Band, i: usize| Some((*band.kinds.get(i)?, *band.owners.get(i)?));
+    for i in 0..expected.kinds.len() {
+        let what =
+            || format!("voxels of rows {} to {} of layer {}", found.rows.first, found.rows.first + found.rows.count, found.rows.layer);
+        let (a, b) = (decided(expected, i), decided(found, i));
+        if a != b {
+            return Err(fail("query.slice_touch", &format!("kind and owner, {}", what()), Some(i), &format!("{a:?}"), &format!("{b:?}")));
+        }
+        // Devices may flush denormal products of a value; nothing else may differ.
+        let (a, b) = (expected.values[i], found.values.get(i).copied().unwrap_or_default());
+        if !(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-36) {
+            return Err(fail("query.slice_values", &format!("value, {}", what()), Some(i), &a.to_string(), &b.to_string()));
+        }
+    }
+    Ok(())
+}
