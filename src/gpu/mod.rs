@@ -4,16 +4,20 @@
 mod acceleration;
 mod context;
 mod debug;
+mod host;
 mod kernel;
 mod memory;
+mod open;
 mod recorder;
 mod requirements;
 mod submit;
 
 pub use acceleration::{AccelerationStructure, Triangles};
-pub use context::{Binding, Gpu, GpuOptions, list_devices};
+pub use context::{Binding, Gpu, GpuOptions};
+pub use host::{Enabled, HostDevice};
 pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer, BufferRef, USAGE};
+pub use open::list_devices;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
 pub use requirements::{DeviceReport, RayTracing, Requirements};

@@ -56,6 +56,7 @@ pub struct Recorder<'a> {
 impl<'a> Recorder<'a> {
     /// A recorder for a command buffer in the recording state. `timestamps`: a reset query pool and its size.
     ///
+    /// Recording binds a compute pipeline, compute push constants, and with descriptors set 0 for compute; a host binds its own again after it.
     /// The recorder must be kept until the commands have been executed where the device binds by descriptors, since it owns their sets.
     ///
     /// # Safety
@@ -63,6 +64,23 @@ impl<'a> Recorder<'a> {
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
         let (uses, stages, pools) = (Vec::new(), Vec::new(), Vec::new());
         Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, barriers: Vec::new(), drop_barrier: None }
+    }
+
+    /// A recorder without a command buffer: what is recorded compiles the pipelines it needs and is checked for missing barriers, and that is
+    /// all. A host rehearses once what it will record every frame, so that nothing is created then (but for descriptor pools, where the device
+    /// binds by descriptors).
+    pub fn rehearse(gpu: &'a Gpu) -> Self {
+        // SAFETY: nothing is recorded into a null command buffer, see `is_rehearsal`.
+        unsafe { Self::new(gpu, vk::CommandBuffer::null(), None) }
+    }
+
+    fn is_rehearsal(&self) -> bool {
+        self.commands == vk::CommandBuffer::null()
+    }
+
+    /// The stages recorded so far that were timed: name, slot of the timestamp at the begin, slot of that at the end.
+    pub fn timed_stages(&self) -> &[(String, u32, u32)] {
+        &self.stages
     }
 
     /// The device.
@@ -95,6 +113,9 @@ impl<'a> Recorder<'a> {
             uses.push((words, false));
         }
         self.touch(&uses, info.name);
+        if self.is_rehearsal() {
+            return Ok(());
+        }
         let device = self.gpu.device();
         let base = info.scalar_base(self.gpu.binding());
         let mut push = [0u8; 128];
@@ -144,6 +165,9 @@ impl<'a> Recorder<'a> {
             return;
         }
         self.uses.clear();
+        if self.is_rehearsal() {
+            return;
+        }
         let barrier = vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(used);
         self.label(label);
         // SAFETY: the caller of `new` vouches for the command buffer.
@@ -158,6 +182,9 @@ impl<'a> Recorder<'a> {
             return;
         }
         self.touch(&[(range, true)], "fill");
+        if self.is_rehearsal() {
+            return;
+        }
         // SAFETY: ranges are aligned to 4 bytes by construction.
         unsafe { self.gpu.device().cmd_fill_buffer(self.commands, range.buffer, range.offset, range.size.next_multiple_of(4), word) };
     }
@@ -168,6 +195,9 @@ impl<'a> Recorder<'a> {
             return;
         }
         self.touch(&[(from, false), (to.part(0, from.size), true)], "copy");
+        if self.is_rehearsal() {
+            return;
+        }
         let region = [vk::BufferCopy { src_offset: from.offset, dst_offset: to.offset, size: from.size }];
         // SAFETY: both ranges lie in their buffers.
         unsafe { self.gpu.device().cmd_copy_buffer(self.commands, from.buffer, to.buffer, &region) };
@@ -175,6 +205,9 @@ impl<'a> Recorder<'a> {
 
     /// Records `work` as a stage of that name: labelled, and timed where there is room for its timestamps.
     pub fn stage<T>(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
+        if self.is_rehearsal() {
+            return work(self);
+        }
         if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(format!("olbvh.{name}"))) {
             // SAFETY: labels are balanced by the end below.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };

@@ -42,6 +42,8 @@ pub struct DeviceReport {
     pub driver: String,
     /// Highest API version.
     pub api: String,
+    /// Version of API and driver, to prefer the newer of two drivers of one device.
+    pub(crate) version: [u32; 2],
     /// Subgroup size.
     pub subgroup: u32,
     /// Kind: discrete, integrated, virtual, cpu, other.
@@ -196,6 +198,7 @@ impl DeviceReport {
             name: text(&properties.device_name),
             driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)).trim().to_string(),
             api: format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
+            version: [version, properties.driver_version],
             subgroup: requirements.subgroup_sizes[1],
             kind: match properties.device_type {
                 vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",

@@ -1,0 +1,85 @@
+//! A device of the host's: what it must have enabled, and what it lends.
+
+use super::context::{Foundation, Gpu, GpuOptions};
+use super::requirements::{DeviceReport, RayTracing};
+use crate::error::{Error, Result};
+use ash::vk;
+use gpu_allocator::vulkan::Allocator;
+use std::sync::{Arc, Mutex};
+
+/// What a host has enabled, of what [`super::Requirements`] lists. Nothing else of a device is used, whatever it could do.
+#[derive(Clone, Copy, Debug, Default)]
+#[allow(clippy::struct_excessive_bools)]
+pub struct Enabled {
+    /// Feature `bufferDeviceAddress`; without it kernels get their buffers by descriptors.
+    pub buffer_addresses: bool,
+    /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Needed where subgroup sizes vary.
+    pub subgroup_size_control: bool,
+    /// `VK_KHR_ray_query` and `VK_KHR_acceleration_structure` with their features: for a baseline only.
+    pub ray_query: bool,
+    /// Instance extension `VK_EXT_debug_utils`: objects are named and stages labelled.
+    pub debug_utils: bool,
+}
+
+/// A Vulkan device that somebody else owns. Cheap handles and function tables; nothing of it is ever destroyed by us.
+#[derive(Clone)]
+pub struct HostDevice {
+    /// The instance, of Vulkan 1.2 or later.
+    pub instance: ash::Instance,
+    /// The physical device.
+    pub physical: vk::PhysicalDevice,
+    /// The logical device.
+    pub device: ash::Device,
+    /// Family of the queues that our commands go to: it needs compute, nothing else.
+    pub family: u32,
+    /// A queue of that family behind the lock that the host takes for its own submissions, for the convenient layer and the start-up
+    /// self-test. `None`: only the `cmd_*` functions can be used.
+    pub queue: Option<Arc<Mutex<vk::Queue>>>,
+    /// The host's allocator, made with `buffer_device_address` if that is enabled. `None`: one of our own.
+    pub allocator: Option<Arc<Mutex<Allocator>>>,
+    /// The host's pipeline cache. `None`: one of our own.
+    pub pipeline_cache: Option<vk::PipelineCache>,
+    /// What is enabled.
+    pub enabled: Enabled,
+}
+
+impl std::fmt::Debug for HostDevice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "HostDevice({:?}, {:?})", self.device.handle(), self.enabled)
+    }
+}
+
+impl Gpu {
+    /// Works on a device of the host's. Of `options`, `device` means nothing here, and `pipeline_cache` only without the host's cache.
+    ///
+    /// Buffers are used by queues of `host.family` alone, with exclusive sharing: a host that reads or writes them on another family transfers
+    /// their ownership. One `Gpu` serves any number of threads; a [`super::Recorder`] belongs to one.
+    ///
+    /// # Errors
+    /// [`Error::NoDevice`] with what is missing, [`Error::SelfTest`], [`Error::Memory`].
+    ///
+    /// # Safety
+    /// The handles are valid and belong together; what `host.enabled` names is enabled, and `host.family` has compute. The device outlives every
+    /// clone of the `Gpu` and everything made from it. When the last is dropped, nothing recorded through it is being executed.
+    pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
+        let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;
+        let mut report = DeviceReport::new(&instance, physical);
+        let requirements = &mut report.requirements;
+        if !requirements.missing.is_empty() {
+            return Err(Error::NoDevice(format!("{} lacks {}", report.name, requirements.missing.join(", "))));
+        }
+        requirements.buffer_addresses &= enabled.buffer_addresses;
+        requirements.subgroup_size_control &= enabled.subgroup_size_control;
+        if !(enabled.ray_query && requirements.buffer_addresses) {
+            requirements.ray_tracing = RayTracing::None;
+        }
+        // SAFETY: the handle is one of this instance.
+        let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
+        let Some(of_family) = families.get(family as usize).filter(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)) else {
+            return Err(Error::NoDevice(format!("queue family {family} of {} has no compute", report.name)));
+        };
+        requirements.queue_family = Some((family, of_family.timestamp_valid_bits));
+        let (debug_utils, ours) = (enabled.debug_utils, None);
+        Self::on(Foundation { instance, physical, device, report, family, queue, allocator, pipeline_cache, debug_utils, ours }, options)
+    }
+}

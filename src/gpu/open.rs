@@ -1,0 +1,142 @@
+//! A device of our own: chosen, checked, opened.
+
+use super::context::{Foundation, Gpu, GpuOptions, Ours};
+use super::debug::DebugUtils;
+use super::failed;
+use super::requirements::DeviceReport;
+use crate::error::{Error, Result};
+use ash::vk;
+use std::ffi::CStr;
+use std::sync::{Arc, Mutex};
+
+struct Session {
+    entry: ash::Entry,
+    instance: ash::Instance,
+    debug: bool,
+}
+
+/// Opens the loader and an instance.
+fn open_instance() -> Result<Session> {
+    // SAFETY: the loader is trusted as every Vulkan program trusts it.
+    let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
+    // SAFETY: plain enumeration.
+    let extensions =
+        unsafe { entry.enumerate_instance_extension_properties(None) }.map_err(failed("vkEnumerateInstanceExtensionProperties"))?;
+    let has = |name: &CStr| extensions.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
+    let mut wanted = Vec::new();
+    let debug = has(ash::ext::debug_utils::NAME);
+    if debug {
+        wanted.push(ash::ext::debug_utils::NAME.as_ptr());
+    }
+    let mut flags = vk::InstanceCreateFlags::empty();
+    if has(ash::khr::portability_enumeration::NAME) {
+        // MoltenVK shows itself only on request.
+        wanted.push(ash::khr::portability_enumeration::NAME.as_ptr());
+        flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
+    }
+    let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_2);
+    let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&wanted).flags(flags);
+    // SAFETY: all structs outlive the call.
+    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|e| Error::NoVulkan(format!("vkCreateInstance: {e:?}")))?;
+    Ok(Session { entry, instance, debug })
+}
+
+/// Every Vulkan device of this machine with what it lacks, if anything.
+///
+/// # Errors
+/// [`Error::NoVulkan`] if there is no loader or driver.
+pub fn list_devices() -> Result<Vec<DeviceReport>> {
+    let session = open_instance()?;
+    // SAFETY: the instance is alive, and destroyed once.
+    let devices = unsafe { session.instance.enumerate_physical_devices() };
+    let reports = devices
+        .map(|d| d.into_iter().map(|d| DeviceReport::new(&session.instance, d)).collect())
+        .map_err(failed("vkEnumeratePhysicalDevices"));
+    // SAFETY: nothing made from the instance is left.
+    unsafe { session.instance.destroy_instance(None) };
+    reports
+}
+
+/// The device asked for, or the best one that qualifies.
+fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceReport)> {
+    // SAFETY: the instance is alive.
+    let devices = unsafe { instance.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
+    let all: Vec<_> = devices.into_iter().map(|d| (d, DeviceReport::new(instance, d))).collect();
+    let names = || all.iter().enumerate().map(|(i, (_, r))| format!("{i}: {}", r.name)).collect::<Vec<_>>().join(", ");
+    if all.is_empty() {
+        return Err(Error::NoDevice("the Vulkan loader finds no driver; install one (mesa-vulkan-drivers runs on any processor)".into()));
+    }
+    if let Some(wanted) = wanted {
+        let lower = wanted.to_lowercase();
+        let by_index = wanted.parse::<usize>().ok().and_then(|i| all.get(i));
+        let found = by_index.or_else(|| all.iter().find(|(_, r)| r.name.to_lowercase().contains(&lower)));
+        let Some((device, report)) = found else {
+            return Err(Error::NoDevice(format!("none is called `{wanted}`; there are {}", names())));
+        };
+        if !report.requirements.missing.is_empty() {
+            return Err(Error::NoDevice(format!("{} lacks {}", report.name, report.requirements.missing.join(", "))));
+        }
+        return Ok((*device, report.clone()));
+    }
+    let rank = |r: &DeviceReport| ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|k| *k == r.kind);
+    let best = all.iter().filter(|(_, r)| r.requirements.missing.is_empty()).min_by_key(|(_, r)| (rank(r), std::cmp::Reverse(r.version)));
+    best.cloned().ok_or_else(|| {
+        let lacking = all.iter().map(|(_, r)| format!("{} lacks {}", r.name, r.requirements.missing.join(", ")));
+        Error::NoDevice(lacking.collect::<Vec<_>>().join("; "))
+    })
+}
+
+impl Gpu {
+    /// Opens a device and tests that it can be trusted.
+    ///
+    /// # Errors
+    /// [`Error::NoVulkan`], [`Error::NoDevice`] with what is missing, [`Error::SelfTest`].
+    pub fn new(options: &GpuOptions) -> Result<Self> {
+        let session = open_instance()?;
+        let chosen = choose(&session.instance, options.device.as_deref());
+        let (physical, report) = match chosen {
+            Ok(chosen) => chosen,
+            Err(e) => {
+                // SAFETY: nothing made from the instance is left.
+                unsafe { session.instance.destroy_instance(None) };
+                return Err(e);
+            }
+        };
+        Self::open(session, physical, report, options)
+    }
+
+    fn open(session: Session, physical: vk::PhysicalDevice, report: DeviceReport, options: &GpuOptions) -> Result<Self> {
+        let requirements = &report.requirements;
+        let Session { entry, instance, debug } = session;
+        let (family, _) = requirements.queue_family.unwrap_or_default();
+        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+        let extensions: Vec<_> = requirements.extensions.iter().map(|e| e.as_ptr()).collect();
+        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+        let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
+        let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
+        if requirements.buffer_addresses {
+            info = info.push_next(&mut addresses);
+        }
+        if requirements.subgroup_size_control {
+            info = info.push_next(&mut control);
+        }
+        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+        let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+        if requirements.ray_query() {
+            info = info.push_next(&mut structures).push_next(&mut ray_queries);
+        }
+        // SAFETY: only features and extensions that the device reported are enabled; all structs outlive the calls.
+        let (device, queue) = unsafe {
+            let device = instance.create_device(physical, &info, None).map_err(failed("vkCreateDevice"))?;
+            let queue = device.get_device_queue(family, 0);
+            (device, queue)
+        };
+        let ours = Some(Ours { debug: if debug { DebugUtils::new(&entry, &instance) } else { None }, _entry: entry });
+        let queue = Some(Arc::new(Mutex::new(queue)));
+        let (allocator, pipeline_cache) = (None, None);
+        Self::on(
+            Foundation { instance, physical, device, report, family, queue, allocator, pipeline_cache, debug_utils: debug, ours },
+            options,
+        )
+    }
+}

@@ -1,0 +1,279 @@
+//! Embedding: a device, queue, allocator and pipeline cache that are the host's, and recording that does nothing but record.
+
+#![allow(clippy::unwrap_used, unsafe_code)]
+
+use ash::vk;
+use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use olbvh::build::{
+    BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshInput, MeshScratch, MeshView, Tree, TreeMemory, cmd_build,
+    cmd_prepare_mesh,
+};
+use olbvh::gpu::{Binding, Enabled, Gpu, GpuOptions, HostDevice, Recorder, Requirements};
+use olbvh::mesh::{Mesh, kuhn_jittered};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, locate};
+use std::cell::Cell;
+use std::ffi::c_void;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, OnceLock};
+
+/// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses.
+struct Host {
+    _entry: ash::Entry,
+    instance: ash::Instance,
+    physical: vk::PhysicalDevice,
+    device: ash::Device,
+    family: u32,
+    addresses: bool,
+    control: bool,
+}
+
+impl Host {
+    fn new() -> Self {
+        // SAFETY: plain creation; `drop` destroys device and instance once.
+        unsafe {
+            let entry = ash::Entry::load().unwrap();
+            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
+            let instance = entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&application), None).unwrap();
+            let physical = instance.enumerate_physical_devices().unwrap()[0];
+            let needs = Requirements::check(&instance, physical);
+            assert!(needs.missing.is_empty(), "{:?}", needs.missing);
+            let family = needs.queue_family.unwrap().0;
+            let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+            let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(needs.buffer_addresses);
+            let mut control =
+                vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
+            let extensions = [ash::ext::subgroup_size_control::NAME.as_ptr()];
+            let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses);
+            if needs.subgroup_size_control {
+                info = info.push_next(&mut control).enabled_extension_names(&extensions);
+            }
+            let device = instance.create_device(physical, &info, None).unwrap();
+            let (addresses, control) = (needs.buffer_addresses, needs.subgroup_size_control);
+            Self { _entry: entry, instance, physical, device, family, addresses, control }
+        }
+    }
+
+    fn enabled(&self) -> Enabled {
+        Enabled { buffer_addresses: self.addresses, subgroup_size_control: self.control, ..Enabled::default() }
+    }
+
+    fn queue(&self) -> Arc<Mutex<vk::Queue>> {
+        // SAFETY: the family has a queue, it was asked for above.
+        Arc::new(Mutex::new(unsafe { self.device.get_device_queue(self.family, 0) }))
+    }
+
+    fn lend(&self) -> HostDevice {
+        HostDevice {
+            instance: self.instance.clone(),
+            physical: self.physical,
+            device: self.device.clone(),
+            family: self.family,
+            queue: Some(self.queue()),
+            allocator: None,
+            pipeline_cache: None,
+            enabled: self.enabled(),
+        }
+    }
+}
+
+impl Drop for Host {
+    fn drop(&mut self) {
+        // SAFETY: whatever was made from the device is gone.
+        unsafe {
+            self.device.destroy_device(None);
+            self.instance.destroy_instance(None);
+        }
+    }
+}
+
+fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
+    let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
+    locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners
+}
+
+#[test]
+fn a_hosts_device_allocator_and_cache_are_used_and_left() {
+    let host = Host::new();
+    let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
+    let expected = owners(&Gpu::new(&GpuOptions::default()).unwrap(), &mesh);
+    let allocator = Allocator::new(&AllocatorCreateDesc {
+        instance: host.instance.clone(),
+        device: host.device.clone(),
+        physical_device: host.physical,
+        debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+        buffer_device_address: host.addresses,
+        allocation_sizes: gpu_allocator::AllocationSizes::default(),
+    });
+    let allocator = Arc::new(Mutex::new(allocator.unwrap()));
+    // SAFETY: the cache belongs to the device and is destroyed below.
+    let cache = unsafe { host.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }.unwrap();
+    for binding in [Binding::Address, Binding::Descriptors] {
+        let lent = HostDevice { allocator: Some(allocator.clone()), pipeline_cache: Some(cache), ..host.lend() };
+        let options = GpuOptions { binding: Some(binding), ..GpuOptions::default() };
+        // SAFETY: the host's handles belong together and outlive `gpu`.
+        let gpu = unsafe { Gpu::from_raw(lent, &options) }.unwrap();
+        assert!(Arc::ptr_eq(gpu.allocator(), &allocator));
+        assert_eq!(owners(&gpu, &mesh), expected);
+    }
+    assert_eq!(allocator.lock().unwrap().generate_report().allocations.len(), 0, "everything is given back");
+    // SAFETY: no pipeline of the cache is being made; the allocator frees its blocks while the device is alive.
+    unsafe { host.device.destroy_pipeline_cache(cache, None) };
+    drop(allocator);
+}
+
+#[test]
+fn without_a_queue_only_recording_works() {
+    let host = Host::new();
+    // SAFETY: as above.
+    let gpu = unsafe { Gpu::from_raw(HostDevice { queue: None, ..host.lend() }, &GpuOptions::default()) }.unwrap();
+    let error = gpu.run("olbvh.test.run", |_| Ok(())).unwrap_err();
+    assert!(error.to_string().contains("lent no queue"), "{error}");
+}
+
+#[test]
+fn what_is_not_enabled_is_not_used() {
+    let host = Host::new();
+    let lent = HostDevice { enabled: Enabled { buffer_addresses: false, ..host.enabled() }, ..host.lend() };
+    // SAFETY: as above.
+    let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }.unwrap();
+    assert_eq!(gpu.binding(), Binding::Descriptors);
+    let mesh = kuhn_jittered([3; 3], 0.3, 1).unwrap();
+    assert!(owners(&gpu, &mesh).iter().all(|&o| o != u32::MAX));
+    // SAFETY: as above; a family that does not exist is refused.
+    let odd = unsafe { Gpu::from_raw(HostDevice { family: 99, ..host.lend() }, &GpuOptions::default()) };
+    assert!(odd.unwrap_err().to_string().contains("queue family 99"));
+}
+
+#[test]
+fn one_device_serves_many_threads() {
+    fn shared<T: Send + Sync>() {}
+    shared::<Gpu>();
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([5; 3], 0.3, 1).unwrap();
+    let expected = owners(&gpu, &mesh);
+    std::thread::scope(|scope| {
+        for _ in 0..4 {
+            scope.spawn(|| assert_eq!(owners(&gpu, &mesh), expected));
+        }
+    });
+}
+
+/// Calls, while [`ARMED`], of device functions that make, allocate, map, submit or wait. Of this process, which other tests share where the runner
+/// starts none per test: only the armed thread counts.
+static CALLS: AtomicU32 = AtomicU32::new(0);
+/// The device's own functions.
+static TABLE: OnceLock<ash::DeviceFnV1_0> = OnceLock::new();
+thread_local! {
+    static ARMED: Cell<bool> = const { Cell::new(false) };
+}
+
+macro_rules! counted {
+    ($($name:ident($first:ty $(, $arg:ident: $kind:ty)*);)*) => {
+        $(unsafe extern "system" fn $name(first: $first $(, $arg: $kind)*) -> vk::Result {
+            CALLS.fetch_add(u32::from(ARMED.get()), Relaxed);
+            // SAFETY: the arguments are passed on as they came.
+            unsafe { (TABLE.get().unwrap().$name)(first $(, $arg)*) }
+        })*
+
+        /// The device with those functions counted.
+        fn counting(device: &ash::Device) -> ash::Device {
+            let mut table = TABLE.get_or_init(|| device.fp_v1_0().clone()).clone();
+            $(table.$name = $name;)*
+            let (one, two, three) = (device.fp_v1_1().clone(), device.fp_v1_2().clone(), device.fp_v1_3().clone());
+            ash::Device::from_parts_1_3(device.handle(), table, one, two, three)
+        }
+    };
+}
+
+type Callbacks<'a> = *const vk::AllocationCallbacks<'a>;
+
+counted! {
+    allocate_memory(vk::Device, info: *const vk::MemoryAllocateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::DeviceMemory);
+    create_buffer(vk::Device, info: *const vk::BufferCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::Buffer);
+    create_shader_module(vk::Device, info: *const vk::ShaderModuleCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::ShaderModule);
+    create_compute_pipelines(vk::Device, cache: vk::PipelineCache, n: u32, info: *const vk::ComputePipelineCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::Pipeline);
+    create_pipeline_layout(vk::Device, info: *const vk::PipelineLayoutCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::PipelineLayout);
+    create_descriptor_pool(vk::Device, info: *const vk::DescriptorPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::DescriptorPool);
+    create_command_pool(vk::Device, info: *const vk::CommandPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::CommandPool);
+    create_query_pool(vk::Device, info: *const vk::QueryPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::QueryPool);
+    create_fence(vk::Device, info: *const vk::FenceCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::Fence);
+    map_memory(vk::Device, memory: vk::DeviceMemory, offset: u64, size: u64, flags: vk::MemoryMapFlags, out: *mut *mut c_void);
+    wait_for_fences(vk::Device, n: u32, fences: *const vk::Fence, all: vk::Bool32, timeout: u64);
+    device_wait_idle(vk::Device);
+    queue_wait_idle(vk::Queue);
+    queue_submit(vk::Queue, n: u32, info: *const vk::SubmitInfo<'_>, fence: vk::Fence);
+}
+
+/// What a frame of a host does: mesh, tree, location, all within memory that is there.
+struct Frame {
+    input: MeshInput,
+    arrays: MeshArrays,
+    mesh_scratch: MeshScratch,
+    tree: TreeMemory,
+    build_scratch: BuildScratch,
+    capacity: Capacity,
+    points: PointInput,
+    output: LocateOutput,
+}
+
+impl Frame {
+    fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        cmd_prepare_mesh(r, &self.input, &self.arrays, &self.mesh_scratch)?;
+        r.barrier("frame.mesh → frame.tree");
+        let mesh = MeshView { input: self.input, arrays: self.arrays };
+        cmd_build(r, &mesh, &self.tree, &self.capacity, &BuildOptions::default(), &self.build_scratch)?;
+        let scene = Scene { mesh, tree: self.tree, longest_leaf: self.input.tets };
+        cmd_locate(r, &scene, &self.points, &self.output, &LocateOptions::default())
+    }
+}
+
+#[test]
+fn recording_neither_makes_nor_submits_nor_waits() {
+    let host = Host::new();
+    if !host.addresses {
+        println!("NOT RUN: without buffer addresses each recording makes descriptor pools");
+        return;
+    }
+    // SAFETY: as above; the counted functions do what the device's own do.
+    let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &GpuOptions::default()) }.unwrap();
+    let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
+    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+    let (positions, cells) =
+        (gpu.upload("olbvh.test.positions", &mesh.points).unwrap(), gpu.upload("olbvh.test.cells", &mesh.tets).unwrap());
+    let options = BuildOptions::default();
+    let capacity = Capacity::for_entries(20 * tets, 10);
+    let carve = |a: &mut Arena| {
+        let (arrays, mesh_scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?);
+        let (tree, build_scratch) = (TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?);
+        let output = LocateOutput { owners: a.words(u64::from(points))?, barycentrics: a.take(16 * u64::from(points))? };
+        Ok((arrays, mesh_scratch, tree, build_scratch, output))
+    };
+    let memory = gpu.buffer("olbvh.test.frame", Arena::measure(carve).unwrap()).unwrap();
+    let (arrays, mesh_scratch, tree, build_scratch, output) = carve(&mut Arena::new(memory.all())).unwrap();
+    let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
+    let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None };
+    let frame = Frame { input, arrays, mesh_scratch, tree, build_scratch, capacity, points: asked, output };
+    let mut rehearsal = Recorder::rehearse(&gpu);
+    frame.record(&mut rehearsal).unwrap();
+    rehearsal.finish().unwrap();
+
+    let before = CALLS.load(Relaxed);
+    gpu.run("olbvh.test.frame", |r| {
+        ARMED.set(true);
+        let result = frame.record(r);
+        ARMED.set(false);
+        result
+    })
+    .unwrap();
+    assert_eq!(CALLS.load(Relaxed), before, "calls made while recording");
+    let found: Vec<u32> = gpu.download(&memory, output.owners.part(0, 4 * u64::from(points))).unwrap();
+    assert_eq!(found, owners(&gpu, &mesh));
+    // The count counts.
+    ARMED.set(true);
+    let buffer = gpu.buffer("olbvh.test.counted", 64 << 20);
+    ARMED.set(false);
+    assert!(buffer.is_ok() && CALLS.load(Relaxed) > before);
+}
