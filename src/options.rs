@@ -18,33 +18,57 @@ pub enum Assign {
     Exact = 2,
 }
 
+/// Which primitives a leaf lists (SPEC 2.6).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Lists {
+    /// All that the assignment puts there (the paper).
+    #[default]
+    All = 0,
+    /// The same in leaves that the boundary touches; in a leaf that is full of mesh one primitive, the owner of the cell's centre, from which a
+    /// walk across faces finds the others. Entries grow with the mesh's surface instead of its volume.
+    Boundary = 1,
+}
+
+/// Names of the variants, as the command line and reports use them.
+macro_rules! named {
+    ($type:ident, $what:literal, [$($variant:ident = $name:literal),+]) => {
+        impl $type {
+            /// Every variant.
+            pub const EVERY: [Self; [$($name),+].len()] = [$(Self::$variant),+];
+
+            /// The name used on the command line and in reports.
+            pub fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $name),+
+                }
+            }
+        }
+
+        impl std::fmt::Display for $type {
+            fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+                f.write_str(self.name())
+            }
+        }
+
+        impl std::str::FromStr for $type {
+            type Err = Error;
+
+            fn from_str(name: &str) -> Result<Self> {
+                let found = Self::EVERY.into_iter().find(|v| v.name().eq_ignore_ascii_case(name));
+                let known = || Self::EVERY.map(Self::name).join(", ");
+                found.ok_or_else(|| Error::Invalid(format!("unknown {} `{name}`; known are {}", $what, known())))
+            }
+        }
+    };
+}
+
+named!(Assign, "assignment", [Aabb = "aabb", Planes = "planes", Exact = "exact"]);
+named!(Lists, "kind of lists", [All = "all", Boundary = "boundary"]);
+
 impl Assign {
     /// All three, weakest first.
-    pub const ALL: [Self; 3] = [Self::Aabb, Self::Planes, Self::Exact];
-
-    /// The name used on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Aabb => "aabb",
-            Self::Planes => "planes",
-            Self::Exact => "exact",
-        }
-    }
-}
-
-impl std::fmt::Display for Assign {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        f.write_str(self.name())
-    }
-}
-
-impl std::str::FromStr for Assign {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        let found = Self::ALL.into_iter().find(|a| a.name().eq_ignore_ascii_case(name));
-        found.ok_or_else(|| Error::Invalid(format!("unknown assignment `{name}`; known are aabb, planes, exact")))
-    }
+    pub const ALL: [Self; 3] = Self::EVERY;
 }
 
 /// How to build a tree.
@@ -54,6 +78,8 @@ pub struct BuildOptions {
     pub alpha: f32,
     /// Which cells list a primitive.
     pub assign: Assign,
+    /// Which primitives a leaf lists.
+    pub lists: Lists,
     /// Store a box per node (24 bytes each). Without, boxes follow from the grid.
     pub boxes: bool,
     /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
@@ -63,7 +89,7 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { alpha: 0.0, assign: Assign::Aabb, boxes: false, capacity: None }
+        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, boxes: false, capacity: None }
     }
 }
 
@@ -101,6 +127,9 @@ mod tests {
         for a in Assign::ALL {
             assert_eq!(a.to_string().parse::<Assign>().unwrap(), a);
         }
-        assert!("boxes".parse::<Assign>().is_err());
+        for lists in Lists::EVERY {
+            assert_eq!(lists.to_string().parse::<Lists>().unwrap(), lists);
+        }
+        assert!("boxes".parse::<Assign>().is_err_and(|e| e.to_string().contains("aabb, planes, exact")));
     }
 }

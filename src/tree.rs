@@ -4,7 +4,7 @@ mod stats;
 mod validate;
 pub use stats::{Memory, TreeStats};
 
-use crate::options::Assign;
+use crate::options::{Assign, Lists};
 use crate::reference::boundary::bit;
 use crate::reference::grid::{Grid, MAX_LEVEL, morton};
 use crate::reference::leaves::Box6;
@@ -17,6 +17,8 @@ use std::ops::Range;
 pub struct TreeArrays {
     /// The assignment that the entries follow.
     pub assign: Assign,
+    /// Which primitives a leaf lists.
+    pub lists: Lists,
     /// The grid whose cells the leaves are; its `level` is l.
     pub grid: Grid,
     /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
@@ -93,6 +95,12 @@ impl TreeArrays {
     /// The primitives of a node: ascending and each once for a leaf; for others the lists of their leaves one after the other.
     pub fn primitives(&self, node: u32) -> &[u32] {
         &self.p[self.entries(node)]
+    }
+
+    /// The primitive that a walk through a leaf begins at, if the leaf is one to walk through: full of mesh, its list left out (SPEC 2.6).
+    pub fn seed(&self, leaf: u32) -> Option<u32> {
+        let full = self.lists == Lists::Boundary && !self.is_boundary(leaf);
+        self.primitives(leaf).first().copied().filter(|_| full)
     }
 
     /// Whether a boundary primitive lies in the node. If not, the node's leaves are full of mesh.

@@ -4,6 +4,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::kuhn_jittered;
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::{LocateOptions, Path, locate, locate_all};
+use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
 #[test]
@@ -12,6 +13,7 @@ fn owners_are_the_references() {
         let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..Default::default() }).unwrap();
         let mesh = kuhn_jittered([10, 11, 9], 0.3, 1).unwrap();
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let topology = topology(&mesh).unwrap();
         let mut h = 1u32;
         let mut next = || {
             h = h.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
@@ -28,7 +30,7 @@ fn owners_are_the_references() {
             for alpha in [0.0, 1.0, 2.0] {
                 let tree = Tree::build(&gpu, &device, &BuildOptions { assign, alpha, ..Default::default() }).unwrap();
                 let host = tree.download().unwrap();
-                let locator = Locator::new(&mesh, &host);
+                let locator = Locator::new(&mesh, &topology, &host);
                 let expected = locator.locate_all(&points);
                 for path in [Path::Descent, Path::Traversal(8), Path::Traversal(1)] {
                     let found = locate(&device, &tree, &points, None, &LocateOptions { path, ..Default::default() }, &|_, _| {}).unwrap();

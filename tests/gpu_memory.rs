@@ -5,7 +5,7 @@
 use olbvh::build::{BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, SortedScratch, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::kuhn;
-use olbvh::options::{Assign, BuildOptions};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 
 fn allocated(gpu: &Gpu) -> u64 {
@@ -32,14 +32,15 @@ fn a_build_allocates_what_it_needs() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn([12; 3]).unwrap();
     let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    for assign in Assign::ALL {
+    for (assign, lists) in Assign::ALL.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
         let before = allocated(&gpu);
-        let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).unwrap();
+        let options = BuildOptions { assign, lists, ..BuildOptions::default() };
+        let tree = Tree::build(&gpu, &on_device, &options).unwrap();
         let status = *tree.status();
         let capacity = Capacity { candidates: status.candidates, entries: status.entries, nodes: status.nodes, level: status.level };
         let planned = Arena::measure(|a| {
             CountScratch::carve(&gpu, a, on_device.input().tets)?;
-            FilterScratch::carve(&gpu, a, assign, status.candidates)?;
+            FilterScratch::carve(&gpu, a, &options, &capacity)?;
             SortedScratch::carve(&gpu, a, &capacity)
         });
         // The head of 512 bytes and the rounding of each buffer beside it.

@@ -7,6 +7,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, locate};
+use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
 /// Whether the device has ray queries; says so loudly where not. The reference driver must have them.
@@ -64,7 +65,8 @@ fn what_rays_find_is_right(binding: Binding) {
         let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, &|_, _| {}).unwrap();
         let (rays, owners, weights) = by_rays(&gpu, &device, &points);
         let host = tree.download().unwrap();
-        let locator = Locator::new(&mesh, &host);
+        let topology = topology(&mesh).unwrap();
+        let locator = Locator::new(&mesh, &topology, &host);
         let mut lost = [0; 2];
         for (i, (&owner, &octree)) in owners.iter().zip(&expected.owners).enumerate() {
             if owner == u32::MAX {

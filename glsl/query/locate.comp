@@ -3,11 +3,12 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Point location by descent over child masks (SPEC 3.1). Lists are searched in slices of at most SLICE entries per dispatch; between slices
+// Point location by descent over child masks (SPEC 3.1), then by a list or a walk. Lists are searched in slices of at most SLICE entries per dispatch; between slices
 // the best candidate waits in the outputs.
 layout(constant_id = 2) const uint HINTS = 0;
 layout(constant_id = 3) const uint SLICE = 16384;
-ARGUMENTS(12)
+layout(constant_id = 4) const uint LISTS = 0;
+ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
     uint slice;  // number of this dispatch
@@ -26,8 +27,10 @@ BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, hints)
 BUFFER(10, READ_WRITE, uint, owners)
 BUFFER16(11, READ_WRITE, vec4, barycentrics) // between slices: inside, in_box, smallest
+BUFFER16(12, readonly, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
 
 void main() {
     uint i = item_index();
@@ -42,16 +45,21 @@ void main() {
     }
     vec3 x = normalise(g, at);
     Best best = no_best();
+    uint hint = HINTS != 0u && slice == 0u ? hints.at[i] : NONE;
     if (slice > 0u) {
         vec4 state = barycentrics.at[i];
         best = Best(owners.at[i], state.x != 0.0, state.y != 0.0, state.z);
-    } else if (HINTS != 0u && hints.at[i] != NONE) {
-        Weights w = weights(load_tet(cells.at[hints.at[i]]), x);
-        if (w.clear) best = Best(hints.at[i], true, true, 0.0);
+    } else if (hint != NONE) {
+        Weights w = weights(load_tet(cells.at[hint]), x);
+        if (w.clear) best = Best(hint, true, true, 0.0);
     }
     uvec2 range = entry_range(leaf);
-    uint begin = min(range.y, range.x + slice * SLICE);
-    if (!best.inside) search(best, begin, min(range.y, begin + SLICE), x);
+    if (walks_in(leaf, range)) {
+        if (slice == 0u && !best.inside) best = walk_in(g, p.at[range.x], hint, at, x);
+    } else {
+        uint begin = min(range.y, range.x + slice * SLICE);
+        if (!best.inside) search(best, begin, min(range.y, begin + SLICE), x);
+    }
     if (last == 0u) {
         owners.at[i] = best.owner;
         barycentrics.at[i] = vec4(float(best.inside), float(best.in_box), best.smallest, 0.0);

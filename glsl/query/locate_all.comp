@@ -7,7 +7,8 @@
 // slices. `owners` are the answers of locate.
 layout(constant_id = 2) const uint FILL = 0;
 layout(constant_id = 3) const uint SLICE = 16384;
-ARGUMENTS(12)
+layout(constant_id = 4) const uint LISTS = 0;
+ARGUMENTS(13)
     uint count;
     uint stride;
     uint slice;
@@ -25,8 +26,30 @@ BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, owners)
 BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: where the next one goes
 BUFFER(11, READ_WRITE, uint, found)
+BUFFER16(12, readonly, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
+
+// Writes from `place` on those of the star of x in `owner` that contain x; their number.
+uint list_star(uint owner, vec3 x, uint place) {
+    Best unused = no_best();
+    arrive(owner, x, unused);
+    uint n = 0u;
+    for (uint i = 0u; i < star_size; ++i) {
+        if (weights(load_tet(cells.at[star[i]]), x).inside) star[n++] = star[i];
+    }
+    uint next = 0u;
+    for (uint k = 0u; FILL != 0u && k < n; ++k) {
+        uint lowest = NONE;
+        for (uint i = 0u; i < n; ++i) {
+            if (star[i] >= next) lowest = min(lowest, star[i]);
+        }
+        if (place + k < capacity) found.at[place + k] = lowest;
+        next = lowest + 1u;
+    }
+    return n;
+}
 
 void main() {
     uint i = item_index();
@@ -46,6 +69,10 @@ void main() {
         return;
     }
     uvec2 range = entry_range(leaf);
+    if (walks_in(leaf, range)) {
+        if (slice == 0u) places.at[i] = place + list_star(owners.at[i], x, place);
+        return;
+    }
     uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
     for (uint e = begin; e < end; ++e) {
         uint t = p.at[e];

@@ -7,7 +7,8 @@
 // Point location through the paper's traversal (SPEC 3.2): a baseline that must agree with the descent. The node predicate tests the point's
 // cell, in integers.
 layout(constant_id = 2) const uint STACK = 8;
-ARGUMENTS(11)
+layout(constant_id = 3) const uint LISTS = 0;
+ARGUMENTS(12)
     uint count;
     uint stride;
     float tolerance;
@@ -23,8 +24,10 @@ BUFFER16(7, readonly, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, writeonly, uint, owners)
 BUFFER16(10, writeonly, vec4, barycentrics)
+BUFFER16(11, readonly, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
 
 uint point_code;
 uint leaf_found;
@@ -53,7 +56,8 @@ void main() {
         vec3 x = normalise(g, at);
         Best best = no_best();
         uvec2 range = entry_range(leaf_found);
-        search(best, range.x, min(range.y, range.x + 32000u), x);
+        if (walks_in(leaf_found, range)) best = walk_in(g, p.at[range.x], NONE, at, x);
+        else search(best, range.x, min(range.y, range.x + 32000u), x);
         owner = decide(best, leaf_found, tolerance);
         if (owner != NONE) {
             Tet tet = load_tet(cells.at[owner]);

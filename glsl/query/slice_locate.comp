@@ -8,6 +8,7 @@
 // cell of the one before and a short walk across faces from it, before it asks the tree. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 32;
 layout(constant_id = 3) const uint WALK = 6;
+layout(constant_id = 4) const uint LISTS = 0;
 ARGUMENTS(13)
     uint layer;
     uint first;  // number of the first row in that layer
@@ -31,14 +32,15 @@ BUFFER(11, writeonly, uint, answers) // owner, or SLICE_PENDING
 BUFFER(12, READ_WRITE, SliceStatus, status)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
 
 // The cell that holds x clearly, if it is `cell` or a short walk away from it.
-uint walk(uint cell, vec3 x) {
+uint walk_clear(uint cell, vec3 x) {
     for (uint s = 0u; s < WALK && cell != NONE; ++s) {
         Tet tet = load_tet(cells.at[cell]);
         Weights w = weights(tet, x);
         if (w.clear) return cell;
-        vec4 own = vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]);
+        vec4 own = own_weights(w, tet);
         uint face = 0u;
         for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
         if (own[face] >= 0.0) return NONE;
@@ -63,14 +65,15 @@ void main() {
             uint owner = NONE;
             if (near_bounds(g, at)) {
                 vec3 x = normalise(g, at);
-                if (state.cursor == 0u) owner = walk(state.hint, x);
+                if (state.cursor == 0u) owner = walk_clear(state.hint, x);
                 uint leaf = owner == NONE ? find_leaf(g.level, quantize(g, at)) : NONE;
                 if (leaf != NONE) {
                     uvec2 range = entry_range(leaf);
                     Best best = Best(state.best, false, state.in_box != 0u, state.smallest);
                     uint from = range.x + state.cursor;
                     uint to = min(range.y, from + max(budget - min(work, budget), 1u));
-                    search(best, from, to, x);
+                    if (walks_in(leaf, range)) best = walk_in(g, p.at[range.x], NONE, at, x);
+                    else search(best, from, to, x);
                     work += to - from;
                     if (!best.inside && to < range.y) {
                         state.cursor = to - range.x;

@@ -8,6 +8,7 @@
 // Twin of src/reference/volume/march.rs.
 layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
+layout(constant_id = 4) const uint LISTS = 0;
 ARGUMENTS(15)
     uint items;  // pixels in whole blocks
     uint budget; // candidates tested per ray and dispatch, roughly
@@ -29,6 +30,7 @@ BUFFER16(13, READ_WRITE, RayState, states)
 BUFFER(14, READ_WRITE, RenderStatus, status)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
 
 const uint WALK = 6u; // steps of a walk across faces before the tree is asked
 const uint TABLE = 1024u;
@@ -112,7 +114,7 @@ void main() {
                 w = weights(tet, x);
                 inside = w.clear;
                 if (inside) break;
-                vec4 own = vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]);
+                vec4 own = own_weights(w, tet);
                 uint face = 0u;
                 for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
                 uint next = neighbours.at[cell][face];
@@ -128,7 +130,8 @@ void main() {
                     Best best = Best(state.best, false, state.in_box != 0u, state.smallest);
                     uint begin = range.x + state.cursor;
                     uint end = min(range.y, begin + max(budget - min(work, budget), 1u));
-                    search(best, begin, end, x);
+                    if (walks_in(leaf, range)) best = walk_in(g, p.at[range.x], NONE, at, x);
+                    else search(best, begin, end, x);
                     work += end - begin;
                     if (!best.inside && end < range.y) {
                         // The list is longer than this dispatch's share: on with it in the next one.

@@ -1,5 +1,7 @@
 // Does a tetrahedron touch a cell? (SPEC 2.2) Twin of src/reference/assign.rs, which explains the bounds: the same operations in the
 // same order.
+#include "shared/centre.glsl"
+
 const uint PLANES = 1u;
 const uint EXACT = 2u;
 
@@ -20,23 +22,9 @@ const uvec3 FILTER_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 
 const uvec4 FILTER_EDGES[6] =
     uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
 
-float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
-
-vec3 half_cell(Grid g, uint level) {
-    precise vec3 cell = g.extent.xyz * two_to(-1 - int(level));
-    precise vec3 whole = g.extent.xyz * 0.5;
-    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
-}
-
 vec3 inflated(Grid g, vec3 h) {
     precise vec3 r = h + (g.extent.xyz * two_to(-20) + two_to(-41));
     return r;
-}
-
-vec3 cell_centre(vec3 h, uvec3 cell) {
-    precise vec3 a = vec3(2u * cell + 1u) * h;
-    precise vec3 b = floor(a * two_to(42)) * two_to(-42);
-    return b;
 }
 
 vec3 cross_bound(vec3 a, vec3 b) {

@@ -1,4 +1,4 @@
-// Candidates for the owner of a point. Needs grid.glsl, tet.glsl, and vertices.
+// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl, and vertices.
 
 // Far outside of the bounds, or not a number: no mesh can be there.
 bool near_bounds(Grid g, vec3 x) {
@@ -27,3 +27,17 @@ struct OwnerSearch {
 };
 
 OwnerSearch no_search() { return OwnerSearch(0u, no_best()); }
+
+// Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
+// smallest barycentric coordinate, then the lowest id. Flat cells never.
+void consider(inout Best best, uint t, Tet tet, Weights w) {
+    if (w.inside) {
+        if (!best.inside || t < best.owner) best = Best(t, true, true, 0.0);
+        return;
+    }
+    if (best.inside) return;
+    float s = smallest(w);
+    bool closer = s > best.smallest || (s == best.smallest && t < best.owner);
+    bool better = best.owner == NONE || (w.in_box && !best.in_box) || (w.in_box == best.in_box && closer);
+    if (better && volume(tet) != 0.0) best = Best(t, false, w.in_box, s);
+}

@@ -1,4 +1,4 @@
-// Point location in a leaf's list (SPEC 3.1). Twin of `in_leaf` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
+// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
 
 #include "shared/candidates.glsl"
 
@@ -7,14 +7,8 @@ void search(inout Best best, uint begin, uint end, vec3 x) {
     for (uint i = begin; i < end; ++i) {
         uint t = p.at[i];
         Tet tet = load_tet(cells.at[t]);
-        Weights w = weights(tet, x);
-        if (w.inside) {
-            best = Best(t, true, true, 0.0);
-            return;
-        }
-        float s = smallest(w);
-        bool better = best.owner == NONE || (w.in_box && !best.in_box) || (w.in_box == best.in_box && s > best.smallest);
-        if (better && volume(tet) != 0.0) best = Best(t, false, w.in_box, s);
+        consider(best, t, tet, weights(tet, x));
+        if (best.inside) return;
     }
 }
 

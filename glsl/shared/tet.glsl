@@ -31,7 +31,8 @@ struct Weights {
     float sum;
     bool in_box; // inside the closed box of the vertices
     bool inside; // the closed, not flat cell holds the point
-    bool clear;  // by so much that rounding cannot put it into a neighbour as well
+    bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
+    float margin; // a weight this near to 0 may be that of a point on either side of the face, by rounding
 };
 
 // Ascending places of four different vertex indices.
@@ -71,8 +72,12 @@ Weights weights(Tet t, vec3 p) {
     precise vec3 size = hi - lo;
     precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
     r.clear = r.inside && least > margin;
+    r.margin = margin;
     return r;
 }
+
+// Whether no face says outside by more than the margin.
+bool near(Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
 
 const float SMALLEST_FLOAT = -3.40282347e38;
 

@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
 
 /// Sizes that bound a build.
@@ -30,6 +30,8 @@ impl Capacity {
 /// The arrays of a tree in device memory (SPEC 2.5), parts of one range.
 #[derive(Clone, Copy, Debug)]
 pub struct TreeMemory {
+    /// Which primitives a leaf lists.
+    pub lists: Lists,
     /// [`BuildStatus`]: what was built.
     pub status: BufferRef,
     /// [`Grid`] with the level of the leaves.
@@ -67,6 +69,7 @@ impl TreeMemory {
         // Leaves are not internal: what is left of the nodes bounds CO and the masks.
         let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
         Ok(Self {
+            lists: options.lists,
             status,
             grid,
             p: arena.words(u64::from(capacity.entries))?,
@@ -103,7 +106,8 @@ impl CountScratch {
     }
 }
 
-/// Scratch memory of the filter of `Planes` and `Exact`: two words per 32 candidates.
+/// Scratch memory of the filter that all but the paper's lists need: two words per 32 candidates, and for `Lists::Boundary` one bit per cell of the
+/// level of the leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterScratch {
     pub(crate) hits: BufferRef,
@@ -111,25 +115,29 @@ pub struct FilterScratch {
     pub(crate) entries: BufferRef,
     pub(crate) words: BufferRef,
     pub(crate) arguments: BufferRef,
+    pub(crate) marks: Option<BufferRef>,
     pub(crate) scan: ScanScratch,
 }
 
 impl FilterScratch {
-    /// For this many candidates; nothing for `Aabb`.
+    /// For the candidates and the level of `capacity`; nothing where every candidate is an entry.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
-    pub fn carve(gpu: &Gpu, arena: &mut Arena, assign: Assign, candidates: u32) -> Result<Option<Self>> {
-        if assign == Assign::Aabb {
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, options: &BuildOptions, capacity: &Capacity) -> Result<Option<Self>> {
+        if options.assign == Assign::Aabb && options.lists == Lists::All {
             return Ok(None);
         }
-        let words = candidates.div_ceil(32);
+        let words = capacity.candidates.div_ceil(32);
+        let cells = 8u64.pow(capacity.level);
+        let marks = if options.lists == Lists::Boundary { Some(arena.words(cells.div_ceil(32))?) } else { None };
         Ok(Some(Self {
             hits: arena.words(u64::from(words))?,
             counts: arena.words(u64::from(words))?,
             entries: arena.words(1)?,
             words: arena.words(1)?,
             arguments: arena.words(3)?,
+            marks,
             scan: ScanScratch::carve(gpu, arena, words)?,
         }))
     }

@@ -13,6 +13,10 @@ use crate::layout::{BuildStatus, Grid};
 use crate::options::BuildOptions;
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
 
+/// Steps of the filter's kernel.
+const MARK: u32 = 1;
+const LIST_MARKED: u32 = 2;
+
 /// A mesh as the stages see it.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshView {
@@ -63,7 +67,7 @@ pub(crate) fn cmd_count(r: &mut Recorder<'_>, mesh: &MeshView, grid: BufferRef, 
     })
 }
 
-/// Stage 2 of `Planes` and `Exact`: which candidates are entries; their number goes to `filter.entries`.
+/// Stage 2 of all but the paper's lists: which candidates are entries; their number goes to `filter.entries`.
 pub(crate) fn cmd_filter(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -78,6 +82,9 @@ pub(crate) fn cmd_filter(
     let candidates = scratch.candidates;
     r.stage("build.filter", |r| {
         let once = r.gpu().subgroup_size();
+        if let Some(marks) = filter.marks {
+            r.fill(marks, 0);
+        }
         let words = WordsOf { bits: candidates, words: filter.words, most: max_candidates };
         r.dispatch(&words, WordsOfSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
         r.barrier("filter.words → filter");
@@ -93,11 +100,21 @@ pub(crate) fn cmd_filter(
             candidates,
             hits: filter.hits,
             counts: filter.counts,
+            marks: filter.marks.unwrap_or_else(|| r.gpu().nothing()),
+            boundary: mesh.arrays.boundary,
+            neighbours: mesh.arrays.neighbours,
             tets,
             stride,
             capacity: max_candidates,
         };
-        r.dispatch(&arguments, FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() }, groups)?;
+        let spec = FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() };
+        if filter.marks.is_some() {
+            r.dispatch(&arguments, FilterSpec { step: MARK, ..spec }, groups)?;
+            r.barrier("codes.mark → codes.filter");
+            r.dispatch(&arguments, FilterSpec { step: LIST_MARKED, ..spec }, groups)?;
+        } else {
+            r.dispatch(&arguments, spec, groups)?;
+        }
         cmd_exclusive_scan(r, filter.counts, filter.counts, filter.entries, count, &filter.scan)
     })
 }

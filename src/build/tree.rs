@@ -46,7 +46,7 @@ impl Tree {
     /// [`Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
-        let tets = view.input.tets;
+        let (tets, lists) = (view.input.tets, options.lists);
         let mut stages = Vec::new();
 
         // Depth and counts: the level, and the number of candidates.
@@ -63,7 +63,7 @@ impl Tree {
         let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
 
         // Which candidates are entries.
-        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, options.assign, capacity.candidates))?;
+        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, options, &capacity))?;
         let (filter_buffer, filter) = filter_buffer;
         if let Some(filter) = &filter {
             let ((), time) =
@@ -78,8 +78,17 @@ impl Tree {
         let (sorted_buffer, sorted) = reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
         let entries = entries(&capacity, &counts, filter.as_ref());
         let nothing = gpu.nothing();
-        let mut memory =
-            TreeMemory { status, grid, p: entry_buffer.all(), po: nothing, co: nothing, flags: nothing, masks: nothing, boxes: None };
+        let mut memory = TreeMemory {
+            lists,
+            status,
+            grid,
+            p: entry_buffer.all(),
+            po: nothing,
+            co: nothing,
+            flags: nothing,
+            masks: nothing,
+            boxes: None,
+        };
         let ((), time) = gpu.run("olbvh.build.codes", |r| {
             cmd_codes(r, &view, &memory, &capacity, &counts, filter.as_ref(), &sorted)?;
             cmd_count_splits(r, status, grid, &capacity, entries, &sorted)
@@ -94,6 +103,7 @@ impl Tree {
             let (status, grid) = TreeMemory::carve_head(a)?;
             let (nodes, internal) = (u64::from(planned.nodes), u64::from(planned.internal));
             Ok(TreeMemory {
+                lists,
                 status,
                 grid,
                 p: entry_buffer.all(),
@@ -136,6 +146,7 @@ impl Tree {
         };
         Ok(TreeArrays {
             assign: self.options.assign,
+            lists: self.options.lists,
             grid: self.grid,
             p: self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?,
             po: words(self.memory.po, nodes + 1)?,

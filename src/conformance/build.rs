@@ -9,7 +9,7 @@ use crate::build::{BadCells, BuildScratch, Capacity, DeviceMesh, MeshView, Tree,
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::mesh::Mesh;
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::Arena;
 use crate::reference::boundary::{Topology, topology};
 use crate::tree::TreeArrays;
@@ -53,6 +53,7 @@ pub(crate) struct BuildCase {
     pub mesh: MeshRecipe,
     pub alpha: f32,
     pub assign: Assign,
+    pub lists: Lists,
     pub boxes: bool,
     pub way: Way,
     pub target: TargetKind,
@@ -61,7 +62,7 @@ pub(crate) struct BuildCase {
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase) -> Verdict {
     let mesh = case.mesh.mesh()?;
     let topology = topology(&mesh)?;
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, boxes: case.boxes, capacity: None };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, capacity: None };
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
     let expected = Expected::new(&mesh, &topology, &options, u32::MAX, 10)?;
     match case.way {
@@ -164,6 +165,7 @@ fn recorded(
         tree.boxes.map(|part| words(part, 6 * nodes).chunks_exact(6).map(|b| [0, 1, 2, 3, 4, 5].map(|i| f32::from_bits(b[i]))).collect());
     let found = TreeArrays {
         assign: options.assign,
+        lists: options.lists,
         grid: one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?,
         p: words(tree.p, n),
         po: words(tree.po, nodes + 1),

@@ -4,7 +4,7 @@ use super::build::{BuildCase, Way};
 use super::meshes::{MeshRecipe, recipes};
 use super::primitive_cases::push;
 use super::{Case, Group, TargetKind, Work};
-use crate::options::Assign;
+use crate::options::{Assign, Lists};
 
 /// α of the quick group, one per assignment so that all of them are seen, and the rest.
 const ALPHAS: [f32; 9] = [0.0, 0.3, 0.5, 1.0, 1.5, 2.0, 4.0, 7.0, 10.0];
@@ -21,7 +21,15 @@ pub(super) fn add(cases: &mut Vec<Case>) {
 }
 
 fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    let case = BuildCase { mesh, alpha: 0.0, assign: Assign::Aabb, boxes: false, way: Way::Recorded, target: TargetKind::Device };
+    let case = BuildCase {
+        mesh,
+        alpha: 0.0,
+        assign: Assign::Aabb,
+        lists: Lists::All,
+        boxes: false,
+        way: Way::Recorded,
+        target: TargetKind::Device,
+    };
     for (i, assign) in Assign::ALL.into_iter().enumerate() {
         let case = BuildCase { assign, ..case };
         // Quick: the record-only layer with boxes at α = 0, ours at a larger α.

@@ -3,10 +3,11 @@
 use super::failure::Verdict;
 use crate::layout::BuildStatus;
 use crate::mesh::Mesh;
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::reference::boundary::Topology;
 use crate::reference::codes::Stage;
 use crate::reference::depth::{Sizes, measure};
+use crate::reference::marks::Marks;
 use crate::reference::vertices::Vertices;
 use crate::tree::TreeArrays;
 
@@ -50,13 +51,15 @@ impl Expected {
         grid.level = chosen;
         let tree = tree_at(mesh, topology, options, chosen, &sizes)?;
 
-        let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: Assign::Aabb };
+        let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: Assign::Aabb, marks: None };
         let mut offsets = vec![0];
         offsets.extend(stage.count().iter().scan(0u32, |sum, n| {
             *sum += n;
             Some(*sum)
         }));
         let stage = Stage { assign: options.assign, ..stage };
+        let marks = (options.lists == Lists::Boundary).then(|| Marks::new(&stage));
+        let stage = Stage { marks: marks.as_ref(), ..stage };
         let codes = stage.emit(&stage.count())?.sorted(chosen).codes;
 
         status.level = chosen;

@@ -102,7 +102,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
     let tree = Tree::build(gpu, &device, &options)?;
     let host = build(&mesh, &topology, &options)?;
-    let locator = Locator::new(&mesh, &host);
+    let locator = Locator::new(&mesh, &topology, &host);
     let (points, inside) = points(&mesh);
     let expected = locator.locate_all(&points);
     let quiet: &dyn Fn(u64, u64) = &|_, _| {};

@@ -75,8 +75,8 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
         return Err(Error::Invalid(format!("points {stride} floats apart; a point has three")));
     }
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
-    let (cells, vertices) = (scene.mesh.input.cells, scene.mesh.arrays.vertices);
-    let workgroup = r.gpu().target().each;
+    let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
+    let (workgroup, lists) = (r.gpu().target().each, scene.tree.lists as u32);
     let groups = Groups::Count(count.div_ceil(workgroup));
     r.stage("query.locate", |r| {
         if let Path::Traversal(stack) = options.path {
@@ -92,14 +92,15 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 points,
                 owners,
                 barycentrics,
+                neighbours,
                 count,
                 stride,
                 tolerance,
             };
-            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), ..Default::default() }, groups);
+            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() }, groups);
         }
         let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
-        let spec = LocateSpec { workgroup, hints: u32::from(hints.is_some()), slice: SLICE, ..Default::default() };
+        let spec = LocateSpec { workgroup, hints: u32::from(hints.is_some()), slice: SLICE, lists, ..Default::default() };
         let hints = hints.unwrap_or_else(|| r.gpu().nothing());
         for slice in 0..slices {
             if slice > 0 {
@@ -119,6 +120,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 hints,
                 owners,
                 barycentrics,
+                neighbours,
                 count,
                 stride,
                 slice,
@@ -232,8 +234,8 @@ pub fn locate_all(
     let gpu = tree.gpu();
     let scene = Scene::new(mesh, tree);
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
-    let (cells, vertices) = (scene.mesh.input.cells, scene.mesh.arrays.vertices);
-    let workgroup = gpu.target().each;
+    let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
+    let (workgroup, lists) = (gpu.target().each, scene.tree.lists as u32);
     let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {
@@ -258,6 +260,7 @@ pub fn locate_all(
                     owners,
                     places,
                     found,
+                    neighbours,
                     count,
                     stride: 3,
                     slice,
@@ -265,7 +268,7 @@ pub fn locate_all(
                 };
                 r.dispatch(
                     &arguments,
-                    LocateAllSpec { workgroup, fill, slice: SLICE, ..Default::default() },
+                    LocateAllSpec { workgroup, fill, slice: SLICE, lists, ..Default::default() },
                     Groups::Count(count.div_ceil(workgroup)),
                 )?;
                 r.barrier("locate_all.slice → next");

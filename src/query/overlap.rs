@@ -16,7 +16,7 @@ use crate::kernels::{
     OverlapUsed, OverlapUsedSpec,
 };
 use crate::layout::{NodeFrame, OverlapStatus, SearchState};
-use crate::options::Assign;
+use crate::options::{Assign, Lists};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::reference::overlap::{Effort, Overlap, joint_grid, members, node_frame};
 
@@ -362,8 +362,12 @@ impl Job<'_> {
 /// primitives that need a search are done.
 ///
 /// # Errors
-/// [`Error::Memory`], [`Error::TooLarge`] for more pairs than 32 bits count, or a failed Vulkan call.
+/// [`Error::Memory`], [`Error::TooLarge`] for more pairs than 32 bits count, a failed Vulkan call, or [`Error::Invalid`] for pairs in a tree without
+/// the lists that they are found by.
 pub fn overlap(a: Party<'_>, b: Party<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+    if pairs && b.tree.options().lists != Lists::All {
+        return Err(Error::Invalid("pairs of cells need a tree with all lists over the second mesh".into()));
+    }
     let gpu = a.tree.gpu();
     let valid = [a, b].map(|p| p.mesh.input().tets > p.mesh.status().bad);
     let mut done = Overlapped { overlap: Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() }, ..Overlapped::default() };

@@ -94,7 +94,7 @@ fn cmd_locate_voxels(r: &mut Recorder<'_>, scene: &Scene, memory: &SliceMemory, 
         budget: LOCATE_BUDGET,
         tolerance: TOLERANCE,
     };
-    let spec = SliceLocateSpec { workgroup, run: RUN, walk: WALK, ..Default::default() };
+    let spec = SliceLocateSpec { workgroup, run: RUN, walk: WALK, lists: tree.lists as u32, ..Default::default() };
     let items = part.rows.count * part.width.div_ceil(RUN);
     r.stage("query.slice_locate", |r| r.dispatch(&arguments, spec, Groups::Count(items.div_ceil(workgroup))))
 }

@@ -116,7 +116,7 @@ fn cmd_march(r: &mut Recorder<'_>, scene: &Scene, canvas: &Canvas, field: Buffer
         budget: BUDGET,
     };
     let (shading, on_cells) = (u32::from(normals.is_some()), u32::from(on == On::Cells));
-    let spec = VolumeMarchSpec { workgroup, shading, on_cells, ..Default::default() };
+    let spec = VolumeMarchSpec { workgroup, shading, on_cells, lists: tree.lists as u32, ..Default::default() };
     r.stage("query.march", |r| r.dispatch(&arguments, spec, Groups::Count(canvas.items.div_ceil(workgroup))))
 }
 

@@ -2,11 +2,12 @@
 
 use super::boundary::Topology;
 use super::codes::Stage;
+use super::marks::Marks;
 use super::vertices::Vertices;
 use super::{depth, leaves, levels};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;
 
 /// Builds the tree over the valid cells of `mesh`, whose topology is `topology` (see [`super::boundary::topology`], which is stage 0: bounds and
@@ -28,7 +29,9 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     grid.level = sizes.level(options)?;
 
     // Stage 2: calculate and sort the Morton codes of the primitives.
-    let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: options.assign };
+    let all = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: options.assign, marks: None };
+    let marks = (options.lists == Lists::Boundary).then(|| Marks::new(&all));
+    let stage = Stage { marks: marks.as_ref(), ..all };
     let counts = stage.count();
     let entries = stage.emit(&counts)?.sorted(grid.level);
 
@@ -41,5 +44,5 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let mask = levels::masks(&splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    Ok(TreeArrays { assign: options.assign, grid, p, po, co, no, boundary, mask, boxes })
+    Ok(TreeArrays { assign: options.assign, lists: options.lists, grid, p, po, co, no, boundary, mask, boxes })
 }

@@ -1,10 +1,12 @@
 //! Stage 2: which cells a primitive lies in, as Morton codes, and their order (SPEC 2.2, the paper's Eq. 6). Twin of `glsl/build/2*`.
 
-use super::assign::Filter;
+use super::assign::{Filter, cell_centre, half_cell};
 use super::boundary::Topology;
 use super::grid::{Grid, morton};
+use super::marks::{Marks, owns_centre};
 use super::sort::sort_pairs;
 use super::vertices::Vertices;
+use super::walk::Walker;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::Assign;
@@ -35,21 +37,40 @@ pub struct Stage<'a> {
     pub grid: &'a Grid,
     /// The assignment.
     pub assign: Assign,
+    /// Under `Lists::Boundary`, the cells that the boundary touches.
+    pub marks: Option<&'a Marks>,
 }
 
 impl Stage<'_> {
     /// The cells of primitive `tet` in candidate order; none if it is bad.
-    pub fn each_cell(&self, tet: u32, mut visit: impl FnMut([u32; 3])) {
+    pub fn each_cell(&self, tet: u32, visit: impl FnMut([u32; 3])) {
         if !self.topology.is_valid(tet) {
             return;
         }
-        let ids = self.mesh.tets[tet as usize];
-        let cells = self.vertices.cells(ids, self.grid.level).iter();
-        if self.assign == Assign::Aabb {
+        let cells = self.vertices.cells(self.mesh.tets[tet as usize], self.grid.level).iter();
+        if self.boxes() {
             cells.for_each(visit);
         } else {
-            let filter = Filter::new(&self.vertices.tet(ids), self.grid, self.grid.level, self.assign);
-            cells.filter(|&cell| filter.touches(cell)).for_each(&mut visit);
+            let listed = self.lists(tet);
+            cells.filter(|&cell| listed(cell)).for_each(visit);
+        }
+    }
+
+    /// Whether every cell of a primitive's box lists it.
+    fn boxes(&self) -> bool {
+        self.assign == Assign::Aabb && self.marks.is_none()
+    }
+
+    /// Which of the cells of its box list the valid primitive `tet`.
+    pub fn lists(&self, tet: u32) -> impl Fn([u32; 3]) -> bool {
+        let primitive = self.vertices.tet(self.mesh.tets[tet as usize]);
+        let filter = Filter::new(&primitive, self.grid, self.grid.level, self.assign);
+        let half = half_cell(self.grid, self.grid.level);
+        let walker = Walker { mesh: self.mesh, neighbours: &self.topology.neighbours, normalised: &self.vertices.normalised };
+        let inner = !self.topology.is_boundary(tet);
+        move |cell| match self.marks {
+            Some(marks) if !marks.contains(cell) => inner && owns_centre(&walker, tet, &primitive, cell_centre(half, cell)),
+            _ => filter.touches(cell),
         }
     }
 
@@ -57,7 +78,7 @@ impl Stage<'_> {
     pub fn count(&self) -> Vec<u32> {
         let count = |tet: usize| {
             let mut n = 0;
-            if self.assign == Assign::Aabb && self.topology.is_valid(tet as u32) {
+            if self.boxes() && self.topology.is_valid(tet as u32) {
                 n = self.vertices.cells(self.mesh.tets[tet], self.grid.level).count();
             } else {
                 self.each_cell(tet as u32, |_| n += 1);

@@ -1,9 +1,12 @@
-//! Point location over lists: every point has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
+//! Point location over lists and by walking: every point has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
 
-use super::boundary::NONE;
+use super::assign::{cell_centre, half_cell};
+use super::boundary::{NONE, Topology};
+use super::candidates::Best;
 use super::grid::{Grid, MAX_LEVEL, canonical, morton};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
+use super::walk::{HINTED, Room, Walked, Walker};
 use crate::mesh::{Field, Mesh, On};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
@@ -43,23 +46,16 @@ pub fn place(grid: &Grid, p: [f32; 3]) -> Option<([u32; 3], Vec3)> {
 pub struct Locator<'a> {
     mesh: &'a Mesh,
     tree: &'a TreeArrays,
+    neighbours: &'a [[u32; 4]],
     normalised: Vec<Vec3>,
     tolerance: f32,
 }
 
-/// The best of several cells none of which contains the point.
-struct Nearest {
-    owner: u32,
-    in_box: bool,
-    smallest: f32,
-    barycentric: [f32; 4],
-}
-
 impl<'a> Locator<'a> {
-    /// Prepares queries with the default tolerance. `tree` must have been built over `mesh`.
-    pub fn new(mesh: &'a Mesh, tree: &'a TreeArrays) -> Self {
+    /// Prepares queries with the default tolerance. `topology` and `tree` must be those of `mesh`.
+    pub fn new(mesh: &'a Mesh, topology: &'a Topology, tree: &'a TreeArrays) -> Self {
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Self { mesh, tree, normalised, tolerance: TOLERANCE }
+        Self { mesh, tree, neighbours: &topology.neighbours, normalised, tolerance: TOLERANCE }
     }
 
     /// The same with another tolerance (see [`TOLERANCE`]).
@@ -70,33 +66,40 @@ impl<'a> Locator<'a> {
 
     /// The owner of `p`: of the primitives listed in the point's leaf, the lowest id that contains it. If none does, the nearest: one whose box
     /// holds the point before others, then the largest smallest barycentric coordinate, then the lowest id, flat cells never; in a boundary
-    /// leaf only if that coordinate reaches −tolerance.
+    /// leaf only if that coordinate reaches −tolerance. In a leaf without list (SPEC 2.6) a walk finds the same.
     pub fn locate(&self, p: [f32; 3]) -> Location {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
-        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, x))
+        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x, NONE))
     }
 
     /// As [`Locator::locate`], but first looks whether `hint` (any number, such as the owner of the last point) contains the point clearly (see
     /// [`Weights::clear`]), and if so takes it: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
-        let usable = |t: &&[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.normalised.len() && !t[..i].contains(&v));
-        if let (Some((_, x)), Some(&ids)) = (place(&self.tree.grid, p), self.mesh.tets.get(hint as usize).filter(usable)) {
-            let tet = Tet::new(ids, &self.normalised);
-            let weights = tet.weights(x);
-            if weights.clear {
-                return Location { owner: hint, barycentric: weights.barycentric(tet.rank) };
-            }
+        let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.normalised.len() && !t[..i].contains(&v));
+        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
+        let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };
+        if hint != NONE && self.weights(hint, x).1.clear {
+            return self.location(hint, x);
         }
-        self.locate(p)
+        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x, hint))
     }
 
     /// Every primitive that contains `p`, ascending; if none does, the owner alone.
     pub fn owners(&self, p: [f32; 3]) -> Vec<u32> {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Vec::new() };
         let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };
-        let inside = |&&t: &&u32| self.weights(t, x).1.inside;
-        let owners: Vec<u32> = self.tree.primitives(leaf).iter().filter(inside).copied().collect();
-        if owners.is_empty() { self.in_leaf(leaf, x).found().into_iter().collect() } else { owners }
+        let mut owners = Vec::new();
+        if self.tree.seed(leaf).is_some() {
+            let owner = self.in_leaf(leaf, cell, x, NONE).owner;
+            self.walker().star(owner, x, |t, _, weights| {
+                owners.extend(weights.inside.then_some(t));
+                false
+            });
+            owners.sort_unstable();
+        } else {
+            owners.extend(self.tree.primitives(leaf).iter().filter(|&&t| self.weights(t, x).1.inside));
+        }
+        if owners.is_empty() { self.in_leaf(leaf, cell, x, NONE).found().into_iter().collect() } else { owners }
     }
 
     /// As [`Locator::locate`], through the paper's traversal with a stack of `stack` nodes instead of the descent.
@@ -106,7 +109,7 @@ impl<'a> Locator<'a> {
         let holds = |node: Node| node.code == code >> (3 * (MAX_LEVEL - node.level));
         let mut location = Location::NOWHERE;
         traverse_leaves(self.tree, stack, holds, |leaf| {
-            location = self.in_leaf(leaf.index, x);
+            location = self.in_leaf(leaf.index, cell, x, NONE);
             ControlFlow::Break(())
         });
         location
@@ -134,21 +137,55 @@ impl<'a> Locator<'a> {
         (tet, tet.weights(x))
     }
 
-    /// The owner among the primitives of a leaf.
-    fn in_leaf(&self, leaf: u32, x: Vec3) -> Location {
-        let mut best: Option<Nearest> = None;
+    fn walker(&self) -> Walker<'_> {
+        Walker { mesh: self.mesh, neighbours: self.neighbours, normalised: &self.normalised }
+    }
+
+    fn location(&self, owner: u32, x: Vec3) -> Location {
+        let (tet, weights) = self.weights(owner, x);
+        Location { owner, barycentric: weights.barycentric(tet.rank) }
+    }
+
+    /// The walk to a point, if its leaf is one to walk through: what [`Locator::locate`] does there.
+    pub fn walk(&self, p: [f32; 3]) -> Option<Walked> {
+        let (cell, x) = place(&self.tree.grid, p)?;
+        let seed = self.tree.seed(self.tree.find_leaf(cell)?)?;
+        Some(self.walker().walk(seed, &self.room(cell), x))
+    }
+
+    /// The cell of a leaf, from one of its finest cells.
+    fn room(&self, finest: [u32; 3]) -> Room {
+        let (grid, level) = (&self.tree.grid, self.tree.grid.level);
+        let half = half_cell(grid, level);
+        Room { centre: cell_centre(half, finest.map(|q| q >> (MAX_LEVEL - level))), half }
+    }
+
+    /// The owner among the primitives of a leaf, listed or not.
+    fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3, hint: u32) -> Location {
+        let best = if let Some(seed) = self.tree.seed(leaf) {
+            let mut hinted = Walked::default();
+            if hint != NONE && self.walker().towards(hint, x, HINTED, &mut hinted) {
+                hinted.best
+            } else {
+                self.walker().walk(seed, &self.room(finest), x).best
+            }
+        } else {
+            self.listed(leaf, x)
+        };
+        let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
+        if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
+    }
+
+    /// The best of a leaf's list, up to the first that contains x.
+    fn listed(&self, leaf: u32, x: Vec3) -> Best {
+        let mut best = Best::NONE;
         for &t in self.tree.primitives(leaf) {
             let (tet, weights) = self.weights(t, x);
-            if weights.inside {
-                return Location { owner: t, barycentric: weights.barycentric(tet.rank) };
-            }
-            let (in_box, smallest) = (weights.in_box, weights.smallest());
-            let better = best.as_ref().is_none_or(|b| (in_box && !b.in_box) || (in_box == b.in_box && smallest > b.smallest));
-            if better && tet.volume() != 0.0 {
-                best = Some(Nearest { owner: t, in_box, smallest, barycentric: weights.barycentric(tet.rank) });
+            best.consider(t, &tet, &weights);
+            if best.inside {
+                break;
             }
         }
-        let close = |b: &Nearest| !self.tree.is_boundary(leaf) || b.smallest >= -self.tolerance;
-        best.filter(close).map_or(Location::NOWHERE, |b| Location { owner: b.owner, barycentric: b.barycentric })
+        best
     }
 }

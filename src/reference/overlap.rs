@@ -307,7 +307,7 @@ impl Effort {
     }
 }
 
-/// Overlap of A and B, with all pairs if `pairs`. The trees must have been built over these meshes.
+/// Overlap of A and B, with all pairs if `pairs`. The trees must have been built over these meshes, that of B with `Lists::All` if pairs are wanted.
 pub fn overlap(a: Side, b: Side, pairs: bool) -> Overlap {
     let mut overlap = Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() };
     let valid = [a, b].map(|s| s.topology.valid_cells() > 0);

@@ -53,7 +53,7 @@ impl<'a> Slicer<'a> {
     ) -> Result<Self> {
         let plan = voxels.plan(&tree.grid)?;
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Ok(Self { mesh, topology, tree, locator: Locator::new(mesh, tree), normalised, field, extrapolate, voxels, plan })
+        Ok(Self { mesh, topology, tree, locator: Locator::new(mesh, topology, tree), normalised, field, extrapolate, voxels, plan })
     }
 
     /// The voxels of these rows.

@@ -46,8 +46,10 @@ pub struct Weights {
     pub in_box: bool,
     /// No face says outside, the box agrees, the cell is not flat: the closed cell holds the point.
     pub inside: bool,
-    /// Inside by so much (2^-16 of the box's volume) that rounding cannot put the point into a neighbour as well: in a mesh whose cells do not
-    /// overlap, this cell is the owner.
+    /// 2^-16 of the box's volume: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+    pub margin: f32,
+    /// Inside by more than the margin, so that rounding cannot put the point into a neighbour as well: in a mesh whose cells do not overlap, this
+    /// cell is the owner.
     pub clear: bool,
 }
 
@@ -79,12 +81,17 @@ impl Tet {
         let least = w[0].min(w[1]).min(w[2].min(w[3]));
         let inside = in_box && self.volume() != 0.0 && least >= 0.0;
         let size = sub(hi, lo);
-        let clear = inside && least > ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
-        Weights { w, sum: (w[0] + w[1]) + (w[2] + w[3]), in_box, inside, clear }
+        let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
+        Weights { w, sum: (w[0] + w[1]) + (w[2] + w[3]), in_box, inside, margin, clear: inside && least > margin }
     }
 }
 
 impl Weights {
+    /// Whether no face says outside by more than the margin.
+    pub fn near(&self) -> bool {
+        self.w.iter().all(|&w| w >= -self.margin)
+    }
+
     /// Smallest barycentric coordinate; −∞ (as `f32::MIN`) for a flat cell.
     pub fn smallest(&self) -> f32 {
         if self.sum <= 0.0 {

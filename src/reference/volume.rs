@@ -67,7 +67,7 @@ impl<'a> Scene<'a> {
         let valid = |tet: usize| topology.is_valid(tet as u32);
         let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Ok(Self { mesh, topology, tree, field, normalised, prepared, locator: Locator::new(mesh, tree).with_tolerance(0.0) })
+        Ok(Self { mesh, topology, tree, field, normalised, prepared, locator: Locator::new(mesh, topology, tree).with_tolerance(0.0) })
     }
 
     /// What is drawn.

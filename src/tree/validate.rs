@@ -3,13 +3,13 @@
 use super::{TreeArrays, TreeStats};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::options::Assign;
-use crate::reference::assign::Filter;
+use crate::options::Lists;
 use crate::reference::boundary::Topology;
 use crate::reference::codes::Stage;
 use crate::reference::grid::{MAX_LEVEL, unmorton};
 use crate::reference::leaves::{cell_box, flag};
 use crate::reference::levels::union;
+use crate::reference::marks::Marks;
 use crate::reference::vertices::Vertices;
 use rayon::prelude::*;
 
@@ -146,6 +146,9 @@ impl TreeArrays {
     /// duplicates, as often as there are pairs, is every pair once.
     fn check_lists(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let vertices = Vertices::new(mesh, &self.grid);
+        let all = Stage { mesh, topology, vertices: &vertices, grid: &self.grid, assign: self.assign, marks: None };
+        let marks = (self.lists == Lists::Boundary).then(|| Marks::new(&all));
+        let stage = Stage { marks: marks.as_ref(), ..all };
         let check = |leaf: u32| -> Rule {
             let (slots, cell) = (self.entries(leaf), unmorton(codes[leaf as usize]));
             let list = &self.p[slots.clone()];
@@ -154,15 +157,12 @@ impl TreeArrays {
                 rule(topology.is_valid(p), || format!("{}: no valid cell of the mesh", at()))?;
                 rule(i == 0 || list[i - 1] < p, || format!("{}: not above the {} before it", at(), list[i - 1]))?;
                 let ids = mesh.tets[p as usize];
-                let inside = vertices.cells(ids, self.grid.level).contains(cell);
-                let kept = || Filter::new(&vertices.tet(ids), &self.grid, self.grid.level, self.assign).touches(cell);
-                let belongs = inside && (self.assign == Assign::Aabb || kept());
+                let belongs = vertices.cells(ids, self.grid.level).contains(cell) && stage.lists(p)(cell);
                 rule(belongs, || format!("{}: by the assignment {} it does not belong there", at(), self.assign))?;
             }
             Ok(())
         };
         self.leaves().into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)?;
-        let stage = Stage { mesh, topology, vertices: &vertices, grid: &self.grid, assign: self.assign };
         let pairs: u64 = stage.count().into_par_iter().map(u64::from).sum();
         let n_m = self.p.len();
         rule(pairs == n_m as u64, || format!("P has {n_m} entries, the assignment {} makes {pairs}", self.assign))

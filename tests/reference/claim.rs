@@ -18,7 +18,7 @@ fn unflagged_leaves_are_inside() {
     for assign in Assign::ALL {
         for alpha in [0.0, 1.0, 2.0] {
             let tree = tree(&mesh, &topology, alpha, assign);
-            let locator = Locator::new(&mesh, &tree);
+            let locator = Locator::new(&mesh, &topology, &tree);
             let mut random = Random(3);
             let (mut wrong, mut outside) = (0, 0);
             for _ in 0..20_000 {

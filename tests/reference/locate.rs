@@ -34,7 +34,7 @@ fn owners_are_those_of_brute_force() {
         for alpha in [0.0, 1.0, 2.0, 4.0] {
             for assign in Assign::ALL {
                 let tree = tree(&mesh, &topology, alpha, assign);
-                let locator = Locator::new(&mesh, &tree);
+                let locator = Locator::new(&mesh, &topology, &tree);
                 points.par_iter().zip(&expected).for_each(|(&p, expected)| {
                     let found = locator.locate(p);
                     let owners = locator.owners(p);
@@ -79,7 +79,7 @@ fn no_point_of_a_mesh_is_lost() {
         for assign in Assign::ALL {
             let tree = tree(&mesh, &topology, alpha, assign);
             let some: Vec<[f32; 3]> = points.iter().copied().step_by(part).collect();
-            let found = Locator::new(&mesh, &tree).locate_all(&some);
+            let found = Locator::new(&mesh, &topology, &tree).locate_all(&some);
             for (p, location) in some.iter().zip(&found) {
                 assert_ne!(location.owner, NONE, "α {alpha} {assign}: {p:?} is lost");
             }
@@ -109,7 +109,7 @@ fn the_owner_does_not_depend_on_the_order_of_vertices() {
     let (turned, turned_topology) = prepared(turned);
     let (a, b) = (tree(&mesh, &topology, 0.0, Assign::Exact), tree(&turned, &turned_topology, 0.0, Assign::Exact));
     assert_eq!(a, b);
-    let (a, b) = (Locator::new(&mesh, &a), Locator::new(&turned, &b));
+    let (a, b) = (Locator::new(&mesh, &topology, &a), Locator::new(&turned, &turned_topology, &b));
     for p in points(&mesh, &topology, 3000, 2) {
         let (a, b) = (a.locate(p), b.locate(p));
         let [w, x, y, z] = b.barycentric;
@@ -121,7 +121,7 @@ fn the_owner_does_not_depend_on_the_order_of_vertices() {
 fn points_outside_are_nowhere_and_the_tolerance_is_kept() {
     let (mesh, topology) = prepared(kuhn([4; 3]).unwrap());
     let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
-    let locator = Locator::new(&mesh, &tree);
+    let locator = Locator::new(&mesh, &topology, &tree);
     for p in [[-0.001, 2.0, 2.0], [2.0, 4.001, 2.0], [2.0, 2.0, 9.0], [-100.0, 0.0, 0.0], [f32::NAN, 1.0, 1.0], [1.0, 1.0, f32::INFINITY]] {
         assert_eq!(locator.locate(p), Location::NOWHERE, "{p:?}");
         assert!(locator.owners(p).is_empty() && locator.locate_by_traversal(p, 8) == Location::NOWHERE);
@@ -139,7 +139,7 @@ fn points_outside_are_nowhere_and_the_tolerance_is_kept() {
 fn a_hint_gives_the_owner() {
     let (mesh, topology) = prepared(kuhn_jittered([5; 3], 0.15, 3).unwrap());
     let tree = tree(&mesh, &topology, 1.0, Assign::Planes);
-    let locator = Locator::new(&mesh, &tree);
+    let locator = Locator::new(&mesh, &topology, &tree);
     let mut random = Random(8);
     let mut last = NONE;
     for p in points(&mesh, &topology, 5000, 6) {
@@ -154,7 +154,7 @@ fn a_hint_gives_the_owner() {
     // Cells that are bad are no hints.
     let (mesh, topology) = prepared(cases().unwrap().into_iter().find(|c| c.name == "bad-some").unwrap().mesh);
     let tree = super::tree(&mesh, &topology, 0.0, Assign::Aabb);
-    let locator = Locator::new(&mesh, &tree);
+    let locator = Locator::new(&mesh, &topology, &tree);
     for hint in 0..12 {
         assert_eq!(locator.locate_near([0.1, 0.1, 0.1], hint).owner, 0);
     }
@@ -168,7 +168,7 @@ fn values_are_interpolated() {
     mesh.fields.push(Field { name: "id".into(), on: On::Cells, values: (0..mesh.tets.len()).map(|t| t as f32).collect() });
     mesh.fields.push(Field { name: "short".into(), on: On::Points, values: Vec::new() });
     let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
-    let locator = Locator::new(&mesh, &tree);
+    let locator = Locator::new(&mesh, &topology, &tree);
     let mut random = Random(4);
     for _ in 0..2000 {
         let p = [0; 3].map(|_| random.next() * 5.0);

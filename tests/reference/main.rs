@@ -5,6 +5,7 @@ mod assign;
 mod boundary;
 mod build;
 mod claim;
+mod lists;
 mod locate;
 mod oracle;
 mod overlap;
@@ -22,7 +23,7 @@ use olbvh::tree::TreeArrays;
 const ALPHAS: [f32; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 7.25, 10.0];
 
 fn options(alpha: f32, assign: Assign) -> BuildOptions {
-    BuildOptions { alpha, assign, boxes: true, capacity: None }
+    BuildOptions { alpha, assign, boxes: true, ..BuildOptions::default() }
 }
 
 fn tree(mesh: &Mesh, topology: &Topology, alpha: f32, assign: Assign) -> TreeArrays {

@@ -58,7 +58,7 @@ fn check(name: &str, mesh: &Mesh, topology: &Topology, tree: &TreeArrays, voxels
     // Far from 0 the centre of a voxel is as coarse as the coordinates there.
     let slack = 4e-6 * (size + extent);
     let half = voxels.half.map(wide);
-    let locator = Locator::new(mesh, tree);
+    let locator = Locator::new(mesh, topology, tree);
     let [w, h] = voxels.size;
     let tets: Vec<(u32, [P; 4])> = (0..)
         .zip(&mesh.tets)

@@ -73,7 +73,7 @@ fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
         "tree": {
-            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
+            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
             "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
         },
@@ -124,7 +124,13 @@ fn page(args: &Args, device: &str, loaded: &Loaded, s: &Summary, verbose: bool) 
         let range = f.range().map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
         page.row(&f.name, format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
     }
-    page.section(&format!("Tree (alpha {}, {}), built in {} on {device}", args.tree.alpha, args.tree.assign, milliseconds(s.build_ms)));
+    page.section(&format!(
+        "Tree (alpha {}, {}, lists {}), built in {} on {device}",
+        args.tree.alpha,
+        args.tree.assign,
+        args.tree.lists,
+        milliseconds(s.build_ms)
+    ));
     page.row("level of the leaves, l", s.level);
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));

@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use olbvh::formats::{LoadOptions, Loaded, load};
 use olbvh::mesh::{Field, Mesh, On};
-use olbvh::options::{Assign, BuildOptions};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use std::path::Path;
 
 /// How a tree is built.
@@ -16,12 +16,16 @@ pub struct TreeArgs {
     /// build. Answers are the same.
     #[arg(long, default_value = "aabb", value_name = "aabb|planes|exact")]
     pub assign: Assign,
+    /// Which tetrahedra a leaf lists: all of them, as in the paper; or all where the surface is and elsewhere one, from which points are walked to.
+    /// Answers are the same.
+    #[arg(long, default_value_t = BuildOptions::default().lists, value_name = "all|boundary")]
+    pub lists: Lists,
 }
 
 impl TreeArgs {
     /// The options of a build, checked.
     pub fn options(&self, boxes: bool) -> Outcome<BuildOptions> {
-        let options = BuildOptions { alpha: self.alpha, assign: self.assign, boxes, ..BuildOptions::default() };
+        let options = BuildOptions { alpha: self.alpha, assign: self.assign, lists: self.lists, boxes, ..BuildOptions::default() };
         options.alpha_fixed()?;
         Ok(options)
     }

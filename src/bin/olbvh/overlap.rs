@@ -10,6 +10,7 @@ use glam::{DQuat, DVec3};
 use olbvh::error::Error;
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
+use olbvh::options::Lists;
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -49,7 +50,10 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu])?;
-    let options = args.tree.options(false)?;
+    let mut options = args.tree.options(false)?;
+    if args.pairs {
+        options.lists = Lists::All; // pairs are found by lists
+    }
     let engine = engine::open(common.device.as_deref())?;
     let a = input::mesh(&args.a, common)?.mesh;
     let mut b = input::mesh(&args.b, common)?.mesh;

@@ -76,7 +76,7 @@ impl Built for CpuTree<'_> {
     }
 
     fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>> {
-        let locator = Locator::new(self.mesh, &self.tree).with_tolerance(tolerance);
+        let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(tolerance);
         let one = |p: [f32; 3]| {
             let location = locator.locate(p);
             let value = field.map_or(f32::NAN, |field| locator.value(field, &location));
@@ -86,7 +86,7 @@ impl Built for CpuTree<'_> {
     }
 
     fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {
-        let locator = Locator::new(self.mesh, &self.tree).with_tolerance(tolerance);
+        let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(tolerance);
         Ok(each(points, |p| locator.owners(p), report))
     }
 

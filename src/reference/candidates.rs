@@ -1,0 +1,50 @@
+//! Candidates for the owner of a point (SPEC 3.1). Twin of `glsl/shared/candidates.glsl`.
+
+use super::boundary::NONE;
+use super::tet::{Tet, Weights};
+
+/// The best of the candidates so far.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Best {
+    /// Its id, or [`NONE`].
+    pub owner: u32,
+    /// Whether it contains the point.
+    pub inside: bool,
+    /// Whether its box does.
+    pub in_box: bool,
+    /// Its smallest barycentric coordinate, unless it contains the point.
+    pub smallest: f32,
+}
+
+impl Default for Best {
+    fn default() -> Self {
+        Self::NONE
+    }
+}
+
+impl Best {
+    /// None yet.
+    pub const NONE: Self = Self { owner: NONE, inside: false, in_box: false, smallest: f32::MIN };
+
+    /// The candidate that contains the point.
+    pub fn inside(owner: u32) -> Self {
+        Self { owner, inside: true, in_box: true, smallest: 0.0 }
+    }
+
+    /// Takes candidate `t` if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the
+    /// largest smallest barycentric coordinate, then the lowest id. Flat cells never.
+    pub fn consider(&mut self, t: u32, tet: &Tet, weights: &Weights) {
+        if weights.inside {
+            if !self.inside || t < self.owner {
+                *self = Self::inside(t);
+            }
+            return;
+        }
+        let (in_box, smallest) = (weights.in_box, weights.smallest());
+        let closer = smallest > self.smallest || (smallest == self.smallest && t < self.owner);
+        let better = self.owner == NONE || (in_box && !self.in_box) || (in_box == self.in_box && closer);
+        if !self.inside && better && tet.volume() != 0.0 {
+            *self = Self { owner: t, inside: false, in_box, smallest };
+        }
+    }
+}

@@ -1,0 +1,229 @@
+//! `Lists::Boundary` on the device: trees and answers are the reference's to the bit, and the answers those of `Lists::All`.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::mesh::cases::cases;
+use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::query::{LocateOptions, LocateOutput, Party, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice};
+use olbvh::reference::boundary::{NONE, Topology, topology};
+use olbvh::reference::build::build;
+use olbvh::reference::locate::{Location, Locator};
+use olbvh::reference::slice::Slicer;
+use olbvh::reference::volume;
+use olbvh::render::RenderSettings;
+use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
+use olbvh::tree::TreeArrays;
+
+const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
+
+fn options(alpha: f32, assign: Assign, lists: Lists) -> BuildOptions {
+    BuildOptions { alpha, assign, lists, ..BuildOptions::default() }
+}
+
+/// A mesh, its topology, and the same on a device.
+struct Subject {
+    name: String,
+    mesh: Mesh,
+    topology: Topology,
+    device: DeviceMesh,
+}
+
+impl Subject {
+    fn new(gpu: &Gpu, name: &str, mesh: Mesh) -> Self {
+        let (topology, device) = (topology(&mesh).unwrap(), DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap());
+        Self { name: name.into(), mesh, topology, device }
+    }
+
+    /// The tree that the reference builds, after a look whether the device builds the same.
+    fn tree(&self, gpu: &Gpu, options: &BuildOptions) -> (Tree, TreeArrays) {
+        let tree = Tree::build(gpu, &self.device, options).unwrap();
+        let expected = build(&self.mesh, &self.topology, options).unwrap();
+        let found = tree.download().unwrap();
+        assert_eq!(expected.grid, found.grid, "{} {options:?}", self.name);
+        assert_eq!(expected.p, found.p, "{} {options:?}", self.name);
+        assert_eq!(expected, found, "{} {options:?}", self.name);
+        (tree, expected)
+    }
+
+    fn points(&self, n: usize) -> Vec<[f32; 3]> {
+        let mut state = 7u32;
+        let mut next = || {
+            state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+            (state >> 8) as f32 / 16_777_216.0
+        };
+        let (grid, tets) = (&self.topology.grid, &self.mesh.tets);
+        let mut points = vec![[f32::NAN; 3], [1e38; 3], [f32::NEG_INFINITY; 3]];
+        for i in 0..n {
+            let t = ((next() * tets.len() as f32) as u32).min((tets.len() as u32).saturating_sub(1));
+            if i % 5 == 4 || !self.topology.is_valid(t) {
+                points.push([0, 1, 2].map(|c| grid.lo[c] + (next() * 1.1 - 0.05) * (grid.hi[c] - grid.lo[c])));
+                continue;
+            }
+            let v = tets[t as usize].map(|v| self.mesh.points[v as usize]);
+            let raw = [1.0, next(), next(), next()].map(|x: f32| x + 1e-3);
+            let used = &raw[..=(i % 5).min(3)];
+            let sum: f32 = used.iter().sum();
+            let p = [0, 1, 2].map(|c| used.iter().zip(&v).map(|(w, v)| w / sum * v[c]).sum::<f32>());
+            // Some of them an ulp aside.
+            points.push(if i % 3 == 0 { p.map(|x| if next() < 0.5 { x.next_up() } else { x.next_down() }) } else { p });
+        }
+        points
+    }
+
+    fn locations(&self, gpu: &Gpu, options: &BuildOptions, n: usize) -> Vec<Location> {
+        let (tree, host) = self.tree(gpu, options);
+        let (locator, points) = (Locator::new(&self.mesh, &self.topology, &host), self.points(n));
+        let expected = locator.locate_all(&points);
+        let what = |i: usize| format!("{} {options:?} point {i} {:?}", self.name, points[i]);
+        for path in [Path::Descent, Path::Traversal(3)] {
+            let found = locate(&self.device, &tree, &points, None, &LocateOptions { path, ..LocateOptions::default() }, QUIET).unwrap();
+            for (i, e) in expected.iter().enumerate() {
+                assert_eq!((e.owner, e.barycentric), (found.owners[i], found.barycentrics[i]), "{path:?} {}", what(i));
+            }
+        }
+        let lists = locate_all(&self.device, &tree, &points, &LocateOptions::default(), QUIET).unwrap();
+        for (i, list) in lists.iter().enumerate() {
+            assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
+        }
+        // Each with the owner of the point before as a hint.
+        let hints: Vec<u32> = std::iter::once(NONE).chain(expected.iter().map(|e| e.owner)).take(points.len()).collect();
+        let (input, hint_buffer) = (gpu.upload("olbvh.test.points", &points).unwrap(), gpu.upload("olbvh.test.hints", &hints).unwrap());
+        let count = points.len() as u64;
+        let owners = gpu.buffer("olbvh.test.owners", 4 * count).unwrap();
+        let barycentrics = gpu.buffer("olbvh.test.barycentrics", 16 * count).unwrap();
+        let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()) };
+        let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
+        let scene = Scene::new(&self.device, &tree);
+        gpu.run("olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
+        let found: Vec<u32> = gpu.download(&owners, owners.all()).unwrap();
+        for (i, owner) in found.into_iter().enumerate() {
+            assert_eq!(locator.locate_near(points[i], hints[i]).owner, owner, "hint: {}", what(i));
+        }
+        expected
+    }
+
+    /// The slices of a tree, as the reference cuts them.
+    fn slices(&self, gpu: &Gpu, options: &BuildOptions) -> Vec<(Vec<u8>, Vec<u32>)> {
+        let (tree, host) = self.tree(gpu, options);
+        let settings = SliceSettings { plane: Plane::Normal([1.0, -2.0, 0.7]), layers: 3, size: [37, 21], ..SliceSettings::default() };
+        let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+        let Ok(voxels) = settings.voxels(three(host.grid.lo), three(host.grid.hi), self.mesh.origin) else { return Vec::new() };
+        let slicer = Slicer::new(&self.mesh, &self.topology, &host, None, voxels, Extrapolate::Nearest).unwrap();
+        let mut bands = Vec::new();
+        let mut take = |band: Band| {
+            let expected = slicer.band(band.rows);
+            assert_eq!((&expected.kinds, &expected.owners), (&band.kinds, &band.owners), "{} {options:?}", self.name);
+            bands.push((band.kinds, band.owners));
+            Ok(())
+        };
+        slice(&self.device, &tree, None, &voxels, Extrapolate::Nearest, QUIET, &mut take).unwrap();
+        bands
+    }
+
+    /// Colours and the number of samples in the mesh.
+    fn picture(&self, gpu: &Gpu, options: &BuildOptions) -> (Vec<[u32; 4]>, u64) {
+        let (tree, host) = self.tree(gpu, options);
+        let field = Field { name: "x".into(), on: On::Points, values: self.mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect() };
+        let settings = RenderSettings { size: [60, 45], ..RenderSettings::default() };
+        let scene = volume::Scene::new(&self.mesh, &self.topology, &host, &field, &settings).unwrap();
+        let drawn = render(&self.device, &tree, scene.plan(), (&field.values, field.on), None, QUIET).unwrap();
+        (drawn.colors.into_iter().map(|c| c.map(f32::to_bits)).collect(), drawn.found_samples)
+    }
+}
+
+fn loaded(file: &str) -> Mesh {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data").join(file);
+    olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap().mesh
+}
+
+/// Meshes whose cells do not overlap.
+fn closed(gpu: &Gpu) -> Vec<Subject> {
+    let mut closed = vec![
+        Subject::new(gpu, "kuhn", kuhn([16; 3]).unwrap()),
+        Subject::new(gpu, "kuhn, off the grid", kuhn([13, 11, 15]).unwrap()),
+        Subject::new(gpu, "jittered", kuhn_jittered([14; 3], 0.12, 3).unwrap()),
+    ];
+    if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") {
+        println!("NOT RUN: bracket_50k and flow_sphere_50k on SwiftShader, where they take many minutes");
+    } else {
+        closed.extend(["bracket_50k.vtu", "flow_sphere_50k.vtu"].map(|file| Subject::new(gpu, file, loaded(file))));
+    }
+    closed
+}
+
+fn gpu(binding: Binding) -> Gpu {
+    Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap()
+}
+
+fn quiet(gpu: &Gpu) {
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+fn points_of_closed_meshes(binding: Binding, meshes: usize) {
+    let gpu = gpu(binding);
+    for subject in closed(&gpu).into_iter().take(meshes) {
+        for (alpha, assign) in [(0.0, Assign::Planes), (1.0, Assign::Aabb)] {
+            let [all, boundary] = Lists::EVERY.map(|lists| subject.locations(&gpu, &options(alpha, assign, lists), 5000));
+            for (i, (a, b)) in all.iter().zip(&boundary).enumerate() {
+                assert_eq!(a, b, "{} α {alpha} {assign} point {i}", subject.name);
+            }
+        }
+    }
+    quiet(&gpu);
+}
+
+#[test]
+fn points_by_address() {
+    points_of_closed_meshes(Binding::Address, 5);
+}
+
+#[test]
+fn points_by_descriptors() {
+    points_of_closed_meshes(Binding::Descriptors, 3);
+}
+
+#[test]
+fn degenerate_meshes() {
+    let gpu = gpu(Binding::Address);
+    for case in cases().unwrap() {
+        let subject = Subject::new(&gpu, case.name, case.mesh);
+        for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (3.0, Assign::Planes)] {
+            subject.locations(&gpu, &options(alpha, assign, Lists::Boundary), 500);
+        }
+    }
+    quiet(&gpu);
+}
+
+#[test]
+fn slices_and_pictures() {
+    let gpu = gpu(Binding::Address);
+    for subject in closed(&gpu) {
+        let [all, boundary] = Lists::EVERY.map(|lists| options(0.5, Assign::Planes, lists));
+        assert_eq!(subject.slices(&gpu, &all), subject.slices(&gpu, &boundary), "{}", subject.name);
+        assert_eq!(subject.picture(&gpu, &all), subject.picture(&gpu, &boundary), "{}", subject.name);
+    }
+    quiet(&gpu);
+}
+
+#[test]
+fn overlaps() {
+    let gpu = gpu(Binding::Address);
+    let mut moved = kuhn_jittered([9; 3], 0.12, 5).unwrap();
+    moved.points.iter_mut().for_each(|p| *p = [p[0] * 0.9 + 6.3, p[1] - p[2] * 0.3 + 2.7, p[2] + 3.1]);
+    let (a, b) = (Subject::new(&gpu, "a", kuhn_jittered([14; 3], 0.12, 3).unwrap()), Subject::new(&gpu, "b", moved));
+    let sets = Lists::EVERY.map(|lists| {
+        let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
+        let parties = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| Party { mesh: &s.device, tree });
+        if lists == Lists::Boundary {
+            assert!(overlap(parties[0], parties[1], true, QUIET).is_err_and(|e| e.to_string().contains("all lists")));
+        }
+        let found = overlap(parties[0], parties[1], false, QUIET).unwrap().overlap;
+        (found.a, found.b)
+    });
+    assert!(sets[0].0.len() > 100 && sets[0].1.len() > 100);
+    assert_eq!(sets[0], sets[1]);
+    quiet(&gpu);
+}

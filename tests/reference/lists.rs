@@ -1,0 +1,117 @@
+//! `Lists::Boundary`: trees that keep every rule, and the same owners as with `Lists::All`, on the way of a walk.
+
+use super::{Random, options, prepared};
+use olbvh::mesh::cases::cases;
+use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::reference::boundary::{NONE, Topology};
+use olbvh::reference::build::build;
+use olbvh::reference::locate::Locator;
+use olbvh::tree::TreeArrays;
+use rayon::prelude::*;
+
+/// The same tree with either kind of lists.
+fn both(mesh: &Mesh, topology: &Topology, alpha: f32, assign: Assign) -> [TreeArrays; 2] {
+    Lists::EVERY.map(|lists| build(mesh, topology, &BuildOptions { lists, ..options(alpha, assign) }).unwrap())
+}
+
+#[test]
+fn trees_keep_every_rule() {
+    for case in cases().unwrap() {
+        let (mesh, topology) = prepared(case.mesh);
+        for alpha in [0.0, 1.0, 3.0] {
+            for assign in Assign::ALL {
+                let [all, tree] = both(&mesh, &topology, alpha, assign);
+                let stats = tree.validate(&mesh, &topology).unwrap_or_else(|e| panic!("{} α {alpha} {assign}: {e}", case.name));
+                assert_eq!(all.grid, tree.grid);
+                // What the boundary touches is listed as before.
+                for leaf in tree.leaves().filter(|&j| tree.is_boundary(j)) {
+                    assert!(!tree.primitives(leaf).is_empty());
+                }
+                assert!(stats.entries <= all.p.len() as u64, "{} α {alpha} {assign}", case.name);
+            }
+        }
+    }
+}
+
+#[test]
+fn entries_grow_with_the_surface() {
+    let share = |n: u32| {
+        let (mesh, topology) = prepared(kuhn_jittered([n; 3], 0.3, 5).unwrap());
+        let [all, tree] = both(&mesh, &topology, 0.0, Assign::Aabb);
+        let full = tree.leaves().filter(|&j| !tree.is_boundary(j));
+        assert!(full.clone().all(|j| tree.entries(j).len() == 1));
+        // A full leaf's list may begin with primitives that do not touch it, and only the first are asked.
+        assert!(full.count() >= all.leaves().filter(|&j| !all.is_boundary(j)).count());
+        tree.p.len() as f64 / all.p.len() as f64
+    };
+    let shares = [8, 16, 32].map(share);
+    assert!(shares[0] > shares[1] && shares[1] > shares[2] && shares[2] < 0.35, "{shares:?}");
+}
+
+/// Points on faces, edges and vertices, an ulp away from them, along edges' extensions, and anywhere.
+fn adversarial(mesh: &Mesh, topology: &Topology, n: usize) -> Vec<[f32; 3]> {
+    let mut random = Random(23);
+    let grid = &topology.grid;
+    let ulp = |x: f32, d: usize| [x.next_down(), x, x.next_up()][d];
+    (0..n)
+        .map(|i| match i % 8 {
+            k @ 0..=3 => random.point(mesh, topology, 1 + k),
+            4 => {
+                let kind = 1 + random.below(3);
+                random.point(mesh, topology, kind).map(|x| ulp(x, random.below(3)))
+            }
+            5 => {
+                let ids = mesh.tets[random.below(mesh.tets.len())];
+                let [a, b] = [ids[0], ids[1]].map(|v| mesh.points[v as usize]);
+                let t = random.next() * 4.0 - 1.5;
+                [0, 1, 2].map(|c| (a[c] + t * (b[c] - a[c])).clamp(grid.lo[c], grid.hi[c]))
+            }
+            6 => {
+                // Between the centres of neighbouring cells of the finest grid: on the sides and centres of leaves.
+                [0, 1, 2].map(|c| grid.lo[c] + (random.below(2049) as f32 / 2048.0) * (grid.hi[c] - grid.lo[c]))
+            }
+            _ => [0, 1, 2].map(|c| grid.lo[c] + random.next() * (grid.hi[c] - grid.lo[c])),
+        })
+        .collect()
+}
+
+fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
+    let (mesh, topology) = prepared(mesh);
+    let points = adversarial(&mesh, &topology, n);
+    let (mut steps, mut detours) = (0, 0);
+    for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (2.0, Assign::Planes)] {
+        let [all, tree] = both(&mesh, &topology, alpha, assign);
+        let (all, walking) = (Locator::new(&mesh, &topology, &all), Locator::new(&mesh, &topology, &tree));
+        let some = &points[..if alpha > 1.0 { n / 10 } else { n }];
+        let walks = some.par_iter().enumerate().map(|(i, &p)| {
+            let what = || format!("{name} α {alpha} {assign} point {i} {p:?}");
+            let (expected, found) = (all.locate(p), walking.locate(p));
+            assert_eq!(expected, found, "{}", what());
+            assert_eq!(all.owners(p), walking.owners(p), "{}", what());
+            let others = all.owners(p);
+            for hint in others.into_iter().chain([NONE, i as u32 % mesh.tets.len() as u32]) {
+                assert_eq!(walking.locate_near(p, hint), expected, "{}, hint {hint}", what());
+            }
+            assert_eq!(walking.locate_by_traversal(p, 3), expected, "{}", what());
+            walking.walk(p).map_or((0, 0), |w| (w.steps, w.detours))
+        });
+        let (s, d) = walks.reduce(|| (0, 0), |a, b| (a.0.max(b.0), a.1.max(b.1)));
+        (steps, detours) = (steps.max(s), detours.max(d));
+    }
+    (steps, detours)
+}
+
+#[test]
+fn owners_are_those_of_the_lists() {
+    for (name, mesh) in [
+        ("kuhn", kuhn([16; 3]).unwrap()),
+        ("kuhn, off the grid", kuhn([13, 17, 15]).unwrap()),
+        ("jittered", kuhn_jittered([20, 18, 22], 0.12, 11).unwrap()),
+        ("more", kuhn_jittered([20; 3], 0.2, 3).unwrap()),
+    ] {
+        let (steps, detours) = same_owners(name, mesh, 40_000);
+        println!("{name}: longest walk {steps} steps, {detours} detours");
+        assert!(detours == 0, "{name}: {detours}");
+    }
+}
