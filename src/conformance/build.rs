@@ -80,7 +80,8 @@ fn within(way: Way, mesh: &Mesh, topology: &Topology, options: &BuildOptions, am
     let sizes = ample.sizes.entries;
     let room = limit(sizes[ample.heuristic as usize]);
     let (entries, level) = match way {
-        Way::Clipped => (room.saturating_sub(1).max(limit(sizes[0])), 10),
+        // No deeper than need be: marks take a bit per cell of the deepest level.
+        Way::Clipped => (room.saturating_sub(1).max(limit(sizes[0])), if options.lists == Lists::All { 10 } else { ample.heuristic }),
         Way::Root => (limit(sizes[0]), 10),
         Way::Nothing => (limit(sizes[0]).saturating_sub(1), 10),
         Way::Shallow => (room, 2),

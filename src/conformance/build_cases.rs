@@ -40,6 +40,12 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
             build(cases, Group::Full, BuildCase { alpha, boxes: true, way: Way::Owned, ..case });
         }
         let thorough = THOROUGH.contains(&mesh.name);
+        let case = BuildCase { lists: Lists::Boundary, ..case };
+        build(cases, mesh.group, BuildCase { alpha: [1.0, 0.0, 0.5][i], way: Way::Owned, ..case });
+        for (alpha, way) in [(0.0, Way::Owned), (2.0, Way::Owned), (0.0, Way::Tight), (0.0, Way::Clipped), (0.0, Way::Shallow)] {
+            build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { alpha, way, boxes: true, ..case });
+        }
+        let case = BuildCase { lists: Lists::All, ..case };
         let group = if thorough { mesh.group } else { Group::Full };
         for way in [Way::Tight, Way::Clipped, Way::Root, Way::Nothing, Way::Shallow] {
             build(cases, group, BuildCase { way, boxes: way == Way::Tight, ..case });
@@ -55,17 +61,28 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 /// Trees over a mesh of the caller's.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for assign in Assign::ALL {
+    for (assign, lists) in Assign::ALL.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
+        let tight = BuildCase { mesh, alpha: 0.0, assign, lists, boxes: false, way: Way::Tight, target: TargetKind::Device };
         for alpha in [0.0, 1.0, 2.0] {
-            let case = BuildCase { mesh, alpha, assign, boxes: alpha == 0.0, way: Way::Owned, target: TargetKind::Device };
-            build(cases, Group::Quick, case);
+            build(cases, Group::Quick, BuildCase { alpha, boxes: alpha == 0.0, way: Way::Owned, ..tight });
         }
-        build(cases, Group::Quick, BuildCase { mesh, alpha: 0.0, assign, boxes: false, way: Way::Tight, target: TargetKind::Device });
+        build(cases, Group::Quick, tight);
     }
 }
 
 fn build(cases: &mut Vec<Case>, group: Group, case: BuildCase) {
     let boxes = if case.boxes { "/boxes" } else { "" };
+    let lists = case.lists.suffix();
     let (mesh, assign, alpha, way) = (case.mesh.name, case.assign, case.alpha, case.way.name());
-    push(cases, format!("build/{mesh}/{assign}/alpha-{alpha}{boxes}/{way}{}", case.target.suffix()), group, Work::Build(case));
+    push(cases, format!("build/{mesh}/{assign}{lists}/alpha-{alpha}{boxes}/{way}{}", case.target.suffix()), group, Work::Build(case));
+}
+
+impl Lists {
+    /// What the names of cases say about it.
+    pub(super) fn suffix(self) -> &'static str {
+        match self {
+            Self::All => "",
+            Self::Boundary => "/boundary",
+        }
+    }
 }

@@ -7,7 +7,7 @@ use super::meshes::MeshRecipe;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::{NONE, topology};
 use crate::reference::build::build;
@@ -49,6 +49,7 @@ pub(crate) struct LocateCase {
     pub mesh: MeshRecipe,
     pub alpha: f32,
     pub assign: Assign,
+    pub lists: Lists,
     pub how: How,
 }
 
@@ -98,7 +99,7 @@ pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
 pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
     let mesh = case.mesh.mesh()?;
     let topology = topology(&mesh)?;
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
     let tree = Tree::build(gpu, &device, &options)?;
     let host = build(&mesh, &topology, &options)?;
@@ -146,10 +147,15 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
                 return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
             }
             for alpha in [0.0, 1.0, 2.0, 4.0] {
-                for assign in Assign::ALL {
-                    let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, ..options })?;
+                for (assign, lists) in Assign::ALL.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
+                    let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, lists, ..options })?;
                     let found = locate(&device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
-                    compare(&format!("query.locate (alpha {alpha}, {assign})"), "owners", &first.owners[..inside], &found.owners)?;
+                    compare(
+                        &format!("query.locate (alpha {alpha}, {assign}, lists {lists})"),
+                        "owners",
+                        &first.owners[..inside],
+                        &found.owners,
+                    )?;
                 }
             }
             Ok(())

@@ -9,8 +9,8 @@
 //! scan/100003/indirect-below/narrow        length, count [, target]
 //! sort/21-bits/100000/indirect/reversed    bits of the keys, length, count [, keys] [, target]
 //! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
-//! build/slivers/exact/alpha-1.5/recorded   mesh, assignment, α [, boxes], how it is built [, target]
-//! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment, α, path
+//! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
+//! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
 //! render/one-tet/iso/points/shaded         mesh, camera, field [, light]
 //! slice/plate/aabb/alpha-2/oblique         mesh, assignment, α, stack of layers
 //! overlap/cloud/exact/alpha-1/grid         mesh, assignment, α, the other mesh

@@ -5,7 +5,7 @@ use super::meshes::MeshRecipe;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::render;
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
@@ -38,8 +38,15 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase) -> Verdict {
     let settings = RenderSettings { size: [50, 42], camera: case.camera.parse()?, shading: case.shading, ..RenderSettings::default() };
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
     let mut first: Option<Vec<u8>> = None;
-    for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact), (4.0, Assign::Aabb)] {
-        let options = BuildOptions { alpha, assign, ..BuildOptions::default() };
+    let (all, boundary) = (Lists::All, Lists::Boundary);
+    for (alpha, assign, lists) in [
+        (0.0, Assign::Aabb, all),
+        (0.0, Assign::Planes, boundary),
+        (1.0, Assign::Planes, all),
+        (2.0, Assign::Exact, all),
+        (4.0, Assign::Aabb, boundary),
+    ] {
+        let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
         let host = build(&mesh, &topology, &options)?;
         let scene = Scene::new(&mesh, &topology, &host, &field, &settings)?;
         let plan = scene.plan();
@@ -52,7 +59,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase) -> Verdict {
         let pixels: Vec<u8> =
             rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
         let expected = draw(&scene, &|_, _| {});
-        let stage = format!("query.volume_march (alpha {alpha}, {assign})");
+        let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // The intervals follow the tree's leaves, the picture does not.
         compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
         near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;

@@ -8,7 +8,7 @@ use super::primitive_cases::push;
 use super::slice::{STACKS, SliceCase};
 use super::{Case, Group, Work};
 use crate::mesh::On;
-use crate::options::Assign;
+use crate::options::{Assign, Lists};
 
 /// Meshes that fill their space without overlap: every point of a cell has an owner, the same whatever the tree.
 const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
@@ -22,20 +22,19 @@ const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart
 pub(super) fn add(cases: &mut Vec<Case>) {
     for mesh in recipes() {
         for assign in Assign::ALL {
-            for alpha in [0.0, 1.0, 3.0] {
+            for (alpha, lists) in [0.0, 1.0, 3.0].into_iter().flat_map(|alpha| Lists::EVERY.map(|lists| (alpha, lists))) {
                 let quick = assign == Assign::Exact && alpha == 0.0;
-                add_location(cases, quick, LocateCase { mesh, alpha, assign, how: How::Descent });
+                add_location(cases, quick, LocateCase { mesh, alpha, assign, lists, how: How::Descent });
             }
         }
         for how in [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Hints, How::All, How::Values] {
-            add_location(
-                cases,
-                matches!(how, How::Traversal(3) | How::Hints | How::All),
-                LocateCase { mesh, alpha: 0.5, assign: Assign::Aabb, how },
-            );
+            for lists in Lists::EVERY {
+                let quick = matches!(how, How::Traversal(3) | How::Hints | How::All);
+                add_location(cases, quick, LocateCase { mesh, alpha: 0.5, assign: Assign::Aabb, lists, how });
+            }
         }
         if CLOSED.contains(&mesh.name) {
-            add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, how: How::Same });
+            add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, how: How::Same });
         }
         if DRAWN.contains(&mesh.name) {
             add_pictures(cases, mesh);
@@ -50,7 +49,9 @@ pub(super) fn add(cases: &mut Vec<Case>) {
 /// Queries of a mesh of the caller's.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for how in [How::Descent, How::Traversal(8), How::Hints, How::All] {
-        add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, how });
+        for lists in Lists::EVERY {
+            add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
+        }
     }
     push(
         cases,
@@ -64,7 +65,7 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 fn add_location(cases: &mut Vec<Case>, quick: bool, case: LocateCase) {
     let group = if quick { case.mesh.group } else { Group::Full };
-    let name = format!("locate/{}/{}/alpha-{}/{}", case.mesh.name, case.assign, case.alpha, case.how.name());
+    let name = format!("locate/{}/{}{}/alpha-{}/{}", case.mesh.name, case.assign, case.lists.suffix(), case.alpha, case.how.name());
     push(cases, name, group, Work::Locate(case));
 }
 
@@ -89,9 +90,11 @@ fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
     for (i, stack) in STACKS.into_iter().enumerate() {
         for (k, (alpha, assign)) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact)].into_iter().enumerate() {
-            let group = if (i + k) % 3 == 0 { mesh.group } else { Group::Full };
-            let name = format!("slice/{}/{assign}/alpha-{alpha}/{}", mesh.name, stack.name);
-            push(cases, name, group, Work::Slice(SliceCase { mesh, alpha, assign, stack }));
+            for lists in Lists::EVERY {
+                let group = if (i + k) % 3 == 0 { mesh.group } else { Group::Full };
+                let name = format!("slice/{}/{assign}{}/alpha-{alpha}/{}", mesh.name, lists.suffix(), stack.name);
+                push(cases, name, group, Work::Slice(SliceCase { mesh, alpha, assign, lists, stack }));
+            }
         }
     }
 }

@@ -5,7 +5,7 @@ use super::meshes::MeshRecipe;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::slice;
 use crate::reference::boundary::topology;
 use crate::reference::slice::Slicer;
@@ -17,6 +17,7 @@ pub(crate) struct SliceCase {
     pub mesh: MeshRecipe,
     pub alpha: f32,
     pub assign: Assign,
+    pub lists: Lists,
     pub stack: Stack,
 }
 
@@ -60,7 +61,8 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase) -> Verdict {
     let topology = topology(&mesh)?;
     let Stack { plane, layers, size, extrapolate, .. } = case.stack;
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
-    let tree = Tree::build(gpu, &device, &BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() })?;
+    let tree =
+        Tree::build(gpu, &device, &BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() })?;
     let host = tree.download()?;
     let corner = |v: [f32; 4]| [v[0], v[1], v[2]];
     let settings = SliceSettings { plane, layers, size, ..SliceSettings::default() };
