@@ -1,6 +1,9 @@
 //! Compiles every kernel of `glsl/` in both permutations, reflects it, and generates its Rust side into `OUT_DIR`:
-//! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V) and `layout.rs` (shared structs).
+//! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V), `layout.rs` (shared structs), and `olbvh.glsl` for the shaders
+//! of other programs.
 
+#[path = "build/export.rs"]
+mod export;
 #[path = "build/reflect.rs"]
 mod reflect;
 
@@ -36,6 +39,7 @@ fn generate(out: &Path) -> Result<(), String> {
     });
     let interfaces = [left??, right?].concat();
     write(&out.join("kernels.rs"), &kernels_source(&interfaces))?;
+    write(&out.join("olbvh.glsl"), &export::export(Path::new(GLSL))?)?;
     write(&out.join("layout.rs"), &layout_source()?)
 }
 

@@ -40,6 +40,7 @@ pub mod conformance;
 pub mod error;
 #[cfg(feature = "formats")]
 pub mod formats;
+pub mod glsl;
 pub mod gpu;
 pub mod kernels;
 pub mod layout;

@@ -164,3 +164,19 @@ struct SearchState {
     uint phase; // 0: non-boundary nodes; 1: lists.
     uint place; // Pairs found so far, or where the next one goes.
 };
+
+// Where a mesh and its tree lie, for the shaders of other programs: device addresses, low word first. See src/glsl.rs.
+struct SceneAddresses {
+    uvec2 grid;       // Grid with the level of the leaves.
+    uvec2 masks;      // Child masks.
+    uvec2 co;         // Child offsets.
+    uvec2 po;         // Primitive offsets.
+    uvec2 p;          // Primitive ids.
+    uvec2 flags;      // Boundary flags.
+    uvec2 cells;      // Vertex indices.
+    uvec2 vertices;   // Normalised coordinates.
+    uvec2 neighbours; // Neighbour table.
+    uvec2 field;      // One float per point, or anything where no field is asked for.
+    uint lists;       // 1: leaves within the mesh have a seed instead of a list.
+    uint pad;         // Unused.
+};

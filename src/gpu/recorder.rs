@@ -83,6 +83,11 @@ impl<'a> Recorder<'a> {
         &self.stages
     }
 
+    /// The command buffer, for commands of the host's own between ours.
+    pub fn commands(&self) -> vk::CommandBuffer {
+        self.commands
+    }
+
     /// The device.
     pub fn gpu(&self) -> &'a Gpu {
         self.gpu

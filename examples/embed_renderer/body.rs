@@ -1,0 +1,202 @@
+//! The body: a mesh in the host's memory, deformed every frame, with olbvh's arrays beside it.
+
+use crate::host::{Host, HostBuffer};
+use anyhow::{Context, Result};
+use ash::vk;
+use glam::Vec3;
+use gpu_allocator::MemoryLocation;
+use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+use olbvh::glsl::SceneBuffers;
+use olbvh::gpu::{BufferRef, Gpu, Recorder, USAGE};
+use olbvh::mesh::Mesh;
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use std::path::Path;
+
+/// What each frame in flight has for itself.
+pub struct Deformed {
+    pub positions: HostBuffer,
+    /// The addresses that the shaders get; see `olbvh.glsl`.
+    pub tree: HostBuffer,
+    pub set: Option<vk::DescriptorSet>,
+    memory: HostBuffer,
+    mesh: MeshView,
+    arrays: TreeMemory,
+}
+
+pub struct Body {
+    mesh: Mesh,
+    pub tets: u32,
+    pub centre: Vec3,
+    pub radius: f32,
+    pub values: HostBuffer,
+    pub triangles: HostBuffer,
+    pub indices: u32,
+    pub slots: Vec<Deformed>,
+    cells: HostBuffer,
+    scratch: HostBuffer,
+    mesh_scratch: MeshScratch,
+    build_scratch: BuildScratch,
+    capacity: Capacity,
+    options: BuildOptions,
+    sets: Option<(vk::DescriptorPool, vk::DescriptorSetLayout)>,
+}
+
+/// The faces that only one tetrahedron has.
+fn surface(tets: &[[u32; 4]]) -> Vec<u32> {
+    let mut faces: Vec<([u32; 3], [u32; 3])> = tets
+        .iter()
+        .flat_map(|t| [[t[1], t[2], t[3]], [t[0], t[3], t[2]], [t[0], t[1], t[3]], [t[0], t[2], t[1]]])
+        .map(|face| {
+            let mut key = face;
+            key.sort_unstable();
+            (key, face)
+        })
+        .collect();
+    faces.sort_unstable();
+    faces.chunk_by(|a, b| a.0 == b.0).filter(|same| same.len() == 1).flat_map(|same| same[0].1).collect()
+}
+
+impl Body {
+    pub fn load(host: &Host, gpu: &Gpu, slots: usize) -> Result<Self> {
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bracket_50k.vtu");
+        let mesh = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default())?.mesh;
+        let field = mesh.field("temperature").context("the mesh has no temperature")?;
+        let [lo, hi] = field.range().context("no finite temperature")?;
+        let values: Vec<f32> = field.values.iter().map(|v| (v - lo) / (hi - lo)).collect();
+        let fold = |pick: fn(Vec3, Vec3) -> Vec3| mesh.points.iter().map(|p| Vec3::from(*p)).reduce(pick).unwrap_or_default();
+        let (low, high) = (fold(Vec3::min), fold(Vec3::max));
+        let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+
+        let values = host.filled("values", &values, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
+        let cells = host.filled("cells", &mesh.tets, USAGE)?;
+        let faces = surface(&mesh.tets);
+        let triangles = host.filled("triangles", &faces, vk::BufferUsageFlags::INDEX_BUFFER)?;
+
+        // Sizes first: what the largest tree may need. Where a deformed body would need more, the device builds a coarser one.
+        let options = BuildOptions::default();
+        let capacity = Capacity::for_entries(24 * tets, 7);
+        let carve_slot = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?));
+        let carve_scratch = |a: &mut Arena| Ok((MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?));
+        let device_buffer = |name: &str, size| host.buffer(name, size, USAGE, MemoryLocation::GpuOnly);
+        let scratch = device_buffer("scratch", Arena::measure(carve_scratch)?)?;
+        let (mesh_scratch, build_scratch) = carve_scratch(&mut Arena::new(scratch.part()))?;
+        let sets = if host.addresses { None } else { Some(descriptor_pool(host, slots)?) };
+        let slots = (0..slots).map(|_| {
+            let positions = host.filled("positions", &mesh.points, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
+            let memory = device_buffer("tree", Arena::measure(carve_slot)?)?;
+            let (mesh_arrays, arrays) = carve_slot(&mut Arena::new(memory.part()))?;
+            let input = MeshInput { positions: positions.part(), stride: 3, points, cells: cells.part(), tets };
+            let view = MeshView { input, arrays: mesh_arrays };
+            let buffers = SceneBuffers::new(&view, &arrays, Some(values.part()));
+            let tree = host.filled("addresses", &[buffers.addresses()], USAGE)?;
+            let set = sets.map(|(pool, layout)| descriptor_set(host, pool, layout, &buffers.list(tree.part()))).transpose()?;
+            Ok(Deformed { positions, tree, set, memory, mesh: view, arrays })
+        });
+        let slots = slots.collect::<Result<Vec<_>>>()?;
+        let (centre, radius) = ((low + high) * 0.5, (high - low).length() * 0.5);
+        let indices = faces.len() as u32;
+        Ok(Self {
+            mesh,
+            tets,
+            centre,
+            radius,
+            values,
+            triangles,
+            indices,
+            slots,
+            cells,
+            scratch,
+            mesh_scratch,
+            build_scratch,
+            capacity,
+            options,
+            sets,
+        })
+    }
+
+    pub fn set_layout(&self) -> Option<vk::DescriptorSetLayout> {
+        self.sets.map(|s| s.1)
+    }
+
+    /// Twists and sways the body; `time` from 0 to 1 is one period.
+    pub fn deform(&mut self, slot: usize, time: f32) {
+        let (centre, radius) = (self.centre, self.radius);
+        let swing = (time * std::f32::consts::TAU).sin();
+        let moved = self.mesh.points.iter().map(|p| {
+            let x = Vec3::from(*p) - centre;
+            let turn = glam::Quat::from_rotation_z(0.6 * swing * x.z / radius);
+            let sway = Vec3::X * 0.12 * radius * swing * (2.5 * x.z / radius).sin();
+            (centre + turn * x + sway).to_array()
+        });
+        let moved: Vec<[f32; 3]> = moved.collect();
+        self.slots[slot].positions.write(&moved);
+    }
+
+    /// Records stage 0 and the construction of a slot's tree.
+    pub fn record(&self, r: &mut Recorder<'_>, slot: usize) -> olbvh::Result<()> {
+        let Deformed { mesh, arrays, .. } = &self.slots[slot];
+        // The scratch memory is that of the frame before.
+        r.barrier("frame.before → frame.mesh");
+        cmd_prepare_mesh(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
+        r.barrier("frame.mesh → frame.tree");
+        cmd_build(r, mesh, arrays, &self.capacity, &self.options, &self.build_scratch)
+    }
+
+    pub fn free(self, host: &Host) {
+        if let Some((pool, layout)) = self.sets {
+            // SAFETY: the device is idle.
+            unsafe {
+                host.device.destroy_descriptor_pool(pool, None);
+                host.device.destroy_descriptor_set_layout(layout, None);
+            }
+        }
+        for slot in self.slots {
+            [slot.positions, slot.tree, slot.memory].into_iter().for_each(|b| host.free(b));
+        }
+        [self.values, self.triangles, self.cells, self.scratch].into_iter().for_each(|b| host.free(b));
+    }
+}
+
+/// A layout and a pool for the arrays of a scene, where there are no buffer addresses.
+fn descriptor_pool(host: &Host, sets: usize) -> Result<(vk::DescriptorPool, vk::DescriptorSetLayout)> {
+    let count = SceneBuffers::COUNT as u32;
+    let bindings: Vec<_> = (0..count)
+        .map(|i| {
+            let binding = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);
+            binding.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::FRAGMENT)
+        })
+        .collect();
+    let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: count * sets as u32 }];
+    // SAFETY: plain creation; `Body::free` destroys both.
+    unsafe {
+        let layout = host.device.create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)?;
+        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets as u32).pool_sizes(&sizes);
+        Ok((host.device.create_descriptor_pool(&info, None)?, layout))
+    }
+}
+
+fn descriptor_set(
+    host: &Host,
+    pool: vk::DescriptorPool,
+    layout: vk::DescriptorSetLayout,
+    buffers: &[BufferRef; SceneBuffers::COUNT],
+) -> Result<vk::DescriptorSet> {
+    let layouts = [layout];
+    let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+    let range = |b: &BufferRef| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size }];
+    let infos = buffers.each_ref().map(range);
+    // SAFETY: the buffers outlive the set.
+    unsafe {
+        let set = host.device.allocate_descriptor_sets(&info)?[0];
+        let writes: Vec<_> = (0..)
+            .zip(&infos)
+            .map(|(i, info)| {
+                let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i);
+                write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
+            })
+            .collect();
+        host.device.update_descriptor_sets(&writes, &[]);
+        Ok(set)
+    }
+}

@@ -1,0 +1,145 @@
+//! A renderer with its own Vulkan device embeds olbvh: a body is deformed every frame, its tree is rebuilt in the renderer's command buffer and memory,
+//! and the fragment shader that draws a cut through the body asks the tree for the field inside. Nothing is read back but the pictures.
+//!
+//! ```text
+//! cargo run --release --example embed_renderer -- [FRAMES] [OUT.png] [--descriptors]
+//! ```
+
+#![allow(unsafe_code, reason = "a Vulkan program")]
+#![allow(clippy::unwrap_used, missing_docs, reason = "an example: what cannot go on may stop")]
+
+mod body;
+mod host;
+mod pictures;
+
+use anyhow::{Context, Result};
+use ash::vk;
+use body::{Body, Deformed};
+use glam::Vec3;
+use glam::camera::rh::proj::vulkan;
+use glam::camera::rh::view::look_at_mat4;
+use host::Host;
+use olbvh::gpu::{Enabled, Gpu, GpuOptions, HostDevice, Recorder};
+use pictures::{Drawing, Pictures, Push};
+use std::io::BufWriter;
+use std::time::Instant;
+
+const SIZE: [u32; 2] = [480, 360];
+/// Frames in flight: each has its own positions and tree.
+const SLOTS: usize = 2;
+
+fn main() -> Result<()> {
+    let mut words: Vec<String> = std::env::args().skip(1).collect();
+    let descriptors = words.iter().position(|w| w == "--descriptors").map(|i| words.remove(i)).is_some();
+    let frames: u32 = words.first().map_or(Ok(60), |w| w.parse()).context("FRAMES is a number")?;
+    let out = words.get(1).map_or("embed_renderer.png", String::as_str);
+
+    let host = Host::new(!descriptors)?;
+    let lent = HostDevice {
+        instance: host.instance.clone(),
+        physical: host.physical,
+        device: host.device.clone(),
+        family: host.family,
+        queue: None,
+        allocator: Some(host.allocator().clone()),
+        pipeline_cache: None,
+        enabled: Enabled {
+            buffer_addresses: host.addresses,
+            subgroup_size_control: host.size_control,
+            debug_utils: host.debug.is_some(),
+            ..Enabled::default()
+        },
+    };
+    // SAFETY: the handles belong together, and `gpu` is dropped before `host`, when the device is idle.
+    let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }?;
+    let body = Body::load(&host, &gpu, SLOTS)?;
+    let pictures = Pictures::new(&host, SIZE, SLOTS, body.set_layout())?;
+    let result = animate(&host, &gpu, body, &pictures, frames, out);
+    // SAFETY: waits for what is still in flight, also after an error.
+    unsafe { host.device.device_wait_idle() }?;
+    pictures.free(&host);
+    result?;
+    drop(gpu);
+    host.check()
+}
+
+/// The camera, the plane of the cut, and the square that is drawn in it.
+fn view(body: &Body, tree: [u32; 2]) -> Push {
+    let (centre, radius) = (body.centre, body.radius);
+    let eye = centre + radius * Vec3::new(1.5, -1.9, 1.1);
+    let lens = vulkan::perspective(0.6, SIZE[0] as f32 / SIZE[1] as f32, 0.1 * radius, 10.0 * radius);
+    let camera = lens * look_at_mat4(eye, centre, Vec3::Z);
+    let normal = Vec3::new(0.0, 1.0, 0.0);
+    let right = Vec3::new(3.0 * radius, 0.0, 0.0);
+    let corner = centre - 0.5 * right - 0.5 * normal.cross(right);
+    Push {
+        camera: camera.to_cols_array_2d(),
+        plane: normal.extend(-normal.dot(centre)).to_array(),
+        corner: corner.extend(0.0).to_array(),
+        right: right.extend(0.0).to_array(),
+        tree,
+    }
+}
+
+fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: u32, out: &str) -> Result<()> {
+    let device = &host.device;
+    let file = BufWriter::new(std::fs::File::create(out).with_context(|| out.to_owned())?);
+    let mut encoder = png::Encoder::new(file, SIZE[0], SIZE[1]);
+    encoder.set_color(png::ColorType::Rgba);
+    encoder.set_animated(frames.max(1), 0)?;
+    encoder.set_frame_delay(1, 20)?;
+    let mut writer = encoder.write_header()?;
+
+    // What a frame records is rehearsed once: afterwards nothing is compiled any more.
+    let mut rehearsal = Recorder::rehearse(gpu);
+    body.record(&mut rehearsal, 0)?;
+    rehearsal.finish()?;
+
+    // SAFETY: pool, buffers and fences are made here and destroyed below or with the device; a slot is used again when its fence says so.
+    unsafe {
+        let info = vk::CommandPoolCreateInfo::default().queue_family_index(host.family);
+        let pool = device.create_command_pool(&info.flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER), None)?;
+        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(SLOTS as u32);
+        let commands = device.allocate_command_buffers(&info)?;
+        let fences = (0..SLOTS).map(|_| device.create_fence(&vk::FenceCreateInfo::default(), None)).collect::<Result<Vec<_>, _>>()?;
+        let mut recorders: Vec<Option<Recorder<'_>>> = (0..SLOTS).map(|_| None).collect();
+        let start = Instant::now();
+        for frame in 0..frames + SLOTS as u32 {
+            let slot = frame as usize % SLOTS;
+            if frame >= SLOTS as u32 {
+                device.wait_for_fences(&[fences[slot]], true, u64::MAX)?;
+                device.reset_fences(&[fences[slot]])?;
+                recorders[slot] = None;
+                writer.write_image_data(pictures.readback[slot].bytes())?;
+            }
+            if frame >= frames {
+                continue;
+            }
+            body.deform(slot, frame as f32 / frames as f32);
+            let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
+            device.begin_command_buffer(commands[slot], &begin)?;
+            let mut recorder = Recorder::new(gpu, commands[slot], None);
+            body.record(&mut recorder, slot)?;
+            recorder.finish()?;
+            recorders[slot] = Some(recorder); // it owns descriptor sets, where there are any, until the fence
+            let built = [vk::MemoryBarrier::default()
+                .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
+                .dst_access_mask(vk::AccessFlags::SHADER_READ)];
+            let from = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+            let to = vk::PipelineStageFlags::FRAGMENT_SHADER;
+            device.cmd_pipeline_barrier(commands[slot], from, to, vk::DependencyFlags::empty(), &built, &[], &[]);
+            let Deformed { positions, tree, set, .. } = &body.slots[slot];
+            let (values, triangles, indices) = (&body.values, &body.triangles, body.indices);
+            let push = view(&body, [tree.address as u32, (tree.address >> 32) as u32]);
+            pictures.record(host, commands[slot], slot, &Drawing { positions, values, triangles, indices, tree_set: *set, push });
+            device.end_command_buffer(commands[slot])?;
+            let submit = [vk::SubmitInfo::default().command_buffers(std::slice::from_ref(&commands[slot]))];
+            device.queue_submit(*host.queue.lock().unwrap(), &submit, fences[slot])?;
+        }
+        println!("{frames} frames of {} tetrahedra in {:.1} s, tree rebuilt in each: {out}", body.tets, start.elapsed().as_secs_f64());
+        fences.into_iter().for_each(|f| device.destroy_fence(f, None));
+        device.destroy_command_pool(pool, None);
+    }
+    body.free(host);
+    Ok(writer.finish()?)
+}

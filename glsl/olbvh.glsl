@@ -1,0 +1,171 @@
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners, value and gradient of a field, traversal with the
+// host's own predicates (the paper's Alg. 3).
+//
+//     #version 460
+//     #include "olbvh.glsl"                     first of all, since it enables extensions
+//     layout(push_constant) uniform Push { uvec2 tree; };
+//     ...
+//     olbvh_open(tree);                         once per invocation
+//     vec4 weights;
+//     uint owner = olbvh_locate(place, 1e-5, weights);
+//     if (owner != OLBVH_NONE) value = olbvh_value(owner, weights);
+//
+// `tree` is the address of a SceneAddresses that the host filled (olbvh::glsl::SceneBuffers). On devices without buffer addresses define
+// OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET (0 unless defined) from binding OLBVH_BINDING (0) on,
+// in the order of SceneBuffers::list, and the argument of olbvh_open means nothing.
+//
+// What the crate exports is this file with its includes, all names beginning with olbvh_; src/glsl.rs has the guide.
+#ifndef OLBVH_GLSL
+#define OLBVH_GLSL
+#ifndef OLBVH_SET
+#define OLBVH_SET 0
+#endif
+#ifndef OLBVH_BINDING
+#define OLBVH_BINDING 0
+#endif
+#ifdef OLBVH_DESCRIPTORS
+#define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
+    layout(set = OLBVH_SET, binding = OLBVH_BINDING + slot, std430) readonly buffer name##Block { T at[]; } name;
+#else
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
+    layout(buffer_reference, std430, buffer_reference_align = alignment) readonly buffer name##Block { T at[]; };               \
+    name##Block name;
+#endif
+#define OLBVH_NONE 0xffffffffu
+
+const uint NONE = OLBVH_NONE;
+#include "shared/layout.glsl"
+
+OLBVH_BUFFER(0, 8, SceneAddresses, scene)
+OLBVH_BUFFER(1, 16, Grid, grid)
+OLBVH_BUFFER(2, 4, uint, masks)
+OLBVH_BUFFER(3, 4, uint, co)
+OLBVH_BUFFER(4, 4, uint, po)
+OLBVH_BUFFER(5, 4, uint, p)
+OLBVH_BUFFER(6, 4, uint, flags)
+OLBVH_BUFFER(7, 16, uvec4, cells)
+OLBVH_BUFFER(8, 16, vec4, vertices)
+OLBVH_BUFFER(9, 16, uvec4, neighbours)
+OLBVH_BUFFER(10, 4, float, field)
+uint LISTS;
+
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/node.glsl"
+#include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
+
+// Names the tree that the functions below mean.
+void olbvh_open(uvec2 tree) {
+#ifndef OLBVH_DESCRIPTORS
+    scene = sceneBlock(tree);
+    SceneAddresses a = scene.at[0];
+    grid = gridBlock(a.grid);
+    masks = masksBlock(a.masks);
+    co = coBlock(a.co);
+    po = poBlock(a.po);
+    p = pBlock(a.p);
+    flags = flagsBlock(a.flags);
+    cells = cellsBlock(a.cells);
+    vertices = verticesBlock(a.vertices);
+    neighbours = neighboursBlock(a.neighbours);
+    field = fieldBlock(a.field);
+#endif
+    LISTS = scene.at[0].lists;
+}
+
+// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and its barycentric coordinates in the order of the cell's vertices. A
+// point outside of the mesh is found if its smallest coordinate in the nearest cell is at least -tolerance.
+uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
+    weights_of_owner = vec4(0.0);
+    Grid g = grid.at[0];
+    uint leaf = near_bounds(g, place) ? find_leaf(g.level, quantize(g, place)) : NONE;
+    if (leaf == NONE) return NONE;
+    vec3 x = normalise(g, place);
+    uvec2 range = entry_range(leaf);
+    Best best = no_best();
+    if (walks_in(leaf, range)) best = walk_in(g, p.at[range.x], NONE, place, x);
+    else search(best, range.x, range.y, x);
+    uint owner = decide(best, leaf, tolerance);
+    if (owner == NONE) return NONE;
+    Tet tet = load_tet(cells.at[owner]);
+    weights_of_owner = barycentric(weights(tet, x), tet.rank);
+    return owner;
+}
+
+// Every tetrahedron that contains a point, the first OLBVH_OWNERS of them in `owners`; their number. In no order.
+#ifndef OLBVH_OWNERS
+#define OLBVH_OWNERS 32
+#endif
+uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
+    Grid g = grid.at[0];
+    uint leaf = near_bounds(g, place) ? find_leaf(g.level, quantize(g, place)) : NONE;
+    if (leaf == NONE) return 0u;
+    vec3 x = normalise(g, place);
+    uvec2 range = entry_range(leaf);
+    bool by_walk = walks_in(leaf, range);
+    if (by_walk) {
+        Best first = walk_in(g, p.at[range.x], NONE, place, x), unused = no_best();
+        arrive(first.owner, x, unused);
+        range = uvec2(0u, star_size);
+    }
+    uint n = 0u;
+    for (uint i = range.x; i < range.y; ++i) {
+        uint t = by_walk ? star[i] : p.at[i];
+        if (!weights(load_tet(cells.at[t]), x).inside) continue;
+        if (n < OLBVH_OWNERS) owners[n] = t;
+        ++n;
+    }
+    return n;
+}
+
+// Value of the field, which has one value per point of the mesh, in a tetrahedron.
+float olbvh_value(uint owner, vec4 weights_of_owner) {
+    uvec4 v = cells.at[owner];
+    return dot(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
+}
+
+// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
+vec3 olbvh_gradient(uint owner) {
+    uvec4 v = cells.at[owner];
+    vec3 a = vertices.at[v.x].xyz, e1 = vertices.at[v.y].xyz - a, e2 = vertices.at[v.z].xyz - a, e3 = vertices.at[v.w].xyz - a;
+    // Normalised coordinates lie in [0, 2^41).
+    const float UNIT = 1.0 / 1099511627776.0;
+    e1 *= UNIT;
+    e2 *= UNIT;
+    e3 *= UNIT;
+    float six_volumes = dot(e1, cross(e2, e3)), f = field.at[v.x];
+    if (six_volumes == 0.0) return vec3(0.0);
+    vec3 sum = (field.at[v.y] - f) * cross(e2, e3) + (field.at[v.z] - f) * cross(e3, e1) + (field.at[v.w] - f) * cross(e1, e2);
+    return sum / six_volumes * grid.at[0].scale;
+}
+
+// Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
+//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
+//     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
+// olbvh_node_box gives a node's box, olbvh_entries its primitives: ids at olbvh_primitive(i) for i in [x, y).
+#ifdef OLBVH_TRAVERSE
+#ifndef OLBVH_STACK
+#define OLBVH_STACK 8
+#endif
+const uint STACK = OLBVH_STACK;
+bool visit_node(Node node);
+bool visit_leaf(Node node);
+#include "shared/traverse.glsl"
+#include "shared/boxes.glsl"
+
+// Visits the tree; false if it was too large to visit in one go (24,000 inner nodes).
+bool olbvh_traverse() { return traverse(grid.at[0].level); }
+
+void olbvh_node_box(Node node, out vec3 lo, out vec3 hi) { cell_box(grid.at[0], node.level, node.code, lo, hi); }
+
+bool olbvh_is_boundary(Node node) { return is_boundary_node(node.index); }
+
+uvec2 olbvh_entries(Node node) { return entry_range(node.index); }
+
+uint olbvh_primitive(uint entry) { return p.at[entry]; }
+#endif
+#endif

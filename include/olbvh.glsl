@@ -1,0 +1,835 @@
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners, value and gradient of a field, traversal with the
+// host's own predicates (the paper's Alg. 3).
+//
+//     #version 460
+//     #include "olbvh.glsl"                     first of all, since it enables extensions
+//     layout(push_constant) uniform Push { uvec2 tree; };
+//     ...
+//     olbvh_open(tree);                         once per invocation
+//     vec4 weights;
+//     uint owner = olbvh_locate(place, 1e-5, weights);
+//     if (owner != OLBVH_NONE) value = olbvh_value(owner, weights);
+//
+// `tree` is the address of a SceneAddresses that the host filled (olbvh::glsl::SceneBuffers). On devices without buffer addresses define
+// OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET (0 unless defined) from binding OLBVH_BINDING (0) on,
+// in the order of SceneBuffers::list, and the argument of olbvh_open means nothing.
+//
+// What the crate exports is this file with its includes, all names beginning with olbvh_; src/glsl.rs has the guide.
+#ifndef OLBVH_GLSL
+#define OLBVH_GLSL
+#ifndef OLBVH_SET
+#define OLBVH_SET 0
+#endif
+#ifndef OLBVH_BINDING
+#define OLBVH_BINDING 0
+#endif
+#ifdef OLBVH_DESCRIPTORS
+#define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
+    layout(set = OLBVH_SET, binding = OLBVH_BINDING + slot, std430) readonly buffer name##Block { T at[]; } name;
+#else
+#extension GL_EXT_buffer_reference : require
+#extension GL_EXT_buffer_reference_uvec2 : require
+#define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
+    layout(buffer_reference, std430, buffer_reference_align = alignment) readonly buffer name##Block { T at[]; };               \
+    name##Block name;
+#endif
+#define OLBVH_NONE 0xffffffffu
+
+const uint olbvh_NONE = OLBVH_NONE;
+// Every struct that host and device share; build.rs reflects this file into src/layout.rs, comments included.
+
+// The grid of a mesh (SPEC 2.1).
+struct olbvh_Grid {
+    vec4 lo;      // Lower corner of the bounds.
+    vec4 hi;      // Upper corner of the bounds.
+    vec4 inv;     // Finest cells per unit of length, 0 on a flat axis.
+    vec4 extent;  // Upper corner in normalised coordinates.
+    float scale;  // Power of two that brings the largest extent into [1, 2).
+    uint level;   // Level of the leaves, l.
+    uint pad[2];  // Unused.
+};
+
+// What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
+struct olbvh_MeshStatus {
+    uint lo[3];     // Lower corner of the bounds as ordered keys (complemented, so that zeroes mean nothing seen).
+    uint hi[3];     // Upper corner of the bounds as ordered keys.
+    uint bad;       // Tetrahedra left out: index out of range, repeated vertex, coordinate not finite.
+    uint boundary;  // Boundary tetrahedra.
+    uint zero_volume; // Tetrahedra of zero volume.
+    uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
+    uint overflow;  // Not 0: the table of faces was too small; never happens with the planned size.
+    uint pad;       // Unused.
+};
+
+// What a build made (SPEC 2.4, 2.5).
+struct olbvh_BuildStatus {
+    uint level;            // Level of the leaves, l.
+    uint heuristic_level;  // Level that the heuristic chose; above `level` where a capacity clipped it.
+    uint candidates;       // Cells within the quantized boxes of all tetrahedra, the entries of `Aabb`.
+    uint entries;          // n_m.
+    uint nodes;            // n_n.
+    uint internal;         // n_ni.
+    uint leaves;           // Nodes on the last level.
+    uint boundary_leaves;  // Leaves with the boundary flag.
+    uint longest_leaf;     // Entries of the longest leaf.
+    uint pad;              // Unused.
+    uint sum[2];           // Sum of the estimates of Eq. 11, low word first.
+    uint total[22];        // Entries of `Aabb` on every level, low word first.
+    uint levels[11];       // NO: nodes on levels 0 to k.
+    uint overflow;         // Not 0: a capacity was exceeded; never happens with a planned one.
+};
+
+// What a picture needs besides mesh, tree and field; see src/render.
+struct olbvh_RenderPlan {
+    vec4 origin;     // Origin of the ray of pixel (0, 0).
+    vec4 origin_x;   // What one pixel to the right adds to it.
+    vec4 origin_y;   // What one pixel down adds to it.
+    vec4 way;        // Direction of the ray of pixel (0, 0), of any length.
+    vec4 way_x;      // What one pixel to the right adds to it.
+    vec4 way_y;      // What one pixel down adds to it.
+    vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
+    vec4 to_light;   // Unit vector to the light.
+    vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
+    uint size[2];    // Width and height in pixels.
+    float step_size; // Distance of two samples.
+    float inverse_step; // Its reciprocal, rounded on the host.
+    float value_lo;  // Value at place 0 of the table.
+    float value_scale; // Places per unit of value.
+    float termination; // A ray ends once it is this opaque.
+    uint pad;        // Unused.
+};
+
+// Where the march of a ray stands between two dispatches.
+struct olbvh_RayState {
+    vec4 color;     // Gathered colour, premultiplied, and opacity.
+    uint next;      // Number of the next sample.
+    uint end;       // One past the last sample.
+    uint hint;      // Cell of the last sample found, or all ones.
+    uint cursor;    // Entries of the leaf's list already searched for the next sample.
+    uint best;      // Best candidate among them, or all ones.
+    float olbvh_smallest; // Its smallest barycentric coordinate.
+    uint in_box;    // Whether its box holds the sample.
+    uint pad;       // Unused.
+};
+
+// Counters of a picture, 64 bits each, low word first.
+struct olbvh_RenderStatus {
+    uint samples[2]; // Samples taken.
+    uint found[2];   // Samples in the mesh.
+    uint unfinished; // Rays that need another dispatch.
+    uint pad;        // Unused.
+};
+
+// A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31
+// says that the rest is a place in the sorted primitives, bit 30 that a boundary primitive is below, the rest is an internal node or that place.
+struct olbvh_LbvhNode {
+    float lo[3];   // Lower corner of the box in normalised coordinates.
+    uint left;     // Reference to the left child.
+    float hi[3];   // Upper corner of the box.
+    uint right;    // Reference to the right child.
+};
+
+// A stack of layers of voxels over a mesh; see src/slicing.
+struct olbvh_SlicePlan {
+    vec4 origin; // Centre of voxel (0, 0) of layer 0.
+    vec4 across; // From one voxel of a row to the next.
+    vec4 down;   // From one row to the next.
+    vec4 up;     // From one layer to the next.
+    vec4 half0;  // Half axis of a voxel's box in normalised coordinates, along the row.
+    vec4 half1;  // The same from row to row.
+    vec4 half2;  // The same from layer to layer.
+    vec4 reach;  // Half extent of a voxel's box along the axes in the units of the mesh, and a little more.
+    uint width;  // Voxels per row.
+    uint height; // Rows of a layer.
+    uint layers; // Layers.
+    uint pad;    // Unused.
+};
+
+// Where the search for the primitive closest to a voxel stands between two dispatches.
+struct olbvh_TouchState {
+    uint code;    // Morton code of the leaf to go on with; all ones: done.
+    uint entry;   // Entries of that leaf already seen.
+    uint owner;   // Closest primitive so far, or all ones.
+    float square; // Its squared distance.
+};
+
+// Where the location of a run of voxels stands between two dispatches.
+struct olbvh_RunState {
+    uint next;      // Number of the next voxel in the run.
+    uint hint;      // Cell of the last voxel found, or all ones.
+    uint cursor;    // Candidates of the current leaf already tested.
+    uint best;      // Best candidate so far, or all ones.
+    uint in_box;    // Whether the best one's box holds the centre.
+    float olbvh_smallest; // Its smallest barycentric coordinate.
+    uint pad0;      // Unused.
+    uint pad1;      // Unused.
+};
+
+// Counters of a slice.
+struct olbvh_SliceStatus {
+    uint unfinished; // Items that need another dispatch.
+    uint pad;        // Unused.
+};
+
+// The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.
+struct olbvh_NodeFrame {
+    vec4 corner;    // Lower corner of the tree's bounds.
+    vec4 half_size; // Half the tree's bounds.
+    vec4 flat_axis; // 1 where an axis is flat to the quantization, else 0.
+    vec4 joint_lo;  // Lower corner of the joint grid in the units of the meshes.
+    float scale;    // Scale of the joint grid.
+    uint pad0;      // Unused.
+    uint pad1;      // Unused.
+    uint pad2;      // Unused.
+};
+
+// Counters of one direction of an overlap; 64 bits as two words, low first.
+struct olbvh_OverlapStatus {
+    uint waiting;    // Primitives that need a search.
+    uint unfinished; // Primitives that need another dispatch.
+    uint by_vertex;  // Primitives with a vertex in the other mesh, or around one of its vertices.
+    uint by_node;    // Primitives that touch a non-boundary node of the other tree.
+    uint located;    // Vertices that had to be looked up in the list of a leaf.
+    uint pad;        // Unused.
+    uint narrow[2];  // Tests of two tetrahedra by separating axes.
+    uint pairs[2];   // Pairs that touch.
+};
+
+// Where the search of a primitive stands between two dispatches.
+struct olbvh_SearchState {
+    uint code;  // Morton code of the leaf to go on with; all ones: done.
+    uint entry; // Entries of that leaf already seen.
+    uint phase; // 0: non-boundary nodes; 1: lists.
+    uint place; // Pairs found so far, or where the next one goes.
+};
+
+// Where a mesh and its tree lie, for the shaders of other programs: device addresses, low word first. See src/glsl.rs.
+struct olbvh_SceneAddresses {
+    uvec2 olbvh_grid;       // Grid with the level of the leaves.
+    uvec2 olbvh_masks;      // Child masks.
+    uvec2 olbvh_co;         // Child offsets.
+    uvec2 olbvh_po;         // Primitive offsets.
+    uvec2 olbvh_p;          // Primitive ids.
+    uvec2 olbvh_flags;      // Boundary flags.
+    uvec2 olbvh_cells;      // Vertex indices.
+    uvec2 olbvh_vertices;   // Normalised coordinates.
+    uvec2 olbvh_neighbours; // Neighbour table.
+    uvec2 olbvh_field;      // One float per point, or anything where no field is asked for.
+    uint lists;       // 1: leaves within the mesh have a seed instead of a list.
+    uint pad;         // Unused.
+};
+
+OLBVH_BUFFER(0, 8, olbvh_SceneAddresses, olbvh_scene)
+OLBVH_BUFFER(1, 16, olbvh_Grid, olbvh_grid)
+OLBVH_BUFFER(2, 4, uint, olbvh_masks)
+OLBVH_BUFFER(3, 4, uint, olbvh_co)
+OLBVH_BUFFER(4, 4, uint, olbvh_po)
+OLBVH_BUFFER(5, 4, uint, olbvh_p)
+OLBVH_BUFFER(6, 4, uint, olbvh_flags)
+OLBVH_BUFFER(7, 16, uvec4, olbvh_cells)
+OLBVH_BUFFER(8, 16, vec4, olbvh_vertices)
+OLBVH_BUFFER(9, 16, uvec4, olbvh_neighbours)
+OLBVH_BUFFER(10, 4, float, olbvh_field)
+uint olbvh_LISTS;
+
+// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs: the same operations in the same order.
+
+const uint olbvh_MAX_LEVEL = 10u;
+
+// x without denormals.
+float olbvh_canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
+
+// Distance from the lower corner, per axis.
+vec3 olbvh_from_corner(olbvh_Grid g, vec3 x) {
+    precise vec3 d = vec3(olbvh_canonical(x.x), olbvh_canonical(x.y), olbvh_canonical(x.z)) - g.lo.xyz;
+    return vec3(olbvh_canonical(d.x), olbvh_canonical(d.y), olbvh_canonical(d.z));
+}
+
+// Cell of the finest grid, clamped into the grid.
+uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
+    precise vec3 q = floor(olbvh_from_corner(g, x) * g.inv.xyz);
+    return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
+}
+
+// Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
+vec3 olbvh_normalise(olbvh_Grid g, vec3 x) {
+    precise vec3 unit = olbvh_from_corner(g, x) * g.scale;
+    unit = vec3(olbvh_canonical(unit.x), olbvh_canonical(unit.y), olbvh_canonical(unit.z));
+    precise vec3 whole = floor(unit * uintBitsToFloat((82u + 127u) << 23));
+    precise vec3 r = whole * uintBitsToFloat((127u - 42u) << 23);
+    return r;
+}
+
+uint olbvh_spread(uint v) {
+    v = (v | v << 16) & 0x030000ffu;
+    v = (v | v << 8) & 0x0300f00fu;
+    v = (v | v << 4) & 0x030c30c3u;
+    return (v | v << 2) & 0x09249249u;
+}
+
+uint olbvh_gather(uint v) {
+    v &= 0x09249249u;
+    v = (v | v >> 2) & 0x030c30c3u;
+    v = (v | v >> 4) & 0x0300f00fu;
+    v = (v | v >> 8) & 0x030000ffu;
+    return (v | v >> 16) & 0x000003ffu;
+}
+
+// Morton code of a cell (Eq. 1), and back.
+uint olbvh_morton(uvec3 q) { return olbvh_spread(q.x) << 2 | olbvh_spread(q.y) << 1 | olbvh_spread(q.z); }
+uvec3 olbvh_unmorton(uint code) { return uvec3(olbvh_gather(code >> 2), olbvh_gather(code >> 1), olbvh_gather(code)); }
+
+// Deterministic reciprocal: see src/reference/grid.rs.
+float olbvh_reciprocal(float x) {
+    float a = abs(x);
+    precise float r = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(a));
+    for (int i = 0; i < 4; ++i) {
+        precise float e = a * r;
+        precise float f = 2.0 - e;
+        r = r * f;
+    }
+    return x < 0.0 ? -r : r;
+}
+// Orientation, containment, barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of src/reference/tet.rs: the
+// same operations in the same order.
+
+vec3 olbvh_cross_product(vec3 a, vec3 b) {
+    precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+    return r;
+}
+
+float olbvh_dot_product(vec3 a, vec3 b) {
+    precise float r = (a.x * b.x + a.y * b.y) + a.z * b.z;
+    return r;
+}
+
+// Six times the signed volume of (a, b, c, p).
+float olbvh_orient(vec3 a, vec3 b, vec3 c, vec3 olbvh_p) {
+    precise vec3 ab = b - a;
+    precise vec3 ac = c - a;
+    precise vec3 ap = olbvh_p - a;
+    return olbvh_dot_product(olbvh_cross_product(ab, ac), ap);
+}
+
+// A tetrahedron with its vertices in ascending global index.
+struct olbvh_Tet {
+    vec3 v[4];
+    uvec4 rank; // place in v of each vertex as the caller numbered them
+};
+
+// A point relative to a tetrahedron.
+struct olbvh_Weights {
+    vec4 w;      // signed volumes opposite to the vertices in ascending index, positive inside
+    float sum;
+    bool in_box; // inside the closed box of the vertices
+    bool inside; // the closed, not flat cell holds the point
+    bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
+    float margin; // a weight this near to 0 may be that of a point on either side of the face, by rounding
+};
+
+// Ascending places of four different vertex indices.
+uvec4 olbvh_ranks(uvec4 ids) {
+    uint yx = uint(ids.y < ids.x), zx = uint(ids.z < ids.x), wx = uint(ids.w < ids.x);
+    uint zy = uint(ids.z < ids.y), wy = uint(ids.w < ids.y), wz = uint(ids.w < ids.z);
+    return uvec4(yx + zx + wx, (1u - yx) + zy + wy, (1u - zx) + (1u - zy) + wz, (1u - wx) + (1u - wy) + (1u - wz));
+}
+
+vec3 olbvh_select_rank(uvec4 rank, uint r, vec3 a, vec3 b, vec3 c, vec3 d) {
+    return rank.x == r ? a : rank.y == r ? b : rank.z == r ? c : d;
+}
+
+// From corners in the caller's order.
+olbvh_Tet olbvh_make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
+    olbvh_Tet t;
+    t.rank = olbvh_ranks(ids);
+    for (uint r = 0u; r < 4u; ++r) t.v[r] = olbvh_select_rank(t.rank, r, a, b, c, d);
+    return t;
+}
+
+float olbvh_volume(olbvh_Tet t) { return olbvh_orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
+
+olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
+    float vol = olbvh_volume(t);
+    float s = vol < 0.0 ? -1.0 : 1.0;
+    olbvh_Weights r;
+    r.w = vec4(-s * olbvh_orient(t.v[1], t.v[2], t.v[3], olbvh_p), s * olbvh_orient(t.v[0], t.v[2], t.v[3], olbvh_p), -s * olbvh_orient(t.v[0], t.v[1], t.v[3], olbvh_p),
+               s * olbvh_orient(t.v[0], t.v[1], t.v[2], olbvh_p));
+    precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
+    r.sum = sum;
+    vec3 lo = min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
+    vec3 hi = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3]));
+    r.in_box = all(lessThanEqual(lo, olbvh_p)) && all(lessThanEqual(olbvh_p, hi));
+    float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
+    r.inside = r.in_box && vol != 0.0 && least >= 0.0;
+    precise vec3 size = hi - lo;
+    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    r.clear = r.inside && least > margin;
+    r.margin = margin;
+    return r;
+}
+
+// Whether no face says outside by more than the margin.
+bool olbvh_near(olbvh_Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
+
+const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
+
+// Smallest barycentric coordinate; the smallest float for a flat cell.
+float olbvh_smallest(olbvh_Weights r) {
+    if (r.sum <= 0.0) return olbvh_SMALLEST_FLOAT;
+    precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * olbvh_reciprocal(r.sum);
+    return b;
+}
+
+// Barycentric coordinates in the caller's order of vertices.
+vec4 olbvh_barycentric(olbvh_Weights r, uvec4 rank) {
+    float k = r.sum <= 0.0 ? 0.0 : olbvh_reciprocal(r.sum);
+    precise vec4 b = vec4(r.w[rank.x], r.w[rank.y], r.w[rank.z], r.w[rank.w]) * k;
+    return b;
+}
+// A node as predicates see it.
+struct olbvh_Node {
+    uint index;
+    uint level;
+    uint code; // Morton code of its cell at that level
+};
+// A tree as queries see it (SPEC 2.5). The including kernel declares: grid, masks, co, po, p, and where used flags, cells, vertices.
+
+uint olbvh_child_mask(uint node) { return olbvh_masks.at[node >> 2u] >> (8u * (node & 3u)) & 0xffu; }
+
+uint olbvh_child_of(uint node, uint mask, uint digit) { return olbvh_co.at[node] + 1u + bitCount(mask & ((1u << digit) - 1u)); }
+
+// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
+uint olbvh_find_leaf(uint level, uvec3 finest) {
+    uint code = olbvh_morton(finest) >> (3u * (olbvh_MAX_LEVEL - level));
+    uint node = 0u;
+    for (uint k = level; k > 0u; --k) {
+        uint digit = code >> (3u * (k - 1u)) & 7u;
+        uint mask = olbvh_child_mask(node);
+        if ((mask >> digit & 1u) == 0u) return olbvh_NONE;
+        node = olbvh_child_of(node, mask, digit);
+    }
+    return node;
+}
+
+// First entry of a node and the one behind its last.
+uvec2 olbvh_entry_range(uint node) {
+    uint begin = olbvh_po.at[node], end = olbvh_po.at[node + 1u];
+    return uvec2(begin >= end ? 0u : begin, end);
+}
+// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
+
+// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl, and vertices.
+
+// Far outside of the bounds, or not a number: no mesh can be there.
+bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
+    precise vec3 t = olbvh_from_corner(g, x) * g.scale;
+    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+}
+
+olbvh_Tet olbvh_load_tet(uvec4 ids) {
+    return olbvh_make_tet(ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
+}
+
+// The best of the candidates so far.
+struct olbvh_Best {
+    uint owner; // NONE: none yet
+    bool inside;
+    bool in_box;
+    float olbvh_smallest;
+};
+
+olbvh_Best olbvh_no_best() { return olbvh_Best(olbvh_NONE, false, false, olbvh_SMALLEST_FLOAT); }
+
+// Where the search for an owner stands, if it takes more than one dispatch.
+struct olbvh_OwnerSearch {
+    uint cursor; // what has been searched
+    olbvh_Best best;
+};
+
+olbvh_OwnerSearch olbvh_no_search() { return olbvh_OwnerSearch(0u, olbvh_no_best()); }
+
+// Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
+// smallest barycentric coordinate, then the lowest id. Flat cells never.
+void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights w) {
+    if (w.inside) {
+        if (!best.inside || t < best.owner) best = olbvh_Best(t, true, true, 0.0);
+        return;
+    }
+    if (best.inside) return;
+    float s = olbvh_smallest(w);
+    bool closer = s > best.olbvh_smallest || (s == best.olbvh_smallest && t < best.owner);
+    bool better = best.owner == olbvh_NONE || (w.in_box && !best.in_box) || (w.in_box == best.in_box && closer);
+    if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
+}
+
+// Looks at entries [begin, end) in order, ends at the first that contains x.
+void olbvh_search(inout olbvh_Best best, uint begin, uint end, vec3 x) {
+    for (uint i = begin; i < end; ++i) {
+        uint t = olbvh_p.at[i];
+        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_consider(best, t, tet, olbvh_weights(tet, x));
+        if (best.inside) return;
+    }
+}
+
+bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
+
+// The owner after the whole list has been searched.
+uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
+    if (best.owner == olbvh_NONE || best.inside) return best.owner;
+    return !olbvh_is_boundary_node(leaf) || best.olbvh_smallest >= -tolerance ? best.owner : olbvh_NONE;
+}
+// Point location in a leaf without list. Twin of `in_leaf` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and
+// neighbours.
+
+// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
+
+float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
+
+vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
+    precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
+    precise vec3 whole = g.extent.xyz * 0.5;
+    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
+}
+
+vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
+    precise vec3 a = vec3(2u * cell + 1u) * h;
+    precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
+    return b;
+}
+// Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it: the same operations in the same order. Needs
+// candidates.glsl, cells and neighbours.
+const uint olbvh_STAR = 128u;    // tetrahedra of a star
+const uint olbvh_STEPS = 512u;   // of part 1
+const uint olbvh_HINTED = 16u;   // from a hint
+const uint olbvh_LEG = 1024u;    // along one segment
+const uint olbvh_DETOURS = 8u;   // points to go by
+const uint olbvh_ARRIVALS = 2u;  // stars that part 1 looks at
+const float olbvh_GAP = -7.62939453125e-6; // -2^-17
+
+// Cell of a leaf in normalised coordinates.
+struct olbvh_Room {
+    vec3 centre;
+    vec3 half_size;
+};
+
+uint olbvh_star[olbvh_STAR];
+uint olbvh_star_size;
+
+bool olbvh_in_star(uint t) {
+    for (uint i = 0u; i < olbvh_star_size; ++i) {
+        if (olbvh_star[i] == t) return true;
+    }
+    return false;
+}
+
+// Weights in the caller's order of vertices, which is that of the faces.
+vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
+
+// Takes into the star what lies beside `t`, one of it.
+void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
+    vec4 own = olbvh_own_weights(w, tet);
+    uvec4 beside = olbvh_neighbours.at[t];
+    for (uint f = 0u; f < 4u; ++f) {
+        uint u = beside[f];
+        if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
+        if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_cells.at[u]), x))) olbvh_star[olbvh_star_size++] = u;
+    }
+}
+
+// Looks for the owner in the star of x in `first`.
+void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
+    olbvh_star[0] = first;
+    olbvh_star_size = 1u;
+    for (uint i = 0u; i < olbvh_star_size; ++i) {
+        uint t = olbvh_star[i];
+        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_Weights w = olbvh_weights(tet, x);
+        olbvh_consider(best, t, tet, w);
+        olbvh_grow_star(t, tet, w, x);
+    }
+}
+
+bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.olbvh_smallest >= olbvh_GAP); }
+
+// Part 1, from `t` for at most `most` steps; whether the owner is settled.
+bool olbvh_walk_towards(uint t, vec3 x, uint most, inout olbvh_Best best) {
+    uint arrivals = 0u;
+    for (uint s = 0u; s < most; ++s) {
+        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_Weights w = olbvh_weights(tet, x);
+        if (w.clear) {
+            best = olbvh_Best(t, true, true, 0.0);
+            break;
+        }
+        if (olbvh_near(w)) {
+            olbvh_arrive(t, x, best);
+            if (olbvh_settled(best) || ++arrivals == olbvh_ARRIVALS) break;
+        }
+        vec4 own = olbvh_own_weights(w, tet);
+        uint face = 0u;
+        for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+        if (own[face] >= 0.0) break;
+        t = olbvh_neighbours.at[t][face];
+        if (t == olbvh_NONE) break;
+    }
+    return olbvh_settled(best);
+}
+
+// Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
+uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
+    uint from = olbvh_NONE;
+    for (uint s = 0u; s < olbvh_LEG; ++s) {
+        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
+        uvec4 beside = olbvh_neighbours.at[t];
+        float first = 3.40282347e38;
+        uint next = olbvh_NONE;
+        for (uint f = 0u; f < 4u; ++f) {
+            if (behind[f] >= 0.0 || beside[f] == from) continue;
+            float here = max(before[f], 0.0);
+            precise float length = here - behind[f];
+            precise float at = here * olbvh_reciprocal(length);
+            if (at < first) {
+                first = at;
+                next = beside[f];
+            }
+        }
+        if (next == olbvh_NONE) break;
+        from = t;
+        t = next;
+    }
+    return t;
+}
+
+// Point number k of the cell, the first its centre.
+vec3 olbvh_room_point(olbvh_Room room, uint k) {
+    vec3 olbvh_p;
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * uintBitsToFloat((127u - 23u) << 23) - 1.0;
+        float away = k == 0u ? 0.0 : part;
+        precise float at = room.centre[c] + room.half_size[c] * away;
+        precise float whole = floor(at * uintBitsToFloat((127u + 42u) << 23)) * uintBitsToFloat((127u - 42u) << 23);
+        olbvh_p[c] = whole;
+    }
+    return olbvh_p;
+}
+
+// Walks to a point x of a cell that is full of mesh, from its seed.
+olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
+    olbvh_Best best = olbvh_no_best();
+    if (olbvh_walk_towards(seed, x, olbvh_STEPS, best)) return best;
+    for (uint k = 0u; k < olbvh_DETOURS; ++k) {
+        vec3 by = olbvh_room_point(room, k);
+        uint t = k == 0u ? seed : olbvh_walk_leg(seed, room.centre, by);
+        olbvh_arrive(olbvh_walk_leg(t, by, x), x, best);
+        if (olbvh_settled(best)) break;
+    }
+    return best;
+}
+
+// Whether a leaf is one to walk through: full of mesh, its list left out.
+bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
+
+// The owner of x, the normalised point `at`, from a hint (or NONE) or the leaf's seed.
+olbvh_Best olbvh_walk_in(olbvh_Grid g, uint seed, uint hint, vec3 at, vec3 x) {
+    olbvh_Best best = olbvh_no_best();
+    if (hint != olbvh_NONE && olbvh_walk_towards(hint, x, olbvh_HINTED, best)) return best;
+    olbvh_Room room;
+    room.half_size = olbvh_half_cell(g, g.level);
+    room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+    return olbvh_walk_from_seed(seed, room, x);
+}
+
+// Names the tree that the functions below mean.
+void olbvh_open(uvec2 tree) {
+#ifndef OLBVH_DESCRIPTORS
+    olbvh_scene = olbvh_sceneBlock(tree);
+    olbvh_SceneAddresses a = olbvh_scene.at[0];
+    olbvh_grid = olbvh_gridBlock(a.olbvh_grid);
+    olbvh_masks = olbvh_masksBlock(a.olbvh_masks);
+    olbvh_co = olbvh_coBlock(a.olbvh_co);
+    olbvh_po = olbvh_poBlock(a.olbvh_po);
+    olbvh_p = olbvh_pBlock(a.olbvh_p);
+    olbvh_flags = olbvh_flagsBlock(a.olbvh_flags);
+    olbvh_cells = olbvh_cellsBlock(a.olbvh_cells);
+    olbvh_vertices = olbvh_verticesBlock(a.olbvh_vertices);
+    olbvh_neighbours = olbvh_neighboursBlock(a.olbvh_neighbours);
+    olbvh_field = olbvh_fieldBlock(a.olbvh_field);
+#endif
+    olbvh_LISTS = olbvh_scene.at[0].lists;
+}
+
+// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and its barycentric coordinates in the order of the cell's vertices. A
+// point outside of the mesh is found if its smallest coordinate in the nearest cell is at least -tolerance.
+uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
+    weights_of_owner = vec4(0.0);
+    olbvh_Grid g = olbvh_grid.at[0];
+    uint leaf = olbvh_near_bounds(g, place) ? olbvh_find_leaf(g.level, olbvh_quantize(g, place)) : olbvh_NONE;
+    if (leaf == olbvh_NONE) return olbvh_NONE;
+    vec3 x = olbvh_normalise(g, place);
+    uvec2 range = olbvh_entry_range(leaf);
+    olbvh_Best best = olbvh_no_best();
+    if (olbvh_walks_in(leaf, range)) best = olbvh_walk_in(g, olbvh_p.at[range.x], olbvh_NONE, place, x);
+    else olbvh_search(best, range.x, range.y, x);
+    uint owner = olbvh_decide(best, leaf, tolerance);
+    if (owner == olbvh_NONE) return olbvh_NONE;
+    olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[owner]);
+    weights_of_owner = olbvh_barycentric(olbvh_weights(tet, x), tet.rank);
+    return owner;
+}
+
+// Every tetrahedron that contains a point, the first OLBVH_OWNERS of them in `owners`; their number. In no order.
+#ifndef OLBVH_OWNERS
+#define OLBVH_OWNERS 32
+#endif
+uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
+    olbvh_Grid g = olbvh_grid.at[0];
+    uint leaf = olbvh_near_bounds(g, place) ? olbvh_find_leaf(g.level, olbvh_quantize(g, place)) : olbvh_NONE;
+    if (leaf == olbvh_NONE) return 0u;
+    vec3 x = olbvh_normalise(g, place);
+    uvec2 range = olbvh_entry_range(leaf);
+    bool by_walk = olbvh_walks_in(leaf, range);
+    if (by_walk) {
+        olbvh_Best first = olbvh_walk_in(g, olbvh_p.at[range.x], olbvh_NONE, place, x), unused = olbvh_no_best();
+        olbvh_arrive(first.owner, x, unused);
+        range = uvec2(0u, olbvh_star_size);
+    }
+    uint n = 0u;
+    for (uint i = range.x; i < range.y; ++i) {
+        uint t = by_walk ? olbvh_star[i] : olbvh_p.at[i];
+        if (!olbvh_weights(olbvh_load_tet(olbvh_cells.at[t]), x).inside) continue;
+        if (n < OLBVH_OWNERS) owners[n] = t;
+        ++n;
+    }
+    return n;
+}
+
+// Value of the field, which has one value per point of the mesh, in a tetrahedron.
+float olbvh_value(uint owner, vec4 weights_of_owner) {
+    uvec4 v = olbvh_cells.at[owner];
+    return dot(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
+}
+
+// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
+vec3 olbvh_gradient(uint owner) {
+    uvec4 v = olbvh_cells.at[owner];
+    vec3 a = olbvh_vertices.at[v.x].xyz, e1 = olbvh_vertices.at[v.y].xyz - a, e2 = olbvh_vertices.at[v.z].xyz - a, e3 = olbvh_vertices.at[v.w].xyz - a;
+    // Normalised coordinates lie in [0, 2^41).
+    const float UNIT = 1.0 / 1099511627776.0;
+    e1 *= UNIT;
+    e2 *= UNIT;
+    e3 *= UNIT;
+    float six_volumes = dot(e1, cross(e2, e3)), f = olbvh_field.at[v.x];
+    if (six_volumes == 0.0) return vec3(0.0);
+    vec3 sum = (olbvh_field.at[v.y] - f) * cross(e2, e3) + (olbvh_field.at[v.z] - f) * cross(e3, e1) + (olbvh_field.at[v.w] - f) * cross(e1, e2);
+    return sum / six_volumes * olbvh_grid.at[0].scale;
+}
+
+// Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
+//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
+//     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
+// olbvh_node_box gives a node's box, olbvh_entries its primitives: ids at olbvh_primitive(i) for i in [x, y).
+#ifdef OLBVH_TRAVERSE
+#ifndef OLBVH_STACK
+#define OLBVH_STACK 8
+#endif
+const uint olbvh_STACK = OLBVH_STACK;
+bool olbvh_visit_node(olbvh_Node node);
+bool olbvh_visit_leaf(olbvh_Node node);
+// Traversal for predicates with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of src/reference/traverse.rs, which
+// explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
+//     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
+//     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+// STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+const uint olbvh_MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
+
+// True if the traversal ended by itself, false at the loop limit.
+bool olbvh_traverse(uint level) {
+    olbvh_Node node = olbvh_Node(0u, 0u, 0u);
+    if (!olbvh_visit_node(node)) return true;
+    if (level == 0u) {
+        olbvh_visit_leaf(node);
+        return true;
+    }
+    olbvh_Node stack[olbvh_STACK];
+    uint top = 0u, held = 0u; // ring: the oldest node is dropped where there is no room
+    uint trail = 0u, resume = 0u;
+    for (uint visits = 0u; visits < olbvh_MAX_VISITS; ++visits) {
+        bool leaves = node.level + 1u == level;
+        uint mask = olbvh_child_mask(node.index), first = olbvh_co.at[node.index] + 1u;
+        uint accepted = 0u, place = first; // bit per digit
+        for (uint digit = 0u; digit < 8u; ++digit) {
+            if ((mask >> digit & 1u) == 0u) continue;
+            olbvh_Node child = olbvh_Node(place++, node.level + 1u, node.code << 3 | digit);
+            if (!olbvh_visit_node(child)) continue;
+            if (!leaves) accepted |= 1u << digit;
+            else if (olbvh_visit_leaf(child)) return true;
+        }
+        uint n = bitCount(accepted);
+        if (n > 0u) {
+            uint shift = 3u * node.level;
+            if (node.level >= resume) trail |= (n - 1u) << shift;
+            uint left = min(trail >> shift & 7u, n - 1u);
+            // Siblings behind the next node, last first; then the next node itself.
+            olbvh_Node parent = node;
+            for (uint k = 0u; k <= left; ++k) {
+                uint digit = uint(findMSB(accepted));
+                accepted ^= 1u << digit;
+                node = olbvh_Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
+                if (k < left) {
+                    stack[top] = node;
+                    top = top + 1u == olbvh_STACK ? 0u : top + 1u;
+                    held = min(held + 1u, olbvh_STACK);
+                }
+            }
+            continue;
+        }
+        if (trail == 0u) return true;
+        uint at = uint(findMSB(trail)) / 3u;
+        trail -= 1u << (3u * at);
+        if (held > 0u) {
+            top = top == 0u ? olbvh_STACK - 1u : top - 1u;
+            --held;
+            node = stack[top];
+            resume = 0u;
+        } else {
+            node = olbvh_Node(0u, 0u, 0u);
+            resume = at + 1u;
+        }
+    }
+    return false;
+}
+// Box of a cell in the units of the mesh (SPEC 2.1). Twin of `cell_box` in src/reference/leaves.rs.
+
+float olbvh_cell_side(olbvh_Grid g, uint c, uint level, uint k) {
+    if (k == 0u) return g.lo[c];
+    if (k == 1u << level || g.inv[c] == 0.0) return g.hi[c];
+    precise float extent = g.hi[c] - g.lo[c];
+    precise float along = float(k) * uintBitsToFloat((127u - level) << 23);
+    precise float offset = olbvh_canonical(extent) * along;
+    precise float x = g.lo[c] + offset;
+    return olbvh_canonical(x);
+}
+
+// Lower and upper corner of the cell with this Morton code.
+void olbvh_cell_box(olbvh_Grid g, uint level, uint code, out vec3 lo, out vec3 hi) {
+    uvec3 k = olbvh_unmorton(code);
+    for (uint c = 0u; c < 3u; ++c) {
+        lo[c] = olbvh_cell_side(g, c, level, k[c]);
+        hi[c] = olbvh_cell_side(g, c, level, k[c] + 1u);
+    }
+}
+
+// Visits the tree; false if it was too large to visit in one go (24,000 inner nodes).
+bool olbvh_traverse() { return olbvh_traverse(olbvh_grid.at[0].level); }
+
+void olbvh_node_box(olbvh_Node node, out vec3 lo, out vec3 hi) { olbvh_cell_box(olbvh_grid.at[0], node.level, node.code, lo, hi); }
+
+bool olbvh_is_boundary(olbvh_Node node) { return olbvh_is_boundary_node(node.index); }
+
+uvec2 olbvh_entries(olbvh_Node node) { return olbvh_entry_range(node.index); }
+
+uint olbvh_primitive(uint entry) { return olbvh_p.at[entry]; }
+#endif
+#endif

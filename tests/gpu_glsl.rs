@@ -1,0 +1,192 @@
+//! `olbvh.glsl` in a shader of a host's own gives the answers of the library, by address and by descriptors.
+
+#![allow(clippy::unwrap_used, unsafe_code)]
+
+use ash::vk;
+use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
+use olbvh::glsl::{OLBVH, SceneBuffers};
+use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
+use olbvh::mesh::kuhn_jittered;
+use olbvh::options::{BuildOptions, Lists};
+use olbvh::query::{LocateOptions, locate, locate_all};
+
+/// A host's kernel: five words per point.
+const KERNEL: &str = r#"
+#version 460
+#define OLBVH_TRAVERSE
+#define OLBVH_SET 1
+#define OLBVH_BINDING 3
+#include "olbvh.glsl"
+layout(local_size_x = 64) in;
+layout(push_constant) uniform Push { uvec2 tree; uint count; };
+layout(set = 0, binding = 0) readonly buffer Points { float points[]; };
+layout(set = 0, binding = 1) writeonly buffer Out { uint found[]; };
+
+// Names that a host may use as well.
+struct Grid { int best; };
+float weights;
+uint NONE, quantize, morton, search, tree_depth;
+
+vec3 at;
+uint met;
+bool olbvh_visit_node(olbvh_Node node) {
+    vec3 lo, hi;
+    olbvh_node_box(node, lo, hi);
+    return all(lessThanEqual(lo, at)) && all(lessThanEqual(at, hi));
+}
+bool olbvh_visit_leaf(olbvh_Node node) {
+    uvec2 range = olbvh_entries(node);
+    for (uint i = range.x; i < range.y; ++i) met = min(met, olbvh_primitive(i));
+    return false;
+}
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    at = vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    olbvh_open(tree);
+    vec4 b;
+    uint owner = olbvh_locate(at, 1e-5, b);
+    uint owners[OLBVH_OWNERS];
+    met = OLBVH_NONE;
+    olbvh_traverse();
+    found[5 * i] = owner;
+    found[5 * i + 1] = olbvh_owners(at, owners);
+    found[5 * i + 2] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_value(owner, b));
+    found[5 * i + 3] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_gradient(owner).y);
+    found[5 * i + 4] = met;
+}
+"#;
+
+fn compile(binding: Binding) -> Vec<u32> {
+    let compiler = shaderc::Compiler::new().unwrap();
+    let mut options = shaderc::CompileOptions::new().unwrap();
+    options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
+    if binding == Binding::Descriptors {
+        options.add_macro_definition("OLBVH_DESCRIPTORS", None);
+    }
+    options.set_include_callback(|name, _, _, _| {
+        assert_eq!(name, "olbvh.glsl");
+        Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content: OLBVH.into() })
+    });
+    compiler.compile_into_spirv(KERNEL, shaderc::ShaderKind::Compute, "host.comp", "main", Some(&options)).unwrap().as_binary().to_vec()
+}
+
+/// Runs the host's kernel over points.
+fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
+    let device = gpu.device();
+    let input = gpu.upload("olbvh.test.points", points).unwrap();
+    let output = gpu.buffer("olbvh.test.found", 20 * points.len() as u64).unwrap();
+    let addresses = gpu.upload("olbvh.test.scene", &[scene.addresses()]).unwrap();
+    let list = scene.list(addresses.all());
+    let sets = [[(0, input.all()), (1, output.all())].to_vec(), (3..).zip(list).collect::<Vec<_>>()];
+    // SAFETY: plain creation and use of a pipeline with its sets; `run` waits, and everything is destroyed afterwards.
+    unsafe {
+        let layouts = sets.clone().map(|set| {
+            let binding = |(i, _): &(u32, BufferRef)| {
+                let b = vk::DescriptorSetLayoutBinding::default().binding(*i).descriptor_count(1);
+                b.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::COMPUTE)
+            };
+            let bindings: Vec<_> = set.iter().map(binding).collect();
+            device.create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None).unwrap()
+        });
+        let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: 13 }];
+        let pool = device.create_descriptor_pool(&vk::DescriptorPoolCreateInfo::default().max_sets(2).pool_sizes(&sizes), None).unwrap();
+        let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+        let handles = device.allocate_descriptor_sets(&info).unwrap();
+        for (handle, set) in handles.iter().zip(&sets) {
+            for (i, b) in set {
+                let info = [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size }];
+                let write = vk::WriteDescriptorSet::default().dst_set(*handle).dst_binding(*i).buffer_info(&info);
+                device.update_descriptor_sets(&[write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER)], &[]);
+            }
+        }
+        let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(12)];
+        let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(&ranges);
+        let layout = device.create_pipeline_layout(&info, None).unwrap();
+        let code = compile(gpu.binding());
+        let module = device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&code), None).unwrap();
+        let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module).name(c"main");
+        let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
+        let pipeline = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).unwrap()[0];
+        let address = addresses.all().address;
+        let push = [address as u32, (address >> 32) as u32, points.len() as u32];
+        gpu.run("olbvh.test.host", |r| {
+            let commands = r.commands();
+            device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
+            device.cmd_bind_descriptor_sets(commands, vk::PipelineBindPoint::COMPUTE, layout, 0, &handles, &[]);
+            device.cmd_push_constants(commands, layout, vk::ShaderStageFlags::COMPUTE, 0, bytemuck::cast_slice(&push));
+            device.cmd_dispatch(commands, (points.len() as u32).div_ceil(64), 1, 1);
+            Ok(())
+        })
+        .unwrap();
+        device.destroy_pipeline(pipeline, None);
+        device.destroy_shader_module(module, None);
+        device.destroy_pipeline_layout(layout, None);
+        device.destroy_descriptor_pool(pool, None);
+        for l in layouts {
+            device.destroy_descriptor_set_layout(l, None);
+        }
+    }
+    gpu.download(&output, output.all()).unwrap()
+}
+
+fn check(binding: Binding) {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    let mesh = kuhn_jittered([9, 8, 7], 0.3, 5).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    // Vertices, and points of a lattice that reaches out of the mesh.
+    let mut points = mesh.points.clone();
+    points.extend((0..3000).map(|i| [(i % 13) as f32 * 0.81 - 0.5, (i / 13 % 13) as f32 * 0.73 - 0.4, (i / 169) as f32 * 0.47 - 0.3]));
+    // A linear field: its values are those of the places, its gradient is the same everywhere.
+    let values: Vec<f32> = mesh.points.iter().map(|p| 3.0 + p[0] + 2.0 * p[1] - p[2]).collect();
+    let field = gpu.upload("olbvh.test.field", &values).unwrap();
+    for lists in [Lists::All, Lists::Boundary] {
+        let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
+        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+        let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
+        let options = LocateOptions::default();
+        let expected = locate(&device, &tree, &points, None, &options, &|_, _| {}).unwrap();
+        let all = locate_all(&device, &tree, &points, &options, &|_, _| {}).unwrap();
+        for (i, [owner, owners, value, slope, met]) in found.into_iter().enumerate() {
+            let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
+            assert_eq!(owner, expected.owners[i], "{what}");
+            if owner == u32::MAX {
+                continue;
+            }
+            // Beyond the surface a point has the nearest cell as its owner, and none that contains it.
+            assert!(owners as usize == all[i].len() || owners == 0, "{what}: {owners} owners of {:?}", all[i]);
+            let p = points[i];
+            assert!((f32::from_bits(value) - (3.0 + p[0] + 2.0 * p[1] - p[2])).abs() < 1e-3, "{what}: {}", f32::from_bits(value));
+            assert!((f32::from_bits(slope) - 2.0).abs() < 1e-2, "{what}: {}", f32::from_bits(slope));
+            assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
+        }
+        assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
+    }
+    assert!(gpu.validation_messages().is_empty(), "{:#?}", gpu.validation_messages());
+}
+
+#[test]
+fn by_address() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    if gpu.binding() == Binding::Descriptors {
+        println!("NOT RUN: the device has no buffer addresses");
+        return;
+    }
+    check(Binding::Address);
+}
+
+#[test]
+fn by_descriptors() {
+    check(Binding::Descriptors);
+}
+
+#[test]
+fn the_file_in_the_repository_is_the_exported_one() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/include/olbvh.glsl");
+    let same = std::fs::read_to_string(file).unwrap() == OLBVH;
+    if !same && std::env::var_os("OLBVH_BLESS").is_some() {
+        std::fs::write(file, OLBVH).unwrap();
+    }
+    assert!(same, "include/olbvh.glsl is old; OLBVH_BLESS=1 writes it anew");
+}
