@@ -2,91 +2,20 @@
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
+mod host;
+
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
-use olbvh::build::{
-    BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshInput, MeshScratch, MeshView, Tree, TreeMemory, cmd_build,
-    cmd_prepare_mesh,
-};
-use olbvh::gpu::{Binding, Enabled, Gpu, GpuOptions, HostDevice, Recorder, Requirements};
+use host::{Frame, Host};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::primitives::Arena;
-use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, locate};
+use olbvh::query::{LocateOptions, locate};
 use std::cell::Cell;
 use std::ffi::c_void;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, OnceLock};
-
-/// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses.
-struct Host {
-    _entry: ash::Entry,
-    instance: ash::Instance,
-    physical: vk::PhysicalDevice,
-    device: ash::Device,
-    family: u32,
-    addresses: bool,
-    control: bool,
-}
-
-impl Host {
-    fn new() -> Self {
-        // SAFETY: plain creation; `drop` destroys device and instance once.
-        unsafe {
-            let entry = ash::Entry::load().unwrap();
-            let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
-            let instance = entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&application), None).unwrap();
-            let physical = instance.enumerate_physical_devices().unwrap()[0];
-            let needs = Requirements::check(&instance, physical);
-            assert!(needs.missing.is_empty(), "{:?}", needs.missing);
-            let family = needs.queue_family.unwrap().0;
-            let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-            let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(needs.buffer_addresses);
-            let mut control =
-                vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
-            let extensions = [ash::ext::subgroup_size_control::NAME.as_ptr()];
-            let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses);
-            if needs.subgroup_size_control {
-                info = info.push_next(&mut control).enabled_extension_names(&extensions);
-            }
-            let device = instance.create_device(physical, &info, None).unwrap();
-            let (addresses, control) = (needs.buffer_addresses, needs.subgroup_size_control);
-            Self { _entry: entry, instance, physical, device, family, addresses, control }
-        }
-    }
-
-    fn enabled(&self) -> Enabled {
-        Enabled { buffer_addresses: self.addresses, subgroup_size_control: self.control, ..Enabled::default() }
-    }
-
-    fn queue(&self) -> Arc<Mutex<vk::Queue>> {
-        // SAFETY: the family has a queue, it was asked for above.
-        Arc::new(Mutex::new(unsafe { self.device.get_device_queue(self.family, 0) }))
-    }
-
-    fn lend(&self) -> HostDevice {
-        HostDevice {
-            instance: self.instance.clone(),
-            physical: self.physical,
-            device: self.device.clone(),
-            family: self.family,
-            queue: Some(self.queue()),
-            allocator: None,
-            pipeline_cache: None,
-            enabled: self.enabled(),
-        }
-    }
-}
-
-impl Drop for Host {
-    fn drop(&mut self) {
-        // SAFETY: whatever was made from the device is gone.
-        unsafe {
-            self.device.destroy_device(None);
-            self.instance.destroy_instance(None);
-        }
-    }
-}
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
@@ -207,29 +136,6 @@ counted! {
     queue_submit(vk::Queue, n: u32, info: *const vk::SubmitInfo<'_>, fence: vk::Fence);
 }
 
-/// What a frame of a host does: mesh, tree, location, all within memory that is there.
-struct Frame {
-    input: MeshInput,
-    arrays: MeshArrays,
-    mesh_scratch: MeshScratch,
-    tree: TreeMemory,
-    build_scratch: BuildScratch,
-    capacity: Capacity,
-    points: PointInput,
-    output: LocateOutput,
-}
-
-impl Frame {
-    fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
-        cmd_prepare_mesh(r, &self.input, &self.arrays, &self.mesh_scratch)?;
-        r.barrier("frame.mesh → frame.tree");
-        let mesh = MeshView { input: self.input, arrays: self.arrays };
-        cmd_build(r, &mesh, &self.tree, &self.capacity, &BuildOptions::default(), &self.build_scratch)?;
-        let scene = Scene { mesh, tree: self.tree, longest_leaf: self.input.tets };
-        cmd_locate(r, &scene, &self.points, &self.output, &LocateOptions::default())
-    }
-}
-
 #[test]
 fn recording_neither_makes_nor_submits_nor_waits() {
     let host = Host::new();
@@ -240,22 +146,7 @@ fn recording_neither_makes_nor_submits_nor_waits() {
     // SAFETY: as above; the counted functions do what the device's own do.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &GpuOptions::default()) }.unwrap();
     let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
-    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
-    let (positions, cells) =
-        (gpu.upload("olbvh.test.positions", &mesh.points).unwrap(), gpu.upload("olbvh.test.cells", &mesh.tets).unwrap());
-    let options = BuildOptions::default();
-    let capacity = Capacity::for_entries(20 * tets, 10);
-    let carve = |a: &mut Arena| {
-        let (arrays, mesh_scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?);
-        let (tree, build_scratch) = (TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?);
-        let output = LocateOutput { owners: a.words(u64::from(points))?, barycentrics: a.take(16 * u64::from(points))? };
-        Ok((arrays, mesh_scratch, tree, build_scratch, output))
-    };
-    let memory = gpu.buffer("olbvh.test.frame", Arena::measure(carve).unwrap()).unwrap();
-    let (arrays, mesh_scratch, tree, build_scratch, output) = carve(&mut Arena::new(memory.all())).unwrap();
-    let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
-    let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None };
-    let frame = Frame { input, arrays, mesh_scratch, tree, build_scratch, capacity, points: asked, output };
+    let frame = Frame::new(&gpu, &mesh);
     let mut rehearsal = Recorder::rehearse(&gpu);
     frame.record(&mut rehearsal).unwrap();
     rehearsal.finish().unwrap();
@@ -269,7 +160,7 @@ fn recording_neither_makes_nor_submits_nor_waits() {
     })
     .unwrap();
     assert_eq!(CALLS.load(Relaxed), before, "calls made while recording");
-    let found: Vec<u32> = gpu.download(&memory, output.owners.part(0, 4 * u64::from(points))).unwrap();
+    let found: Vec<u32> = gpu.download(&frame.memory, frame.output.owners.part(0, 4 * mesh.points.len() as u64)).unwrap();
     assert_eq!(found, owners(&gpu, &mesh));
     // The count counts.
     ARMED.set(true);
