@@ -62,6 +62,9 @@ pub enum Error {
     /// A tree breaks one of its rules (see [`crate::tree::TreeArrays::validate`]).
     #[error("the tree breaks a rule: {0}")]
     BrokenTree(String),
+    /// Two structures give different answers to one question.
+    #[error("wrong answer: {0}")]
+    Mismatch(String),
     /// A file cannot be read as what it should be.
     #[error("{}: {place}{message}", path.display())]
     File {

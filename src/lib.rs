@@ -19,7 +19,7 @@
 //! ```
 //!
 //! # Layers
-//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`], [`baseline`] ← conformance, `formats` ← program.
+//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`], [`baseline`] ← conformance, `bench`, `formats` ← program.
 //! [`mesh`], [`tree`], [`options`], [`layout`], [`render`] and [`mod@reference`] know no Vulkan.
 //!
 //! - **Record**: functions named `cmd_*` append to a [`gpu::Recorder`]: the caller's command buffer, the caller's memory, nothing submitted,
@@ -35,6 +35,8 @@
 //! nor become denormal, which devices may flush). Quotients that matter go through [`reference::grid::reciprocal`], which uses no division.
 
 pub mod baseline;
+#[cfg(feature = "cli")]
+pub mod bench;
 pub mod build;
 pub mod conformance;
 pub mod error;

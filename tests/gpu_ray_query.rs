@@ -6,7 +6,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateOptions, LocateOutput, PointInput, locate};
+use olbvh::query::{LocateOptions, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
@@ -23,13 +23,8 @@ fn has_rays(gpu: &Gpu) -> bool {
 
 fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, points: &[[f32; 3]]) -> (RayQuery, Vec<u32>, Vec<[f32; 4]>) {
     let rays = RayQuery::build(gpu, mesh).unwrap().unwrap();
-    let n = points.len() as u64;
-    let input = gpu.upload("olbvh.test.points", points).unwrap();
-    let (owners, weights) = (gpu.buffer("olbvh.test.owners", 4 * n).unwrap(), gpu.buffer("olbvh.test.weights", 16 * n).unwrap());
-    let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: None };
-    let output = LocateOutput { owners: owners.all(), barycentrics: weights.all() };
-    gpu.run("olbvh.test.rays", |r| rays.cmd_locate(r, mesh, &input, &output)).unwrap();
-    (rays, gpu.download(&owners, owners.all()).unwrap(), gpu.download(&weights, weights.all()).unwrap())
+    let found = rays.locate(mesh, points).unwrap();
+    (rays, found.owners, found.barycentrics)
 }
 
 /// The mesh with its coordinates multiplied, and points in and around it.

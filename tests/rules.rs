@@ -24,6 +24,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),
+    ("bench", &["baseline", "build", "error", "gpu", "layout", "mesh", "options", "query", "reference", "render", "slicing", "tree"]),
     (
         "conformance",
         &[
@@ -39,6 +40,7 @@ const LAYERS: &[(&str, &[&str])] = &[
             "query",
             "reference",
             "render",
+            "slicing",
             "tree",
         ],
     ),

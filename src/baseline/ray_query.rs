@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime, Triangles};
 use crate::kernels::{ListFaces, ListFacesSpec, LocateByRay, LocateByRaySpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::query::{LocateOutput, PointInput};
+use crate::query::{LocateOutput, Located, PointInput};
 
 /// From normalised coordinates to those of the scene, [0, 2): safe for whatever the device multiplies.
 const SCALE: f32 = f32::from_bits((127 - 40) << 23);
@@ -17,6 +17,7 @@ const SCALE: f32 = f32::from_bits((127 - 40) << 23);
 /// An acceleration structure over the faces of a mesh.
 #[derive(Debug)]
 pub struct RayQuery {
+    gpu: Gpu,
     structure: AccelerationStructure,
     faces: u32,
     sides: Buffer,
@@ -64,7 +65,7 @@ impl RayQuery {
         let triangles = Triangles { vertices, points, indices: indices.all(), count: faces, scale: SCALE };
         let structure = AccelerationStructure::build(gpu, &triangles)?;
         stages.extend_from_slice(structure.stages());
-        Ok(Some(Self { structure, faces, sides, longest, stages, _memory: memory }))
+        Ok(Some(Self { gpu: gpu.clone(), structure, faces, sides, longest, stages, _memory: memory }))
     }
 
     /// The acceleration structure.
@@ -109,5 +110,26 @@ impl RayQuery {
         };
         let spec = LocateByRaySpec { workgroup, ..Default::default() };
         r.stage("ray_query.locate", |r| r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup))))
+    }
+
+    /// Locates points (relative to the mesh's origin): a tetrahedron that holds each, or all ones if it is outside or lost.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`], or a failed Vulkan call.
+    pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
+        let n = points.len() as u64;
+        let uploaded = self.gpu.upload("olbvh.ray_query.points", points)?;
+        let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
+        let memory = self.gpu.buffer("olbvh.ray_query.located", Arena::measure(carve)?)?;
+        let (owners, barycentrics) = carve(&mut Arena::new(memory.all()))?;
+        let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None };
+        let output = LocateOutput { owners, barycentrics };
+        let ((), time) = self.gpu.run("olbvh.ray_query.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
+        Ok(Located {
+            owners: self.gpu.download(&memory, owners.part(0, 4 * n))?,
+            barycentrics: self.gpu.download(&memory, barycentrics.part(0, 16 * n))?,
+            stages: time.stages,
+            ..Located::default()
+        })
     }
 }

@@ -9,7 +9,7 @@ use crate::layout::{BuildStatus, Grid};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::grid::MAX_LEVEL;
-use crate::tree::TreeArrays;
+use crate::tree::{Memory, TreeArrays};
 use bytemuck::Pod;
 
 /// An OLBVH in device memory.
@@ -186,6 +186,25 @@ impl Tree {
     /// Device time of every stage, in order.
     pub fn stages(&self) -> &[StageTime] {
         &self.stages
+    }
+
+    /// Bytes of each array.
+    pub fn sizes(&self) -> Memory {
+        let (nodes, internal) = (u64::from(self.status.nodes), u64::from(self.status.internal));
+        Memory {
+            p: 4 * u64::from(self.status.entries),
+            po: 4 * (nodes + 1),
+            co: 4 * (internal + 1),
+            no: 4 * (u64::from(self.status.level) + 1),
+            boundary: 4 * nodes.div_ceil(32),
+            mask: 4 * internal.div_ceil(4),
+            boxes: if self.options.boxes { 24 * nodes } else { 0 },
+        }
+    }
+
+    /// Bytes as the paper's Table 2 counts them; see [`TreeArrays::paper_bytes`].
+    pub fn paper_bytes(&self) -> u64 {
+        4 * u64::from(self.status.entries) + 25 * u64::from(self.status.nodes) + 4 * u64::from(self.status.internal)
     }
 
     /// Bytes of scratch memory that the build used beside the tree.

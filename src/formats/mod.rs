@@ -20,6 +20,7 @@ mod medit;
 mod meditb;
 mod npy;
 mod points;
+mod procedural;
 mod report;
 mod scalar;
 mod source;
@@ -34,8 +35,8 @@ mod write;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::error::{Error, Result};
-use crate::mesh::{Mesh, kuhn_jittered};
+use crate::error::Result;
+use crate::mesh::Mesh;
 use detect::Format;
 pub use points::load_points;
 pub use report::{CellCount, Fate, Report};
@@ -69,16 +70,17 @@ pub struct Loaded {
     pub report: Report,
 }
 
-/// Reads a mesh: a file, or `kuhn:NX,NY,NZ` (with `,jitter=J` and `,seed=S` if wanted) for [`crate::mesh::kuhn`].
+/// Reads a mesh: a file, or a procedural one: `kuhn:NX,NY,NZ` (with `,jitter=J` and `,seed=S` if wanted) for [`crate::mesh::kuhn`], `graded:N`,
+/// `shell:N` and `slivers:N` for the functions of [`crate::mesh`].
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read, [`Error::File`] with the place if it is broken or in no known format,
-/// [`Error::Invalid`] for a wrong `kuhn:` text, [`Error::TooLarge`] past 32-bit indices.
+/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken or in no known format,
+/// [`crate::Error::Invalid`] for a wrong `kuhn:` or other procedural text, [`crate::Error::TooLarge`] past 32-bit indices.
 pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
     let start = Instant::now();
     let path = spec.as_ref();
-    if let Some(text) = path.to_str().and_then(|s| s.strip_prefix("kuhn:")) {
-        return load_kuhn(text, start);
+    if let Some(made) = path.to_str().and_then(procedural::make) {
+        return made.map(|(format, mesh)| procedural::loaded(format, mesh, start));
     }
     read(&Source::read(path)?, options, start)
 }
@@ -107,34 +109,5 @@ fn read(source: &Source, options: &LoadOptions, start: Instant) -> Result<Loaded
     };
     let (mesh, mut report) = assembly.finish()?;
     report.seconds = start.elapsed().as_secs_f64();
-    Ok(Loaded { mesh, report })
-}
-
-fn load_kuhn(text: &str, start: Instant) -> Result<Loaded> {
-    let wrong = |why: &str| Error::Invalid(format!("kuhn:{text}: {why}; write kuhn:NX,NY,NZ or kuhn:NX,NY,NZ,jitter=0.3,seed=7"));
-    let mut parts = text.split(',').map(str::trim);
-    let mut size = [0; 3];
-    for n in &mut size {
-        *n = parts.next().and_then(|p| p.parse().ok()).ok_or_else(|| wrong("three whole numbers are needed"))?;
-    }
-    let (mut jitter, mut seed) = (0.0f32, 0);
-    for part in parts {
-        match part.split_once('=') {
-            Some(("jitter", v)) => jitter = v.parse().ok().filter(|j| (0.0..=1.0).contains(j)).ok_or_else(|| wrong("jitter is 0 to 1"))?,
-            Some(("seed", v)) => seed = v.parse().map_err(|_| wrong("seed is a whole number"))?,
-            _ => return Err(wrong("unknown part")),
-        }
-    }
-    let mesh = kuhn_jittered(size, jitter, seed)?;
-    let n = mesh.tets.len() as u64;
-    let report = Report {
-        format: format!("Kuhn grid {}×{}×{}", size[0], size[1], size[2]),
-        seconds: start.elapsed().as_secs_f64(),
-        points: mesh.points.len() as u64,
-        cells: vec![CellCount { name: "tetrahedron".into(), count: n, fate: Fate::Kept, tetrahedra: n }],
-        tetrahedra: n,
-        bounds: [[0.0; 3], size.map(f64::from)],
-        ..Report::default()
-    };
     Ok(Loaded { mesh, report })
 }

@@ -2,7 +2,9 @@
 
 pub mod cases;
 mod kuhn;
+mod procedural;
 pub use kuhn::{kuhn, kuhn_jittered};
+pub use procedural::{graded, shell, slivers};
 
 /// A tetrahedral mesh with scalar fields.
 #[derive(Clone, Debug, Default)]

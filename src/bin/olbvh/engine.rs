@@ -3,8 +3,9 @@
 mod cpu;
 mod gpu;
 
-use crate::common::Outcome;
+use crate::common::{Failure, Outcome};
 use olbvh::error::Result;
+use olbvh::gpu::Gpu;
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::{Counts, Fault};
@@ -102,6 +103,14 @@ pub struct Summary {
     pub build_ms: f64,
     /// Milliseconds of each stage, in order; empty where stages are not timed.
     pub stages: Vec<(String, f64)>,
+}
+
+/// The Vulkan device that `--device` names.
+pub fn device(name: Option<&str>) -> Outcome<Gpu> {
+    if name.is_some_and(|name| name.eq_ignore_ascii_case("cpu")) {
+        return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
+    }
+    Ok(gpu::Device::open(name)?.gpu().clone())
 }
 
 /// The engine that `--device` names: the best Vulkan device without one.

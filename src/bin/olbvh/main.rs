@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, [`engine`] between them and the devices.
 
+mod bench;
 mod common;
 mod conformance;
 mod devices;
@@ -20,7 +21,7 @@ use std::process::ExitCode;
 
 const AFTER_HELP: &str = "\
 MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh (Medit), .node or .ele (TetGen); or kuhn:NX,NY,NZ, a procedural grid of
-NX×NY×NZ unit cubes, six tetrahedra each, with a scalar field. Lengths are in the units of the mesh.
+NX×NY×NZ unit cubes, six tetrahedra each, with a scalar field (others: see `olbvh bench --help`). Lengths are in the units of the mesh.
 
 Examples:
   olbvh info bracket.vtu                        what is in a mesh, and what its tree is like
@@ -28,6 +29,7 @@ Examples:
   olbvh locate bracket.vtu points.csv -o out.csv   in which cell each point lies, and the field there
   olbvh slice bracket.vtu -o bracket.npy --layers 100   voxels, none of them empty that the mesh touches
   olbvh overlap a.vtu b.vtu -o cells.json       which cells of two meshes intersect
+  olbvh bench                                   how fast all that is here
   olbvh render kuhn:32,32,32 -o jet.png --device cpu
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device.";
@@ -44,6 +46,7 @@ struct Cli {
 
 #[derive(Subcommand)]
 enum Command {
+    Bench(bench::Args),
     Conformance(conformance::Args),
     Devices(devices::Args),
     Info(info::Args),
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
     common.start_log();
     output::clean_up_on_interrupt();
     let done = match command {
+        Command::Bench(args) => bench::run(&args, &common),
         Command::Conformance(args) => conformance::run(&args, &common),
         Command::Devices(args) => devices::run(&args, &common),
         Command::Info(args) => info::run(&args, &common),

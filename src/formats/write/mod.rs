@@ -42,10 +42,12 @@ pub enum OutputFormat {
     Svx,
     /// JSON.
     Json,
+    /// Markdown.
+    Md,
 }
 
 impl OutputFormat {
-    const ALL: [(Self, &str); 8] = [
+    const ALL: [(Self, &str); 9] = [
         (Self::Npy, "npy"),
         (Self::Npz, "npz"),
         (Self::Csv, "csv"),
@@ -54,6 +56,7 @@ impl OutputFormat {
         (Self::Png, "png"),
         (Self::Svx, "svx"),
         (Self::Json, "json"),
+        (Self::Md, "md"),
     ];
 
     /// The format of `path`, which must be one of `allowed`. Ask before long work.

@@ -11,7 +11,6 @@ use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::volume::Picture;
 use olbvh::render::{Bounds, Prepared, RenderSettings};
 use olbvh::slicing::{Extrapolate, VoxelGrid};
-use olbvh::tree::Memory;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -23,6 +22,11 @@ impl Device {
     pub fn open(name: Option<&str>) -> Result<Self> {
         let options = GpuOptions { device: name.map(Into::into), pipeline_cache: cache_file(), ..GpuOptions::default() };
         Ok(Self(Gpu::new(&options)?))
+    }
+
+    /// The device itself.
+    pub fn gpu(&self) -> &Gpu {
+        &self.0
     }
 }
 
@@ -51,16 +55,6 @@ impl Engine for Device {
         let tree = Tree::build(&self.0, &device, options)?;
         let (cells, built) = (device.status(), tree.status());
         let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let (nodes, internal) = (u64::from(built.nodes), u64::from(built.internal));
-        let memory = Memory {
-            p: 4 * u64::from(built.entries),
-            po: 4 * (nodes + 1),
-            co: 4 * (internal + 1),
-            no: 4 * (u64::from(built.level) + 1),
-            boundary: 4 * nodes.div_ceil(32),
-            mask: 4 * internal.div_ceil(4),
-            boxes: if options.boxes { 24 * nodes } else { 0 },
-        };
         let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
         let summary = Summary {
             counts: Counts {
@@ -74,10 +68,10 @@ impl Engine for Device {
             bounds: Bounds { lo: corner(tree.grid().lo), hi: corner(tree.grid().hi) },
             level: built.level,
             entries: u64::from(built.entries),
-            nodes,
+            nodes: u64::from(built.nodes),
             leaves: u64::from(built.leaves),
-            memory,
-            paper_bytes: 4 * u64::from(built.entries) + 25 * nodes + 4 * internal,
+            memory: tree.sizes(),
+            paper_bytes: tree.paper_bytes(),
             topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),

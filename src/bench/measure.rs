@@ -1,0 +1,125 @@
+//! Repetitions and what they took.
+
+use crate::error::Result;
+use crate::gpu::StageTime;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::time::Instant;
+
+/// How often, or how long, one measurement is repeated: until either is used up, once at least.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Budget {
+    /// Most repetitions.
+    pub repetitions: u32,
+    /// Seconds after which no further one begins.
+    pub seconds: f64,
+}
+
+/// The smallest, median and largest of some times, in milliseconds.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Spread {
+    /// Smallest.
+    pub min: f64,
+    /// Median; of an even number the mean of the middle two.
+    pub median: f64,
+    /// Largest.
+    pub max: f64,
+}
+
+impl Spread {
+    /// Of at least one time.
+    fn of(mut times: Vec<f64>) -> Option<Self> {
+        times.sort_by(f64::total_cmp);
+        let middle = times.len() / 2;
+        let (min, max, upper) = (*times.first()?, *times.last()?, *times.get(middle)?);
+        let median = if times.len().is_multiple_of(2) { f64::midpoint(times[middle - 1], upper) } else { upper };
+        Some(Self { min, median, max })
+    }
+}
+
+/// What a measurement took.
+#[derive(Clone, Debug, Serialize)]
+pub struct Timing {
+    /// Repetitions.
+    pub repetitions: u32,
+    /// Between timestamps on the device; `None` where its queue has none.
+    pub device_ms: Option<Spread>,
+    /// Of the whole call on the host, transfers included.
+    pub wall_ms: Spread,
+    /// Medians of the stages on the device.
+    pub stages_ms: BTreeMap<String, f64>,
+}
+
+impl Timing {
+    /// The median: of the device, or else on the host.
+    pub fn milliseconds(&self) -> f64 {
+        self.device_ms.unwrap_or(self.wall_ms).median
+    }
+}
+
+/// Raw times of repetitions.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Runs {
+    walls: Vec<f64>,
+    stages: Vec<Vec<StageTime>>,
+}
+
+impl Runs {
+    pub(super) fn is_empty(&self) -> bool {
+        self.walls.is_empty()
+    }
+
+    /// Of one stage, or of all together.
+    pub(super) fn timing(&self, stage: Option<&str>) -> Timing {
+        let chosen = |s: &&StageTime| stage.is_none_or(|name| s.name == name);
+        let sums = self.stages.iter().map(|run| run.iter().filter(chosen).map(|s| s.milliseconds).sum());
+        let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
+        for (i, run) in self.stages.iter().enumerate() {
+            for s in run.iter().filter(chosen) {
+                let times = by_name.entry(s.name.clone()).or_default();
+                times.resize(self.stages.len(), 0.0);
+                times[i] += s.milliseconds;
+            }
+        }
+        let none = Spread { min: 0.0, median: 0.0, max: 0.0 };
+        Timing {
+            repetitions: self.walls.len() as u32,
+            device_ms: Spread::of(sums.collect()).filter(|s| s.max > 0.0),
+            wall_ms: Spread::of(self.walls.clone()).unwrap_or(none),
+            stages_ms: by_name.into_iter().filter_map(|(name, times)| Some((name, Spread::of(times)?.median))).collect(),
+        }
+    }
+}
+
+/// Repeats `once`, which gives its stages, within a budget. What it does has been done before, so that nothing is done for the first time.
+pub(super) fn repeat(budget: &Budget, mut once: impl FnMut() -> Result<Vec<StageTime>>) -> Result<Runs> {
+    let (start, mut runs) = (Instant::now(), Runs::default());
+    while runs.is_empty() || (runs.walls.len() < budget.repetitions as usize && start.elapsed().as_secs_f64() < budget.seconds) {
+        let begin = Instant::now();
+        let stages = once()?;
+        runs.walls.push(begin.elapsed().as_secs_f64() * 1e3);
+        runs.stages.push(stages);
+    }
+    Ok(runs)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn medians_and_sums() {
+        let times = [4.0, 1.0, 3.0, 10.0];
+        assert_eq!(Spread::of(times.to_vec()), Some(Spread { min: 1.0, median: 3.5, max: 10.0 }));
+        assert_eq!(Spread::of(times[..3].to_vec()).map(|s| s.median), Some(3.0));
+        let mut next = times.iter();
+        let stage = |name: &str, milliseconds| StageTime { name: name.into(), milliseconds };
+        let once = || Ok(vec![stage("a", *next.next().unwrap()), stage("b", 1.0), stage("b", 1.0)]);
+        let runs = repeat(&Budget { repetitions: 3, seconds: 10.0 }, once).unwrap();
+        let all = runs.timing(None);
+        assert_eq!((all.repetitions, all.device_ms.unwrap().median, all.stages_ms["b"]), (3, 5.0, 2.0));
+        assert_eq!(runs.timing(Some("a")).milliseconds(), 3.0);
+        let none = repeat(&Budget { repetitions: 9, seconds: 0.0 }, || Ok(Vec::new())).unwrap().timing(None);
+        assert!(none.repetitions == 1 && none.device_ms.is_none());
+    }
+}

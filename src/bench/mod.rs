@@ -1,0 +1,125 @@
+//! The paper's measurements on one device in one run: the octree for α = 0, 1, 2 and every assignment, against the LBVH and the device's own ray
+//! tracing. Every answer is verified before anything is timed.
+//!
+//! ```text
+//! subject    a mesh on the device, and the questions that all structures are asked
+//! structure  one structure: built, asked
+//! verify     its answers against those of the first structure, and of the reference
+//! measure    repetitions within a budget
+//! report     every figure, and the ratios to the LBVH     → table (text, Markdown), plot (SVG)
+//! ```
+
+mod measure;
+mod plot;
+mod report;
+mod structure;
+mod subject;
+mod suite;
+mod table;
+mod verify;
+
+pub use measure::{Budget, Spread, Timing};
+pub use plot::plots;
+pub use report::{DeviceFacts, Figure, Lost, MemoryFigures, MeshReport, Quality, Quantity, Report, StructureReport};
+pub use structure::Kind;
+pub use suite::{Settings, Suite};
+pub use table::{markdown, text};
+
+use crate::error::Result;
+use crate::gpu::{Gpu, StageTime};
+use crate::mesh::Mesh;
+use crate::query::Party;
+use crate::reference::boundary::topology;
+use measure::{Runs, repeat};
+use structure::{Built, Structure};
+use subject::Subject;
+use verify::{Answers, check, check_tree};
+
+/// Measures all structures over a mesh; `progress` is told what is being done.
+///
+/// # Errors
+/// [`crate::Error::Mismatch`] if two structures give different answers, [`crate::Error::Memory`] and the like if the device cannot hold the mesh.
+pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &dyn Fn(&str)) -> Result<MeshReport> {
+    progress(&format!("{name}: {} tetrahedra", mesh.tets.len()));
+    let subject = Subject::new(gpu, mesh, settings)?;
+    let mut report = MeshReport::new(name, &subject);
+    let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
+    let mut expected: Option<Answers> = None;
+    for kind in Kind::all() {
+        let built = |mesh| Structure::build(gpu, mesh, kind);
+        let (Some(structure), Some(moved)) = (built(&subject.device)?, built(&subject.moved)?) else {
+            progress(&format!("{name}: {kind}: not on this device"));
+            continue;
+        };
+        progress(&format!("{name}: {kind}"));
+        let answers = Answers::of(&subject, &structure, &moved)?;
+        if let (Structure::Octree(tree), Some(topology)) = (&structure, &topology) {
+            check_tree(&subject, topology, tree, &answers)?;
+        }
+        let lost = match &expected {
+            Some(first) => check(&subject, kind, first, &answers)?,
+            None => None,
+        };
+        report.structures.push(measure(&subject, kind, [&structure, &moved], &answers, lost, settings)?);
+        expected.get_or_insert(answers);
+    }
+    report.set_ratios();
+    Ok(report)
+}
+
+/// Times one structure.
+fn measure(
+    subject: &Subject<'_>,
+    kind: Kind,
+    [structure, moved]: [&Structure; 2],
+    answers: &Answers,
+    lost: Option<Lost>,
+    settings: &Settings,
+) -> Result<StructureReport> {
+    let budget = &settings.budget;
+    let mut report = StructureReport::new(kind, structure, lost);
+    let mut add = |quantity, runs: Option<Runs>, stage: Option<&str>, work: Option<u64>| {
+        if let Some(runs) = runs.as_ref().filter(|runs| !runs.is_empty()) {
+            report.figures.push(Figure::new(quantity, runs.timing(stage), work));
+        }
+    };
+    let gpu = subject.gpu;
+    let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
+    add(Quantity::Build, Some(repeat(budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
+    for (quantity, points) in [(Quantity::LocateRandom, &subject.random), (Quantity::LocateCoherent, &subject.coherent)] {
+        let runs = repeat(budget, || Ok(structure.locate(&subject.device, points)?.stages))?;
+        add(quantity, Some(runs), None, Some(points.len() as u64));
+    }
+    if let Some((found, _)) = &answers.picture {
+        let drawn =
+            || Ok(subject.render(structure)?.map_or(Vec::new(), |d| vec![time("intervals", d.interval_ms), time("march", d.march_ms)]));
+        let runs = repeat(budget, drawn)?;
+        add(Quantity::Intervals, Some(runs.clone()), Some("intervals"), None);
+        add(Quantity::March, Some(runs), Some("march"), Some(*found));
+    }
+    if let Some((kinds, _)) = &answers.voxels {
+        let sliced = || {
+            let sliced = subject.slice(structure, &mut |_| Ok(()))?.unwrap_or_default();
+            Ok(vec![time("locate", sliced.locate_ms), time("touch", sliced.touch_ms), time("values", sliced.values_ms)])
+        };
+        add(Quantity::Slice, Some(repeat(budget, sliced)?), None, Some(kinds.len() as u64));
+    }
+    if answers.overlap.is_some() {
+        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh: &subject.moved, structure: moved }];
+        let runs = repeat(budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
+        add(Quantity::Overlap, Some(runs), None, None);
+    }
+    Ok(report)
+}
+
+fn time(name: &str, milliseconds: f64) -> StageTime {
+    StageTime { name: name.into(), milliseconds }
+}
+
+/// A mesh with its octree, as queries get them.
+fn party(built: Built<'_>) -> Option<Party<'_>> {
+    match built.structure {
+        Structure::Octree(tree) => Some(Party { mesh: built.mesh, tree }),
+        _ => None,
+    }
+}

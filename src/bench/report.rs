@@ -1,0 +1,311 @@
+//! Every figure of a run.
+
+use super::structure::Structure;
+use super::subject::{Subject, corners, volume};
+use super::{Kind, Settings, Suite, Timing};
+use crate::gpu::Gpu;
+use glam::DVec3;
+use serde::Serialize;
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Construction.
+    Build,
+    /// Ray intervals of a picture.
+    Intervals,
+    /// March of a picture, counting the samples in the mesh.
+    March,
+    /// Conservative slicing.
+    Slice,
+    /// Overlap with the moved mesh.
+    Overlap,
+    /// Location of points in no order.
+    LocateRandom,
+    /// Location of points along a Z curve.
+    LocateCoherent,
+}
+
+impl Quantity {
+    /// All, in the paper's order.
+    pub const ALL: [Self; 7] =
+        [Self::Build, Self::Intervals, Self::March, Self::Slice, Self::Overlap, Self::LocateRandom, Self::LocateCoherent];
+
+    /// Title of a table, with the paper's.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Build => "Construction (Fig. 6)",
+            Self::Intervals => "Ray intervals (Table 3)",
+            Self::March => "Samples inside the mesh, ray marching (Fig. 7)",
+            Self::Slice => "Conservative slicing (Fig. 8)",
+            Self::Overlap => "Overlap with the moved mesh (Fig. 10)",
+            Self::LocateRandom => "Point location, random points",
+            Self::LocateCoherent => "Point location, points along a Z curve",
+        }
+    }
+
+    /// Name of a file.
+    pub fn stem(self) -> &'static str {
+        match self {
+            Self::Build => "fig06_construction",
+            Self::Intervals => "table3_ray_intervals",
+            Self::March => "fig07_samples",
+            Self::Slice => "fig08_slicing",
+            Self::Overlap => "fig10_overlap",
+            Self::LocateRandom => "location_random",
+            Self::LocateCoherent => "location_coherent",
+        }
+    }
+
+    /// Whether it is told in items per second, not in milliseconds.
+    pub fn is_rate(self) -> bool {
+        matches!(self, Self::March | Self::LocateRandom | Self::LocateCoherent)
+    }
+}
+
+/// One measurement.
+#[derive(Clone, Debug, Serialize)]
+pub struct Figure {
+    /// What was measured.
+    pub quantity: Quantity,
+    /// Repetitions and times.
+    #[serde(flatten)]
+    pub timing: Timing,
+    /// Tetrahedra built over, points located, samples found in the mesh, voxels; `None` where nothing is counted.
+    pub items: Option<u64>,
+    /// Items per second of the median.
+    pub per_second: Option<f64>,
+    /// How many times as fast as the LBVH, by the medians.
+    pub speedup: Option<f64>,
+}
+
+impl Figure {
+    pub(super) fn new(quantity: Quantity, timing: Timing, items: Option<u64>) -> Self {
+        let per_second = items.map(|n| n as f64 / timing.milliseconds() * 1e3);
+        Self { quantity, timing, items, per_second, speedup: None }
+    }
+
+    /// What tables and plots show: millions per second, or milliseconds.
+    pub fn shown(&self) -> f64 {
+        if self.quantity.is_rate() { self.per_second.unwrap_or(0.0) * 1e-6 } else { self.timing.milliseconds() }
+    }
+}
+
+/// Bytes of a structure.
+#[derive(Clone, Debug, Serialize)]
+pub struct MemoryFigures {
+    /// All of it.
+    pub total: u64,
+    /// By array.
+    pub arrays: Vec<(&'static str, u64)>,
+    /// As the paper's Table 2 counts an octree: boxes, but no PO.
+    pub paper: Option<u64>,
+    /// Of an acceleration structure before compaction.
+    pub before_compaction: Option<u64>,
+    /// Scratch memory of the construction, where it is known.
+    pub scratch: Option<u64>,
+}
+
+/// Points that a structure did not find though a cell holds them.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Lost {
+    /// So many.
+    pub points: u64,
+    /// Of so many.
+    pub of: u64,
+}
+
+/// A structure over a mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct StructureReport {
+    /// Its name in tables.
+    pub name: String,
+    /// `olbvh`, `lbvh` or `ray_query`.
+    pub kind: &'static str,
+    /// The paper's α.
+    pub alpha: Option<u8>,
+    /// How primitives are assigned to leaves.
+    pub assign: Option<&'static str>,
+    /// Which leaves list all of their primitives.
+    pub lists: Option<&'static str>,
+    /// Level of the leaves.
+    pub level: Option<u32>,
+    /// Entries of all leaves.
+    pub entries: Option<u32>,
+    /// Nodes.
+    pub nodes: Option<u32>,
+    /// Bytes.
+    pub memory: MemoryFigures,
+    /// Points that ray queries lost.
+    pub lost: Option<Lost>,
+    /// Measurements.
+    pub figures: Vec<Figure>,
+}
+
+impl StructureReport {
+    pub(super) fn new(kind: Kind, structure: &Structure, lost: Option<Lost>) -> Self {
+        let (alpha, assign, lists) = match kind {
+            Kind::Octree { alpha, assign, lists } => (Some(alpha), Some(assign.name()), Some(lists.name())),
+            _ => (None, None, None),
+        };
+        let plain = |total, arrays| MemoryFigures { total, arrays, paper: None, before_compaction: None, scratch: None };
+        let (name, memory, status) = match structure {
+            Structure::Octree(tree) => {
+                let memory = plain(tree.sizes().total(), tree.sizes().arrays().to_vec());
+                let memory = MemoryFigures { paper: Some(tree.paper_bytes()), scratch: Some(tree.scratch_bytes()), ..memory };
+                ("olbvh", memory, Some(tree.status()))
+            }
+            Structure::Lbvh(lbvh) => ("lbvh", plain(lbvh.bytes(), vec![("nodes and ids", lbvh.bytes())]), None),
+            Structure::RayQuery(rays) => {
+                let built = rays.structure();
+                let arrays = vec![("structure", built.bytes()), ("sides", rays.bytes() - built.bytes())];
+                let memory = plain(rays.bytes(), arrays);
+                let scratch = Some(built.scratch_bytes());
+                ("ray_query", MemoryFigures { before_compaction: Some(built.built_bytes()), scratch, ..memory }, None)
+            }
+        };
+        let (level, entries, nodes) = (status.map(|s| s.level), status.map(|s| s.entries), status.map(|s| s.nodes));
+        Self { name: kind.to_string(), kind: name, alpha, assign, lists, level, entries, nodes, memory, lost, figures: Vec::new() }
+    }
+
+    /// The measurement of a quantity.
+    pub fn figure(&self, quantity: Quantity) -> Option<&Figure> {
+        self.figures.iter().find(|f| f.quantity == quantity)
+    }
+}
+
+/// Shape of the cells, as the paper's Table 1.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct Quality {
+    /// Largest volume over smallest.
+    pub volume_ratio: f64,
+    /// Inradius over circumradius: smallest, median, largest; 1/3 is regular.
+    pub aspect: [f64; 3],
+}
+
+impl Quality {
+    fn of(subject: &Subject<'_>) -> Self {
+        let mut aspects: Vec<f64> = corners(subject.mesh).map(aspect).collect();
+        aspects.sort_by(f64::total_cmp);
+        let at = |i: usize| aspects.get(i).copied().unwrap_or(f64::NAN);
+        let ends = corners(subject.mesh).map(volume).fold([f64::INFINITY, 0.0], |[lo, hi], v| [lo.min(v), hi.max(v)]);
+        Self { volume_ratio: ends[1] / ends[0], aspect: [at(0), at(aspects.len() / 2), at(aspects.len().saturating_sub(1))] }
+    }
+}
+
+/// Inradius over circumradius.
+fn aspect(p: [[f64; 3]; 4]) -> f64 {
+    let v = p.map(DVec3::from_array);
+    let [a, b, c] = [v[1] - v[0], v[2] - v[0], v[3] - v[0]];
+    let six_volumes = a.cross(b).dot(c).abs();
+    let faces = [a.cross(b), b.cross(c), c.cross(a), (v[2] - v[1]).cross(v[3] - v[1])];
+    let double_area: f64 = faces.iter().map(|n| n.length()).sum();
+    let around = (a.length_squared() * b.cross(c) + b.length_squared() * c.cross(a) + c.length_squared() * a.cross(b)).length();
+    if around > 0.0 { 2.0 * six_volumes * six_volumes / (double_area * around) } else { 0.0 }
+}
+
+/// All structures over a mesh.
+#[derive(Clone, Debug, Serialize)]
+pub struct MeshReport {
+    /// File or name.
+    pub name: String,
+    /// Tetrahedra.
+    pub tets: u32,
+    /// Points.
+    pub points: u32,
+    /// Boundary tetrahedra.
+    pub boundary: u32,
+    /// Shape of the cells.
+    pub quality: Quality,
+    /// Milliseconds for bounds, neighbours and boundary, once per mesh, whatever the structure.
+    pub topology_ms: f64,
+    /// The structures.
+    pub structures: Vec<StructureReport>,
+}
+
+impl MeshReport {
+    pub(super) fn new(name: &str, subject: &Subject<'_>) -> Self {
+        let (input, status) = (subject.device.input(), subject.device.status());
+        Self {
+            name: name.into(),
+            tets: input.tets,
+            points: input.points,
+            boundary: status.boundary,
+            quality: Quality::of(subject),
+            topology_ms: subject.device.time().stages.iter().map(|s| s.milliseconds).sum(),
+            structures: Vec::new(),
+        }
+    }
+
+    /// The LBVH over this mesh.
+    pub fn lbvh(&self) -> Option<&StructureReport> {
+        self.structures.iter().find(|s| s.kind == "lbvh")
+    }
+
+    /// Relates every measurement to that of the LBVH.
+    pub(super) fn set_ratios(&mut self) {
+        let baseline: Vec<(Quantity, f64)> =
+            self.lbvh().map_or(Vec::new(), |lbvh| lbvh.figures.iter().map(|f| (f.quantity, f.timing.milliseconds())).collect());
+        for figure in self.structures.iter_mut().flat_map(|s| &mut s.figures) {
+            let lbvh = baseline.iter().find(|b| b.0 == figure.quantity);
+            figure.speedup = lbvh.map(|b| b.1 / figure.timing.milliseconds());
+        }
+    }
+}
+
+/// Where it ran.
+#[derive(Clone, Debug, Serialize)]
+pub struct DeviceFacts {
+    /// Name.
+    pub name: String,
+    /// Driver and its version.
+    pub driver: String,
+    /// Highest API version.
+    pub api: String,
+    /// discrete, integrated, virtual, cpu, other.
+    pub kind: &'static str,
+    /// Subgroup size.
+    pub subgroup: u32,
+    /// Whether it has ray queries.
+    pub ray_query: bool,
+    /// Shapes of the kernels.
+    pub target: &'static str,
+    /// How kernels get their buffers.
+    pub binding: String,
+}
+
+/// A whole run.
+#[derive(Clone, Debug, Serialize)]
+pub struct Report {
+    /// Version of this crate.
+    pub version: &'static str,
+    /// Commit of the sources, where known.
+    pub commit: Option<String>,
+    /// The suite.
+    pub suite: Suite,
+    /// Sizes of the questions.
+    pub settings: Settings,
+    /// The device.
+    pub device: DeviceFacts,
+    /// The meshes.
+    pub meshes: Vec<MeshReport>,
+}
+
+impl Report {
+    /// A report without meshes.
+    pub fn new(gpu: &Gpu, suite: Suite, settings: Settings, commit: Option<String>) -> Self {
+        let report = gpu.report();
+        let device = DeviceFacts {
+            name: report.name.clone(),
+            driver: report.driver.clone(),
+            api: report.api.clone(),
+            kind: report.kind,
+            subgroup: report.subgroup,
+            ray_query: report.requirements.ray_query(),
+            target: gpu.target().name,
+            binding: format!("{:?}", gpu.binding()).to_lowercase(),
+        };
+        Self { version: env!("CARGO_PKG_VERSION"), commit, suite, settings, device, meshes: Vec::new() }
+    }
+}

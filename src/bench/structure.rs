@@ -1,0 +1,100 @@
+//! One structure over one mesh, whichever it is.
+
+use super::party;
+use crate::baseline::{Lbvh, RayQuery};
+use crate::build::{DeviceMesh, Tree};
+use crate::error::Result;
+use crate::gpu::{Gpu, StageTime};
+use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::query::{self, LocateOptions, Located, Overlapped};
+
+/// Which structure.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// The octree.
+    Octree {
+        /// The paper's α.
+        alpha: u8,
+        /// How primitives are assigned to leaves.
+        assign: Assign,
+        /// Which leaves list all of theirs: in the paper every one.
+        lists: Lists,
+    },
+    /// The binary tree of the paper's comparison.
+    Lbvh,
+    /// The device's acceleration structure over faces.
+    RayQuery,
+}
+
+impl Kind {
+    /// Every structure, in the order of the tables; the first one's answers are those that the others must give.
+    pub fn all() -> Vec<Self> {
+        let [aabb, planes, exact] = Assign::ALL.map(|assign| (assign, Lists::All));
+        let choices = [aabb, planes, exact, (Assign::Aabb, Lists::Boundary)];
+        let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
+        octrees.chain([Self::Lbvh, Self::RayQuery]).collect()
+    }
+}
+
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Octree { alpha, assign, lists: Lists::All } => write!(f, "OLBVH α={alpha} {assign}"),
+            Self::Octree { alpha, lists, .. } => write!(f, "OLBVH α={alpha} lists {lists}"),
+            Self::Lbvh => f.write_str("LBVH"),
+            Self::RayQuery => f.write_str("ray query"),
+        }
+    }
+}
+
+/// A structure on the device.
+pub(super) enum Structure {
+    Octree(Tree),
+    Lbvh(Lbvh),
+    RayQuery(RayQuery),
+}
+
+/// A mesh and its structure.
+#[derive(Clone, Copy)]
+pub(super) struct Built<'a> {
+    pub mesh: &'a DeviceMesh,
+    pub structure: &'a Structure,
+}
+
+impl Structure {
+    /// Builds it; `None` where the device lacks what it takes.
+    pub(super) fn build(gpu: &Gpu, mesh: &DeviceMesh, kind: Kind) -> Result<Option<Self>> {
+        Ok(match kind {
+            Kind::Octree { alpha, assign, lists } => {
+                let options = BuildOptions { alpha: f32::from(alpha), assign, lists, ..BuildOptions::default() };
+                Some(Self::Octree(Tree::build(gpu, mesh, &options)?))
+            }
+            Kind::Lbvh => Some(Self::Lbvh(Lbvh::build(gpu, mesh)?)),
+            Kind::RayQuery => RayQuery::build(gpu, mesh)?.map(Self::RayQuery),
+        })
+    }
+
+    /// Device time of the construction.
+    pub(super) fn stages(&self) -> &[StageTime] {
+        match self {
+            Self::Octree(tree) => tree.stages(),
+            Self::Lbvh(lbvh) => lbvh.stages(),
+            Self::RayQuery(rays) => rays.stages(),
+        }
+    }
+
+    /// Locates points.
+    pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
+        match self {
+            Self::Octree(tree) => query::locate(mesh, tree, points, None, &LocateOptions::default(), &|_, _| {}),
+            Self::Lbvh(lbvh) => lbvh.locate(mesh, points, TOLERANCE),
+            Self::RayQuery(rays) => rays.locate(mesh, points),
+        }
+    }
+}
+
+/// Which primitives of two meshes intersect the other; `None` where the structures cannot tell.
+pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> {
+    let (Some(a), Some(b)) = (party(a), party(b)) else { return Ok(None) };
+    query::overlap(a, b, false, &|_, _| {}).map(Some)
+}

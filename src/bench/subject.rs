@@ -1,0 +1,119 @@
+//! A mesh on the device and the questions that all structures over it are asked.
+
+use super::Settings;
+use super::party;
+use super::structure::{Built, Structure};
+use crate::build::{BadCells, DeviceMesh};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::mesh::{Field, Mesh, On};
+use crate::query::{self, Drawn, Sliced};
+use crate::reference::boundary::fault_of;
+use crate::reference::grid::morton;
+use crate::render::{Bounds, Plan, RenderSettings};
+use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
+
+/// Voxels are so thick, as part of the largest extent: one cell of the paper's *Jets*.
+const THICKNESS: f64 = 1.0 / 127.0;
+/// So far along each axis, as part of the extent, the mesh is moved for the overlap with itself.
+const MOVED: f32 = 0.137;
+
+/// A mesh and its questions.
+pub(super) struct Subject<'a> {
+    pub gpu: &'a Gpu,
+    pub mesh: &'a Mesh,
+    pub device: DeviceMesh,
+    /// The same mesh, moved.
+    pub moved: DeviceMesh,
+    /// Points all over the volume of the mesh, in no order.
+    pub random: Vec<[f32; 3]>,
+    /// The same along a Z curve.
+    pub coherent: Vec<[f32; 3]>,
+    field: Field,
+    plan: Plan,
+    voxels: VoxelGrid,
+}
+
+impl<'a> Subject<'a> {
+    pub(super) fn new(gpu: &'a Gpu, mesh: &'a Mesh, settings: &Settings) -> Result<Self> {
+        let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
+        let grid = *device.grid();
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let bounds = Bounds { lo: corner(grid.lo), hi: corner(grid.hi) };
+        let extent = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
+        let mut moved = mesh.clone();
+        moved.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + MOVED * extent[c]));
+        let moved = DeviceMesh::upload(gpu, &moved, BadCells::Skip)?;
+
+        let random = random_points(mesh, settings.points);
+        let mut coherent = random.clone();
+        coherent.sort_by_cached_key(|&p| morton(grid.quantize(p)));
+
+        let of_points = mesh.fields.iter().find(|f| f.on == On::Points).cloned();
+        let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
+        let field = of_points.unwrap_or_else(along_x);
+        // Every sample is taken: nothing is opaque, and no ray ends early.
+        let picture = RenderSettings { size: [settings.picture; 2], shading: false, termination: 1.0, ..RenderSettings::default() };
+        let plan = Plan::new(&picture, &bounds, mesh.origin, field.range())?;
+        let thickness = extent.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
+        let slice =
+            SliceSettings { size: [settings.slice, 0], thickness: Some(f64::from(thickness) * THICKNESS), ..SliceSettings::default() };
+        let voxels = slice.voxels(bounds.lo, bounds.hi, [0.0; 3])?;
+        Ok(Self { gpu, mesh, device, moved, random, coherent, field, plan, voxels })
+    }
+
+    /// Centre of a voxel of the slice, by its number.
+    pub(super) fn centre(&self, voxel: usize) -> [f32; 3] {
+        let (row, at) = (self.voxels.size[0].max(1), voxel as u32);
+        self.voxels.centre([at % row, at / row, 0])
+    }
+
+    /// Draws the field; `None` where the structure cannot.
+    pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
+        let Some(party) = party(Built { mesh: &self.device, structure }) else { return Ok(None) };
+        query::render(party.mesh, party.tree, &self.plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
+    }
+
+    /// Slices the mesh through its middle; `None` where the structure cannot.
+    pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
+        let Some(party) = party(Built { mesh: &self.device, structure }) else { return Ok(None) };
+        let field = Some((self.field.values.as_slice(), On::Points));
+        query::slice(party.mesh, party.tree, field, &self.voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
+    }
+}
+
+/// Six times the volume of a tetrahedron with these corners.
+pub(super) fn volume(p: [[f64; 3]; 4]) -> f64 {
+    let [a, b, c] = [1, 2, 3].map(|i| glam::DVec3::from_array(p[i]) - glam::DVec3::from_array(p[0]));
+    a.cross(b).dot(c).abs()
+}
+
+/// The corners of every valid tetrahedron.
+pub(super) fn corners(mesh: &Mesh) -> impl Iterator<Item = [[f64; 3]; 4]> {
+    let valid = (0u32..).zip(&mesh.tets).filter(|&(t, _)| fault_of(mesh, t).is_none());
+    valid.map(|(_, ids)| ids.map(|id| mesh.points[id as usize].map(f64::from)))
+}
+
+/// Points spread evenly over the volume of a mesh, always the same ones.
+fn random_points(mesh: &Mesh, count: u32) -> Vec<[f32; 3]> {
+    let mut state = 0u64;
+    // SplitMix64, 53 bits.
+    let mut next = || {
+        state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 11) as f64 / 9_007_199_254_740_992.0
+    };
+    let ends: Vec<f64> = corners(mesh).scan(0.0, |sum, p| Some((*sum += volume(p), *sum).1)).collect();
+    let tets: Vec<_> = corners(mesh).collect();
+    let total = ends.last().copied().unwrap_or(0.0);
+    let mut point = |_| {
+        let at = next() * total;
+        let p = tets.get(ends.partition_point(|&end| end <= at)).or(tets.last())?;
+        let mut cuts = [next(), next(), next()];
+        cuts.sort_by(f64::total_cmp);
+        let weights = [cuts[0], cuts[1] - cuts[0], cuts[2] - cuts[1], 1.0 - cuts[2]];
+        Some([0, 1, 2].map(|c| (0..4).map(|i| weights[i] * p[i][c]).sum::<f64>() as f32))
+    };
+    (0..count).map_while(&mut point).collect()
+}

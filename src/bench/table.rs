@@ -1,0 +1,192 @@
+//! A report as tables, for a terminal and as Markdown.
+
+use super::report::{MeshReport, Quantity, Report, StructureReport};
+use std::fmt::Write as _;
+
+/// A table: the first column is text, the others are right-aligned.
+struct Table {
+    title: String,
+    header: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+/// A number with three significant digits, at least.
+pub(super) fn number(x: f64) -> String {
+    match x.abs() {
+        a if !a.is_finite() => "–".into(),
+        a if a >= 99.95 => format!("{x:.0}"),
+        a if a >= 9.995 => format!("{x:.1}"),
+        a if a >= 0.0995 || a == 0.0 => format!("{x:.2}"),
+        a if a >= 1e-3 => format!("{x:.4}"),
+        _ => format!("{x:.1e}"),
+    }
+}
+
+fn mebibytes(bytes: u64) -> String {
+    number(bytes as f64 / f64::from(1 << 20))
+}
+
+fn text_of(cells: &[&str]) -> Vec<String> {
+    cells.iter().map(|&c| c.to_owned()).collect()
+}
+
+/// One row per structure, one column per mesh; `None` if no structure has anything to show.
+fn by_structure(report: &Report, title: &str, cell: impl Fn(&MeshReport, &StructureReport) -> Option<String>) -> Option<Table> {
+    let mut names: Vec<&str> = Vec::new();
+    for s in report.meshes.iter().flat_map(|m| &m.structures) {
+        if !names.contains(&s.name.as_str()) {
+            names.push(&s.name);
+        }
+    }
+    let header = std::iter::once(String::new()).chain(report.meshes.iter().map(|m| m.name.clone())).collect();
+    let of = |name: &str, m: &MeshReport| m.structures.iter().find(|s| s.name == name).and_then(|s| cell(m, s));
+    let row = |name: &str| {
+        let cells: Vec<Option<String>> = report.meshes.iter().map(|m| of(name, m)).collect();
+        let some = cells.iter().any(Option::is_some);
+        some.then(|| std::iter::once(name.to_owned()).chain(cells.into_iter().map(|c| c.unwrap_or_else(|| "–".into()))).collect())
+    };
+    let rows: Vec<Vec<String>> = names.into_iter().filter_map(row).collect();
+    (!rows.is_empty()).then(|| Table { title: title.into(), header, rows })
+}
+
+fn meshes(report: &Report) -> Table {
+    let header = ["", "tetrahedra", "points", "boundary", "volume ratio", "aspect min", "median", "max"];
+    let row = |m: &MeshReport| {
+        let share = format!("{:.1} %", 100.0 * f64::from(m.boundary) / f64::from(m.tets.max(1)));
+        let ratio = if m.quality.volume_ratio < 1e4 { number(m.quality.volume_ratio) } else { format!("{:.1e}", m.quality.volume_ratio) };
+        let mut cells = vec![m.name.clone(), m.tets.to_string(), m.points.to_string(), share, ratio];
+        cells.extend(m.quality.aspect.map(|a| format!("{a:.3}")));
+        cells
+    };
+    Table { title: "Meshes (Table 1)".into(), header: text_of(&header), rows: report.meshes.iter().map(row).collect() }
+}
+
+fn figures(report: &Report, quantity: Quantity) -> Option<Table> {
+    let unit = if quantity.is_rate() { "million per second" } else { "ms" };
+    by_structure(report, &format!("{}, {unit} (times the LBVH's speed)", quantity.title()), |_, s| {
+        let figure = s.figure(quantity)?;
+        let ratio = figure.speedup.map_or(String::new(), |r| format!(" ({}×)", number(r)));
+        Some(format!("{}{ratio}", number(figure.shown())))
+    })
+}
+
+/// The tables that everybody wants.
+fn main_tables(report: &Report) -> Vec<Table> {
+    let total = by_structure(report, "Memory (Table 2), MiB (part of the LBVH's)", |m, s| {
+        let part = m.lbvh().map_or(String::new(), |l| format!(" ({:.0} %)", 100.0 * s.memory.total as f64 / l.memory.total as f64));
+        Some(format!("{}{part}", mebibytes(s.memory.total)))
+    });
+    let paper = by_structure(report, "Memory as the paper counts, with boxes and without PO, MiB", |_, s| s.memory.paper.map(mebibytes));
+    let lost = by_structure(report, "Points inside that are lost, of those located", |_, s| {
+        s.lost.map(|l| format!("{} of {} ({:.4} %)", l.points, l.of, 100.0 * l.points as f64 / l.of.max(1) as f64))
+    });
+    let mut tables = vec![meshes(report)];
+    tables.extend(figures(report, Quantity::Build));
+    tables.extend(total.into_iter().chain(paper));
+    tables.extend(Quantity::ALL[1..].iter().filter_map(|&q| figures(report, q)));
+    tables.extend(lost);
+    tables
+}
+
+/// What is in the main tables, taken apart.
+fn detail_tables(report: &Report) -> Vec<Table> {
+    let listed = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
+    let stages = report.meshes.iter().map(|m| {
+        let row = |s: &StructureReport| {
+            let stages = s.figure(Quantity::Build).map(|f| &f.timing.stages_ms);
+            let stages = listed(&mut stages.into_iter().flatten().map(|(name, ms)| format!("{} {}", name, number(*ms))));
+            vec![s.name.clone(), s.level.map_or("–".into(), |l| l.to_string()), s.entries.map_or("–".into(), |n| n.to_string()), stages]
+        };
+        let header = text_of(&["", "l", "entries", "device ms per stage"]);
+        Table { title: format!("Construction by stage, {}", m.name), header, rows: m.structures.iter().map(row).collect() }
+    });
+    let arrays = report.meshes.iter().map(|m| {
+        let row = |s: &StructureReport| {
+            let arrays = s.memory.arrays.iter().filter(|a| a.1 > 0).map(|(name, n)| format!("{name} {n}"));
+            let more = [("before compaction", s.memory.before_compaction), ("scratch", s.memory.scratch)];
+            let more = more.into_iter().filter_map(|(name, n)| Some(format!("{name} {}", n?)));
+            vec![s.name.clone(), listed(&mut arrays.chain(more))]
+        };
+        Table {
+            title: format!("Bytes by array, {}", m.name),
+            header: text_of(&["", "bytes"]),
+            rows: m.structures.iter().map(row).collect(),
+        }
+    });
+    let every = report.meshes.iter().map(|m| {
+        let header = ["", "measurement", "repetitions", "device min", "median", "max", "wall median, ms"];
+        let row = |s: &StructureReport| {
+            let name = s.name.clone();
+            let figure = move |f: &super::Figure| {
+                let t = &f.timing;
+                let device = t.device_ms.map_or(text_of(&["–"; 3]), |d| [d.min, d.median, d.max].map(number).to_vec());
+                [vec![name.clone(), f.quantity.stem().into(), t.repetitions.to_string()], device, vec![number(t.wall_ms.median)]].concat()
+            };
+            s.figures.iter().map(figure).collect::<Vec<_>>()
+        };
+        let rows = m.structures.iter().flat_map(row).collect();
+        Table { title: format!("Every measurement, {}", m.name), header: text_of(&header), rows }
+    });
+    stages.chain(arrays).chain(every).collect()
+}
+
+fn heading(report: &Report) -> String {
+    let Report { version, commit, suite, settings, device, .. } = report;
+    format!(
+        "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
+         medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n",
+        commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
+        suite.name(),
+        device.name,
+        device.driver,
+        device.subgroup,
+        device.target,
+        device.binding,
+        settings.points,
+        settings.picture,
+        settings.slice,
+        settings.budget.repetitions,
+        settings.budget.seconds
+    )
+}
+
+/// The main tables for a terminal.
+pub fn text(report: &Report) -> String {
+    let mut text = heading(report);
+    for Table { title, header, rows } in main_tables(report) {
+        let width = |c: usize| rows.iter().chain([&header]).filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..header.len()).map(width).collect();
+        let _ = writeln!(text, "\n{title}");
+        for row in std::iter::once(&header).chain(&rows) {
+            let mut line = format!("  {:1$}", row[0], widths[0]);
+            for (cell, &w) in row.iter().zip(&widths).skip(1) {
+                let _ = write!(line, "  {cell:>w$}");
+            }
+            let _ = writeln!(text, "{}", line.trim_end());
+        }
+    }
+    text
+}
+
+/// All tables as Markdown.
+pub fn markdown(report: &Report) -> String {
+    let mut text = format!("# Measurements\n\n{}", heading(report).replace('\n', "  \n"));
+    for Table { title, header, rows } in main_tables(report).into_iter().chain(detail_tables(report)) {
+        let _ = writeln!(text, "\n## {title}\n\n| {} |\n|---|{}", header.join(" | "), "---:|".repeat(header.len() - 1));
+        for row in rows {
+            let _ = writeln!(text, "| {} |", row.join(" | "));
+        }
+    }
+    text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::number;
+
+    #[test]
+    fn numbers_have_three_digits() {
+        let shown = [0.0, 0.000_12, 0.012_34, 0.5, 9.994, 9.996, 99.94, 99.96, 12_345.6, f64::NAN].map(number);
+        assert_eq!(shown, ["0.00", "1.2e-4", "0.0123", "0.50", "9.99", "10.0", "99.9", "100", "12346", "–"]);
+    }
+}

@@ -1,0 +1,117 @@
+//! The answers of a structure, and whether they are right.
+
+use super::Lost;
+use super::structure::{Built, Kind, Structure, overlap};
+use super::subject::Subject;
+use crate::build::Tree;
+use crate::error::{Error, Result};
+use crate::options::Lists;
+use crate::reference::boundary::Topology;
+use crate::reference::build::build;
+use crate::reference::locate::{Locator, place};
+use crate::reference::tet::Tet;
+use crate::slicing::INSIDE;
+
+/// Pictures may differ by this much per channel, and in one pixel of 1000 by more (SPEC 3.3).
+const COLOR: f32 = 2.0 / 255.0;
+
+/// What a structure answers; `None`: it cannot.
+pub(super) struct Answers {
+    /// Of the random and of the coherent points.
+    owners: [Vec<u32>; 2],
+    /// Samples in the mesh; colours.
+    pub picture: Option<(u64, Vec<[f32; 4]>)>,
+    /// Kind and owner of every voxel.
+    pub voxels: Option<(Vec<u8>, Vec<u32>)>,
+    /// Primitives that intersect the other mesh, of either.
+    pub overlap: Option<[Vec<u32>; 2]>,
+}
+
+impl Answers {
+    /// Asks everything once. `moved`: the same kind of structure over the moved mesh.
+    pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: &Structure) -> Result<Self> {
+        let owners = |points: &[[f32; 3]]| structure.locate(&subject.device, points).map(|found| found.owners);
+        let owners = [owners(&subject.random)?, owners(&subject.coherent)?];
+        let picture = subject.render(structure)?.map(|drawn| (drawn.found_samples, drawn.colors));
+        let (mut kinds, mut cells) = (Vec::new(), Vec::new());
+        let sliced = subject.slice(structure, &mut |band| {
+            kinds.extend(band.kinds);
+            cells.extend(band.owners);
+            Ok(())
+        })?;
+        let voxels = sliced.map(|_| (kinds, cells));
+        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh: &subject.moved, structure: moved }];
+        let overlap = overlap(a, b)?.map(|found| [found.overlap.a, found.overlap.b]);
+        Ok(Self { owners, picture, voxels, overlap })
+    }
+}
+
+/// Whether the closed cell holds the point, by the exact test.
+fn holds(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
+    let grid = subject.device.grid();
+    let Some(&ids) = subject.mesh.tets.get(tet as usize) else { return false };
+    let corners = ids.map(|id| grid.normalise(subject.mesh.points[id as usize]));
+    // The order of the ids is all that matters.
+    let order = ids.map(|id| ids.iter().filter(|&&other| other < id).count() as u32);
+    let mut by_order = [[0.0; 3]; 4];
+    order.iter().zip(corners).for_each(|(&o, corner)| by_order[o as usize] = corner);
+    place(grid, point).is_some_and(|(_, x)| Tet::new(order, &by_order).weights(x).inside)
+}
+
+/// Compares with the answers of the first structure. Ray queries may lose points, and name any cell that holds a point.
+pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers: &Answers) -> Result<Option<Lost>> {
+    let wrong = |what: String| Err(Error::Mismatch(format!("{kind}: {what}")));
+    let mut lost = Lost { points: 0, of: 0 };
+    for (points, (expected, found)) in [&subject.random, &subject.coherent].iter().zip(first.owners.iter().zip(&answers.owners)) {
+        lost.of += points.len() as u64;
+        let all = points.iter().zip(expected.iter().zip(found));
+        for (&point, (&expected, &found)) in all.filter(|(_, (expected, found))| expected != found) {
+            let holding = [expected, found].map(|tet| holds(subject, tet, point));
+            match kind {
+                Kind::RayQuery if found == u32::MAX => lost.points += u64::from(holding[0]),
+                // Where cells overlap, walks may end in another one.
+                Kind::RayQuery | Kind::Octree { lists: Lists::Boundary, .. } if holding[1] => {}
+                // Outside by less than the tolerance, a point may be found from one leaf and not from another.
+                Kind::Octree { .. } | Kind::Lbvh if holding == [false; 2] => {}
+                _ => return wrong(format!("point {point:?} lies in cell {expected}, not {found}")),
+            }
+        }
+    }
+    if let (Some((samples, colors)), Some((found, others))) = (&first.picture, &answers.picture) {
+        let differs = |(a, b): (&[f32; 4], &[f32; 4])| a.iter().zip(b).any(|(a, b)| (a - b).abs() > COLOR);
+        let pixels = colors.iter().zip(others).filter(|&pair| differs(pair)).count();
+        if samples != found || 1000 * pixels > colors.len() {
+            return wrong(format!("{found} samples in the mesh where there are {samples}; {pixels} pixels differ"));
+        }
+    }
+    if let (Some((kinds, expected)), Some((found_kinds, found))) = (&first.voxels, &answers.voxels) {
+        let walks = matches!(kind, Kind::Octree { lists: Lists::Boundary, .. });
+        let same = |i: usize| expected[i] == found[i] || (walks && kinds[i] == INSIDE && holds(subject, found[i], subject.centre(i)));
+        if kinds != found_kinds || !(0..kinds.len()).all(same) {
+            return wrong("the voxels of the slice differ".into());
+        }
+    }
+    if let (Some(expected), Some(found)) = (&first.overlap, &answers.overlap)
+        && expected != found
+    {
+        let counts = [expected, found].map(|sets| sets.each_ref().map(Vec::len));
+        return wrong(format!("{:?} primitives overlap where there are {:?}", counts[1], counts[0]));
+    }
+    Ok((kind == Kind::RayQuery).then_some(lost))
+}
+
+/// Compares a tree and the owners found with it with the reference.
+pub(super) fn check_tree(subject: &Subject<'_>, topology: &Topology, tree: &Tree, answers: &Answers) -> Result<()> {
+    let options = tree.options();
+    let host = tree.download()?;
+    let wrong = |what: &str| Err(Error::Mismatch(format!("α={} {}: {what}", options.alpha, options.assign)));
+    if host != build(subject.mesh, topology, options)? {
+        return wrong("the tree is not the reference's");
+    }
+    let expected = Locator::new(subject.mesh, topology, &host).locate_all(&subject.random);
+    if expected.iter().zip(&answers.owners[0]).any(|(e, &found)| e.owner != found) {
+        wrong("owners are not the reference's")
+    } else {
+        Ok(())
+    }
+}

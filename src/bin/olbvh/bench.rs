@@ -1,0 +1,122 @@
+//! `olbvh bench`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::{engine, input, output};
+use olbvh::bench::{Report, Settings, Suite, markdown, plots, run as measure, text};
+use olbvh::error::Error;
+use olbvh::formats::{OutputFile, OutputFormat};
+use std::io::Write as _;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Measure the octree against an LBVH and the device's own ray tracing, as the paper does, on one device.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh bench                               two small meshes, within a minute on two cores
+  olbvh bench --suite paper -o results      the paper's sizes; results/ gets bench.json, bench.md and a plot per figure
+  olbvh bench bracket.vtu -o bracket.md     this mesh, with the sizes of the quick suite
+  olbvh bench graded:40 shell:200 --suite paper --repeat 9 --seconds 1 --json
+
+Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different size), shell:N (thin walls), slivers:N (flat cells). The suite gives
+the sizes of points, picture and slice; MESH... stands in place of its meshes. Answers are verified before anything is timed; a wrong one ends the
+run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios.")]
+pub struct Args {
+    /// Meshes instead of those of the suite.
+    mesh: Vec<PathBuf>,
+    /// How much is measured.
+    #[arg(long, default_value = "quick", value_name = "quick|paper|full")]
+    suite: Suite,
+    /// Where the results go: a .json or .md file, or a folder for both and the plots.
+    #[arg(short, long, value_name = "OUT")]
+    output: Option<PathBuf>,
+    /// Points to locate; by default as many as the suite does.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    points: Option<u32>,
+    /// Width and height of the picture, and voxels of a row of the slice; by default those of the suite.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    pixels: Option<u32>,
+    /// Most repetitions of a measurement.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    repeat: Option<u32>,
+    /// Seconds after which a measurement is not repeated again.
+    #[arg(long, value_name = "S")]
+    seconds: Option<f64>,
+}
+
+/// What OUT is.
+enum Target {
+    Folder,
+    File(OutputFormat),
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    let target = args.output.as_deref().map(target).transpose()?;
+    let mut settings = Settings::of(args.suite);
+    settings.points = args.points.unwrap_or(settings.points);
+    if let Some(pixels) = args.pixels {
+        (settings.picture, settings.slice) = (pixels, pixels);
+    }
+    settings.budget.repetitions = args.repeat.unwrap_or(settings.budget.repetitions);
+    if let Some(seconds) = args.seconds {
+        if !(seconds.is_finite() && seconds >= 0.0) {
+            return Err(Failure::Usage(format!("--seconds {seconds}; it is a time")));
+        }
+        settings.budget.seconds = seconds;
+    }
+    let gpu = engine::device(common.device.as_deref())?;
+    let mut report = Report::new(&gpu, args.suite, settings, commit());
+    let named =
+        |(role, mesh): (&str, &str)| (if role.is_empty() { mesh.to_owned() } else { format!("{role} {mesh}") }, PathBuf::from(mesh));
+    let meshes: Vec<(String, PathBuf)> = if args.mesh.is_empty() {
+        args.suite.meshes().into_iter().map(named).collect()
+    } else {
+        args.mesh.iter().map(|path| (path.display().to_string(), path.clone())).collect()
+    };
+    for (name, path) in meshes {
+        let mesh = input::mesh(&path, common)?.mesh;
+        report.meshes.push(measure(&gpu, &name, &mesh, &report.settings, &|line| common.remark(line))?);
+        // So that a long run that is stopped has told something.
+        if let (Some(path), Some(target)) = (&args.output, &target) {
+            write(path, target, &report)?;
+        }
+    }
+    let json = serde_json::to_value(&report).map_err(|e| Failure::Failed(e.to_string()))?;
+    output::summary(common, &json, &text(&report))
+}
+
+/// Announces the result before long work.
+fn target(path: &Path) -> Outcome<Target> {
+    if path.extension().is_some() {
+        return output::announce(path, &[OutputFormat::Json, OutputFormat::Md]).map(Target::File);
+    }
+    std::fs::create_dir_all(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    Ok(Target::Folder)
+}
+
+fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
+    let json = serde_json::to_string_pretty(report).map_err(|e| Failure::Failed(e.to_string()))? + "\n";
+    let files = match target {
+        Target::File(OutputFormat::Md) => vec![(path.to_path_buf(), markdown(report))],
+        Target::File(_) => vec![(path.to_path_buf(), json)],
+        Target::Folder => {
+            let plots = plots(report).into_iter();
+            let tables = [("bench.json".to_owned(), json), ("bench.md".to_owned(), markdown(report))];
+            plots.chain(tables).map(|(name, content)| (path.join(name), content)).collect()
+        }
+    };
+    for (path, content) in files {
+        let mut file = OutputFile::create(&path)?;
+        file.write_all(content.as_bytes()).map_err(|source| Error::Io { path, source })?;
+        file.commit()?;
+    }
+    Ok(())
+}
+
+/// The commit of the sources that this program was built from, if they are still there and under Git.
+fn commit() -> Option<String> {
+    let told = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"]).output().ok()?;
+    let name = String::from_utf8(told.stdout).ok()?.trim().to_owned();
+    (told.status.success() && !name.is_empty()).then_some(name)
+}

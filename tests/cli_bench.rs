@@ -1,0 +1,108 @@
+//! `olbvh bench` on a tiny mesh: what it writes, and that what it writes fits together.
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+fn bench(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_olbvh")).arg("bench").args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn strings<'a>(list: &'a Value, key: &str) -> Vec<&'a str> {
+    list.as_array().unwrap().iter().map(|entry| entry[key].as_str().unwrap()).collect()
+}
+
+/// Device median, or else that of the host.
+fn milliseconds(figure: &Value) -> f64 {
+    figure["device_ms"].get("median").unwrap_or(&figure["wall_ms"]["median"]).as_f64().unwrap()
+}
+
+#[test]
+fn a_tiny_mesh_is_measured() {
+    let folder = tempfile::tempdir().unwrap();
+    let sizes = ["--points", "500", "--pixels", "16", "--repeat", "3", "--seconds", "0.02"];
+    let arguments = [&["kuhn:4,5,3", "shell:8", "-o", "out", "--json"], &sizes[..]].concat();
+    let out = bench(folder.path(), &arguments);
+    let messages = String::from_utf8_lossy(&out.stderr);
+    assert_eq!(out.status.code(), Some(0), "{messages}");
+    assert!(messages.contains("kuhn:4,5,3: OLBVH α=0 aabb"), "{messages}");
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    for key in ["version", "commit", "suite", "settings", "device", "meshes"] {
+        assert!(report.get(key).is_some(), "no {key} in {report:#}");
+    }
+    assert_eq!(report["settings"]["budget"]["repetitions"], 3);
+    assert!(report["device"]["name"].is_string() && report["device"]["target"].is_string());
+    assert_eq!(strings(&report["meshes"], "name"), ["kuhn:4,5,3", "shell:8"]);
+    let rays = report["device"]["ray_query"].as_bool().unwrap();
+    for mesh in report["meshes"].as_array().unwrap() {
+        let structures = mesh["structures"].as_array().unwrap();
+        let kinds = strings(&mesh["structures"], "kind");
+        assert_eq!(kinds.iter().filter(|&&k| k == "olbvh").count(), 12);
+        assert_eq!((kinds.contains(&"lbvh"), kinds.contains(&"ray_query")), (true, rays));
+        let lbvh = structures.iter().find(|s| s["kind"] == "lbvh").unwrap();
+        for structure in structures {
+            let memory = &structure["memory"];
+            let sum: u64 = memory["arrays"].as_array().unwrap().iter().map(|a| a[1].as_u64().unwrap()).sum();
+            assert_eq!(Some(sum), memory["total"].as_u64());
+            let quantities = strings(&structure["figures"], "quantity");
+            let expected = ["build", "locate_random", "locate_coherent", "intervals", "march", "slice", "overlap"];
+            assert!(quantities.starts_with(&expected[..3]), "{quantities:?}");
+            if structure["kind"] == "olbvh" {
+                assert_eq!(quantities, expected);
+                assert!(memory["paper"].as_u64().is_some() && structure["nodes"].as_u64().is_some());
+            }
+            for figure in structure["figures"].as_array().unwrap() {
+                let time = milliseconds(figure);
+                let spread = &figure["wall_ms"];
+                let [min, median, max] = ["min", "median", "max"].map(|k| spread[k].as_f64().unwrap());
+                assert!(time > 0.0 && min <= median && median <= max, "{figure}");
+                assert!((1..=3).contains(&figure["repetitions"].as_u64().unwrap()));
+                if let Some(items) = figure["items"].as_f64() {
+                    let rate = figure["per_second"].as_f64().unwrap();
+                    assert!((rate * time / 1e3 / items - 1.0).abs() < 1e-9, "{figure}");
+                }
+                // The ratio is that of the times printed.
+                let baseline = lbvh["figures"].as_array().unwrap().iter().find(|f| f["quantity"] == figure["quantity"]);
+                let ratio = baseline.map(|b| milliseconds(b) / time);
+                match (figure["speedup"].as_f64(), ratio) {
+                    (Some(speedup), Some(ratio)) => assert!((speedup / ratio - 1.0).abs() < 1e-9, "{figure}"),
+                    (speedup, ratio) => assert_eq!(speedup, ratio, "{figure}"),
+                }
+            }
+        }
+        let lost = structures.iter().map(|s| s["lost"]["points"].as_u64());
+        assert!(lost.zip(&kinds).all(|(lost, &kind)| lost.is_some() == (kind == "ray_query")));
+    }
+    let out = folder.path().join("out");
+    let stored: Value = serde_json::from_slice(&std::fs::read(out.join("bench.json")).unwrap()).unwrap();
+    assert_eq!(stored, report);
+    let tables = std::fs::read_to_string(out.join("bench.md")).unwrap();
+    for title in ["## Meshes (Table 1)", "## Construction (Fig. 6)", "## Memory (Table 2)", "## Every measurement, shell:8"] {
+        assert!(tables.contains(title), "no {title} in {tables}");
+    }
+    for plot in ["fig06_construction", "table2_memory", "fig07_samples", "fig08_slicing", "fig10_overlap", "location_random"] {
+        let svg = std::fs::read_to_string(out.join(plot).with_extension("svg")).unwrap();
+        assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.contains("LBVH") && !svg.contains("NaN"), "{plot}");
+    }
+}
+
+#[test]
+fn wrong_arguments_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let wrong: [&[&str]; 6] = [
+        &["--suite", "huge"],
+        &["--repeat", "0"],
+        &["kuhn:2,2,2", "-o", "a.csv"],
+        &["kuhn:2,2,2", "--seconds=-1"],
+        &["shell:3"],
+        &["kuhn:2,2,2", "--device", "cpu"],
+    ];
+    for arguments in wrong {
+        let out = bench(folder.path(), arguments);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
+    }
+    assert_eq!(bench(folder.path(), &["nothing.vtu"]).status.code(), Some(3));
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a refused run leaves nothing");
+}
