@@ -371,6 +371,9 @@ olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
 // Whether no face says outside by more than the margin.
 bool olbvh_near(olbvh_Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
 
+// Weights in the caller's order of vertices, which is that of the faces.
+vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
+
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; the smallest float for a flat cell.
@@ -439,14 +442,6 @@ struct olbvh_Best {
 };
 
 olbvh_Best olbvh_no_best() { return olbvh_Best(olbvh_NONE, false, false, olbvh_SMALLEST_FLOAT); }
-
-// Where the search for an owner stands, if it takes more than one dispatch.
-struct olbvh_OwnerSearch {
-    uint cursor; // what has been searched
-    olbvh_Best best;
-};
-
-olbvh_OwnerSearch olbvh_no_search() { return olbvh_OwnerSearch(0u, olbvh_no_best()); }
 
 // Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
 // smallest barycentric coordinate, then the lowest id. Flat cells never.
@@ -522,9 +517,6 @@ bool olbvh_in_star(uint t) {
     }
     return false;
 }
-
-// Weights in the caller's order of vertices, which is that of the faces.
-vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
 
 // Takes into the star what lies beside `t`, one of it.
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {

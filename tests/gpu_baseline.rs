@@ -5,10 +5,12 @@ use olbvh::baseline::{Lbvh, LbvhArrays};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{Mesh, kuhn_jittered};
+use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, TOLERANCE};
-use olbvh::query::{self, LocateOptions};
+use olbvh::query::{self, LocateOptions, Party, Structure};
 use olbvh::reference::boundary::NONE;
+use olbvh::render::{Bounds, Prepared, RenderSettings};
+use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh with both structures over it.
 struct Both {
@@ -32,7 +34,7 @@ fn meshes() -> Vec<(&'static str, Mesh)> {
     let mut meshes: Vec<_> = cases().unwrap().into_iter().map(|c| (c.name, c.mesh)).collect();
     meshes.push(("jittered", kuhn_jittered([9, 8, 7], 0.3, 5).unwrap()));
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
-    meshes.push(("equal-20000", Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000])));
+    meshes.push(("identical-9000", Mesh::new(one.points.clone(), vec![one.tets[0]; 9_000])));
     meshes
 }
 
@@ -97,8 +99,8 @@ fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
 
 fn check_owners(name: &str, b: &Both) {
     let mut points = points(&b.mesh);
-    if name == "equal-20000" {
-        points = points.into_iter().step_by(97).collect(); // each looks at 20,000 cells
+    if name == "identical-9000" {
+        points = points.into_iter().step_by(97).collect(); // each looks at all cells
     }
     let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
     let found = b.lbvh.locate(&b.device, &points, TOLERANCE).unwrap();
@@ -106,28 +108,102 @@ fn check_owners(name: &str, b: &Both) {
         let of = |l: &query::Located| (l.owners[i], l.barycentrics[i]);
         assert_eq!(of(&expected), of(&found), "{name}: point {i} {p:?}");
     }
-    if name == "equal-20000" {
+    if name == "identical-9000" {
         assert!(found.stages.len() > 1, "the search of a point was never resumed");
     }
 }
 
+/// Few pixels and voxels where each looks at thousands of cells, in many dispatches, or has thousands of samples.
+fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
+    if name.starts_with("identical") || name == "very-far" { [4, 3] } else { size }
+}
+
+/// A picture of the first coordinate, if there is something to see.
+fn check_picture(name: &str, b: &Both) -> u64 {
+    let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+    let bounds = Bounds { lo: three(b.device.grid().lo), hi: three(b.device.grid().hi) };
+    let field = Field { name: "x".into(), on: On::Points, values: b.mesh.points.iter().map(|p| p[0]).collect() };
+    let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
+    let mut found = 0;
+    for camera in ["iso", "azimuth=100,elevation=-10,zoom=1.5"] {
+        let settings = RenderSettings { size: size(name, [28, 20]), camera: camera.parse().unwrap(), ..RenderSettings::default() };
+        let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
+        let Ok(prepared) = Prepared::new(&settings, &b.mesh, &bounds, &neighbours, valid, &field) else { continue };
+        let draw = |structure: Structure| {
+            query::render(&b.device, structure, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), &|_, _| {}).unwrap()
+        };
+        let (expected, drawn) = (draw((&b.tree).into()), draw((&b.lbvh).into()));
+        assert_eq!(expected.found_samples, drawn.found_samples, "{name}, {camera}: samples in the mesh");
+        assert!(expected.colors == drawn.colors, "{name}, {camera}: colours");
+        found += drawn.found_samples;
+    }
+    found
+}
+
+/// Slices through the middle: touched voxels.
+fn check_slices(name: &str, b: &Both) -> u64 {
+    let three = |v: [f32; 4]| [v[0], v[1], v[2]];
+    let (lo, hi) = (three(b.device.grid().lo), three(b.device.grid().hi));
+    let mut touched = 0;
+    for (plane, layers) in [(Plane::Axis(0), 1), (Plane::Axis(2), 3), (Plane::Normal([1.0, -2.0, 0.7]), 2)] {
+        let settings = SliceSettings { plane, layers, size: size(name, [17, 13]), ..SliceSettings::default() };
+        let Ok(voxels) = settings.voxels(lo, hi, b.mesh.origin) else { continue };
+        let slice = |structure: Structure| {
+            let (mut kinds, mut owners) = (Vec::new(), Vec::new());
+            let mut sink = |band: Band| {
+                kinds.extend(band.kinds);
+                owners.extend(band.owners);
+                Ok(())
+            };
+            let sliced = query::slice(&b.device, structure, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut sink).unwrap();
+            touched += sliced.tally.touched;
+            (kinds, owners)
+        };
+        let [expected, found] = [(&b.tree).into(), (&b.lbvh).into()].map(slice);
+        assert!(expected.0 == found.0, "{name}: kinds of {plane:?}");
+        assert!(expected.1 == found.1, "{name}: owners of {plane:?}");
+    }
+    touched
+}
+
+fn check_overlap<'a>(name: &str, a: &'a Both, b: &'a Both) -> usize {
+    let party = |b: &'a Both| Party { mesh: &b.device, tree: &b.tree };
+    let expected = query::overlap(party(a), party(b), false, &|_, _| {}).unwrap();
+    let found = a.lbvh.overlap(&a.device, &b.lbvh, &b.device, &|_, _| {}).unwrap();
+    assert_eq!(expected.overlap.a, found.overlap.a, "{name}: a");
+    assert_eq!(expected.overlap.b, found.overlap.b, "{name}: b");
+    if name == "identical-9000" {
+        assert!(found.submissions > 1, "the search of a primitive was never resumed");
+    }
+    found.overlap.a.len()
+}
+
 fn everything(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    let (mut found, mut touched, mut hits) = (0, 0, 0);
+    let mut grid = kuhn_jittered([6, 5, 4], 0.3, 9).unwrap();
+    grid.points.iter_mut().for_each(|p| *p = [p[0] - 2.6, p[1] - 3.3, p[2] - 1.4]);
+    let grid = Both::new(&gpu, grid);
     for (name, mesh) in meshes() {
         let both = Both::new(&gpu, mesh);
         check_tree(name, &both);
         check_owners(name, &both);
+        found += if name == "identical-9000" { 0 } else { check_picture(name, &both) };
+        touched += check_slices(name, &both);
+        hits += check_overlap(name, &grid, &both);
+        hits += check_overlap(name, &both, &grid);
     }
+    assert!(found > 10_000 && touched > 1000 && hits > 1000, "{found} samples, {touched} voxels, {hits} hits");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
 #[test]
-fn by_address() {
+fn baseline_by_address() {
     everything(Binding::Address);
 }
 
 #[test]
-fn by_descriptors() {
+fn baseline_by_descriptors() {
     everything(Binding::Descriptors);
 }

@@ -26,19 +26,6 @@ bool closer(uint i, uint j) {
     return c != d ? c < d : i < j;
 }
 
-// Box of a leaf or of a node that is done, in normalised coordinates.
-void box_of(uint reference, out vec3 lo, out vec3 hi) {
-    uint i = reference & BINARY_INDEX;
-    if ((reference & BINARY_LEAF) != 0u) {
-        uvec4 v = cells.at[ids.at[i]];
-        vec3 a = vertices.at[v.x].xyz, b = vertices.at[v.y].xyz, c = vertices.at[v.z].xyz, d = vertices.at[v.w].xyz;
-        lo = min(min(a, b), min(c, d));
-        hi = max(max(a, b), max(c, d));
-    } else {
-        node_box(i, lo, hi);
-    }
-}
-
 void main() {
     uint first = item_index(), last = first, me = first | BINARY_LEAF;
     vec3 lo, hi;

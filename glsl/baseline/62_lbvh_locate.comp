@@ -34,7 +34,7 @@ void main() {
         vec3 at = vec3(points.at[3u * i], points.at[3u * i + 1u], points.at[3u * i + 2u]);
         vec3 x = normalise(g, at);
         OwnerSearch s = no_search();
-        if (fresh == 0u) s = OwnerSearch(state.y, Best(owners.at[i], (state.z & 2u) != 0u, (state.z & 1u) != 0u, uintBitsToFloat(state.w)));
+        if (fresh == 0u) s = OwnerSearch(state.y, best_of(owners.at[i], state.z, uintBitsToFloat(state.w)));
         uint owner, work = 0u;
         if (find_owner(s, g, at, x, tolerance, work, budget, owner)) {
             vec4 b = vec4(0.0);
@@ -46,7 +46,7 @@ void main() {
         } else {
             waits = 1u;
             owner = s.best.owner;
-            state = uvec4(NONE, s.cursor, uint(s.best.in_box) | uint(s.best.inside) << 1, floatBitsToUint(s.best.smallest));
+            state = uvec4(NONE, s.cursor, best_bits(s.best), floatBitsToUint(s.best.smallest));
         }
         owners.at[i] = owner;
         barycentrics.at[i] = state;

@@ -2,6 +2,7 @@
 // vertices.
 #include "shared/binary_tree.glsl"
 #include "shared/candidates.glsl"
+#include "shared/owner_search.glsl"
 
 // Boxes are grown by this share of their size, so that cells that hold a point within the tolerance are met too.
 const float GROW = 4e-5;
@@ -19,22 +20,16 @@ bool holds(vec3 lo, vec3 hi) {
 bool enters(uint reference) {
     if ((reference & BINARY_LEAF) != 0u) return true; // the candidate's own box decides
     vec3 lo, hi;
-    node_box(reference & BINARY_INDEX, lo, hi);
+    box_of(reference, lo, hi);
     return holds(lo, hi);
 }
 #include "shared/binary_walk.glsl"
 
-// The lowest cell that contains the point, else the one that misses it by least.
-void consider(inout Best best, uint t) {
+void look_at(inout Best best, uint t) {
     if (best.inside && best.owner < t) return;
     Tet tet = load_tet(cells.at[t]);
-    if (!holds(min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3])))) return;
-    Weights w = weights(tet, sought);
-    float s = smallest(w);
-    bool nearer = best.owner == NONE || (w.in_box && !best.in_box)
-        || (w.in_box == best.in_box && (s > best.smallest || (s == best.smallest && t < best.owner)));
-    if (w.inside) best = Best(t, true, true, 0.0);
-    else if (!best.inside && nearer && volume(tet) != 0.0) best = Best(t, false, w.in_box, s);
+    if (holds(min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]))))
+        consider(best, t, tet, weights(tet, sought));
 }
 
 // Goes on with a search for the owner of a point, `x` in normalised coordinates; false: the share of work is done before it has ended.
@@ -48,7 +43,7 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     while (work < budget) {
         place = next_place(walk, work, budget);
         if (place >= WALK_PAUSED) break;
-        consider(s.best, ids.at[place]);
+        look_at(s.best, ids.at[place]);
         ++work;
         place = WALK_PAUSED;
     }

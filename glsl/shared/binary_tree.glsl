@@ -1,11 +1,19 @@
-// The nodes of the baseline's binary tree and references to them. Needs nodes.
+// The nodes of the baseline's binary tree and references to them. Needs nodes, ids, cells, vertices.
 const uint BINARY_LEAF = 1u << 31;     // the rest is a place in the sorted primitives, not an internal node
 const uint BINARY_BOUNDARY = 1u << 30; // a boundary primitive is below
 const uint BINARY_INDEX = BINARY_BOUNDARY - 1u;
 const uint BINARY_DEPTH = 64u; // a code has 30 bits and a place 29: the tree is no deeper
 
-// Box of an internal node in normalised coordinates.
-void node_box(uint i, out vec3 lo, out vec3 hi) {
-    lo = vec3(nodes.at[i].lo[0], nodes.at[i].lo[1], nodes.at[i].lo[2]);
-    hi = vec3(nodes.at[i].hi[0], nodes.at[i].hi[1], nodes.at[i].hi[2]);
+// Box of a node or leaf in normalised coordinates.
+void box_of(uint reference, out vec3 lo, out vec3 hi) {
+    uint i = reference & BINARY_INDEX;
+    if ((reference & BINARY_LEAF) != 0u) {
+        uvec4 v = cells.at[ids.at[i]];
+        vec3 a = vertices.at[v.x].xyz, b = vertices.at[v.y].xyz, c = vertices.at[v.z].xyz, d = vertices.at[v.w].xyz;
+        lo = min(min(a, b), min(c, d));
+        hi = max(max(a, b), max(c, d));
+    } else {
+        lo = vec3(nodes.at[i].lo[0], nodes.at[i].lo[1], nodes.at[i].lo[2]);
+        hi = vec3(nodes.at[i].hi[0], nodes.at[i].hi[1], nodes.at[i].hi[2]);
+    }
 }

@@ -20,14 +20,6 @@ struct Best {
 
 Best no_best() { return Best(NONE, false, false, SMALLEST_FLOAT); }
 
-// Where the search for an owner stands, if it takes more than one dispatch.
-struct OwnerSearch {
-    uint cursor; // what has been searched
-    Best best;
-};
-
-OwnerSearch no_search() { return OwnerSearch(0u, no_best()); }
-
 // Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
 // smallest barycentric coordinate, then the lowest id. Flat cells never.
 void consider(inout Best best, uint t, Tet tet, Weights w) {

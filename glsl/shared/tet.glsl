@@ -79,6 +79,9 @@ Weights weights(Tet t, vec3 p) {
 // Whether no face says outside by more than the margin.
 bool near(Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
 
+// Weights in the caller's order of vertices, which is that of the faces.
+vec4 own_weights(Weights w, Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
+
 const float SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; the smallest float for a flat cell.

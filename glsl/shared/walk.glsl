@@ -24,9 +24,6 @@ bool in_star(uint t) {
     return false;
 }
 
-// Weights in the caller's order of vertices, which is that of the faces.
-vec4 own_weights(Weights w, Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
-
 // Takes into the star what lies beside `t`, one of it.
 void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     vec4 own = own_weights(w, tet);

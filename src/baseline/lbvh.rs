@@ -2,11 +2,11 @@
 
 use crate::build::{DeviceMesh, MeshArrays, MeshInput};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, StageTime};
+use crate::gpu::{Buffer, Gpu, Groups, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
-use crate::query::Located;
+use crate::query::{BinaryTree, Located, Structure};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
 const CODE_BITS: u32 = 31;
@@ -16,11 +16,9 @@ const BUDGET: u32 = 16_384;
 /// A binary tree over the tetrahedra of a mesh.
 #[derive(Debug)]
 pub struct Lbvh {
-    gpu: Gpu,
-    nodes: BufferRef,
-    ids: BufferRef,
-    root: BufferRef,
-    valid: u32,
+    pub(super) gpu: Gpu,
+    pub(super) tree: BinaryTree,
+    pub(super) valid: u32,
     stages: Vec<StageTime>,
     memory: Buffer,
 }
@@ -74,7 +72,7 @@ impl Lbvh {
                 r.dispatch(&arguments, spec, Groups::Count(valid.div_ceil(workgroup)))
             })
         })?;
-        Ok(Self { gpu: gpu.clone(), nodes, ids, root, valid, stages: time.stages, memory })
+        Ok(Self { gpu: gpu.clone(), tree: BinaryTree { nodes, root, ids }, valid, stages: time.stages, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per primitive.
@@ -95,9 +93,9 @@ impl Lbvh {
         let valid = u64::from(self.valid);
         let node_bytes = size_of::<LbvhNode>() as u64 * valid.saturating_sub(1);
         Ok(LbvhArrays {
-            root: self.gpu.download(&self.memory, self.root.part(0, 4))?.first().copied().unwrap_or(u32::MAX),
-            nodes: self.gpu.download(&self.memory, self.nodes.part(0, node_bytes))?,
-            ids: self.gpu.download(&self.memory, self.ids.part(0, 4 * valid))?,
+            root: self.gpu.download(&self.memory, self.tree.root.part(0, 4))?.first().copied().unwrap_or(u32::MAX),
+            nodes: self.gpu.download(&self.memory, self.tree.nodes.part(0, node_bytes))?,
+            ids: self.gpu.download(&self.memory, self.tree.ids.part(0, 4 * valid))?,
         })
     }
 
@@ -119,9 +117,9 @@ impl Lbvh {
         loop {
             let arguments = LbvhLocate {
                 grid: mesh.arrays().grid,
-                nodes: self.nodes,
-                root: self.root,
-                ids: self.ids,
+                nodes: self.tree.nodes,
+                root: self.tree.root,
+                ids: self.tree.ids,
                 boundary: mesh.arrays().boundary,
                 cells: mesh.input().cells,
                 vertices: mesh.arrays().vertices,
@@ -149,5 +147,11 @@ impl Lbvh {
         located.owners = gpu.download(&memory, owners.part(0, 4 * n))?;
         located.barycentrics = gpu.download(&memory, barycentrics.part(0, 16 * n))?;
         Ok(located)
+    }
+}
+
+impl From<&Lbvh> for Structure {
+    fn from(lbvh: &Lbvh) -> Self {
+        Self::Binary(lbvh.tree)
     }
 }

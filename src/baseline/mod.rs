@@ -2,6 +2,7 @@
 //! own ray tracing with what it does not lose.
 
 mod lbvh;
+mod overlap;
 mod ray_query;
 
 pub use lbvh::{Lbvh, LbvhArrays};

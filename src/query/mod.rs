@@ -6,11 +6,80 @@ mod slice;
 mod volume;
 
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate, locate_all};
+pub(crate) use overlap::set_bits;
 pub use overlap::{Overlapped, Party, overlap};
 pub use slice::{SliceMemory, Sliced, slice};
 pub use volume::{Drawn, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
+use crate::gpu::BufferRef;
+
+/// A binary tree in device memory: what the LBVH baseline is to the queries.
+#[derive(Clone, Copy, Debug)]
+pub struct BinaryTree {
+    /// [`crate::layout::LbvhNode`] per internal node.
+    pub nodes: BufferRef,
+    /// A word: the reference to the root, or all ones.
+    pub root: BufferRef,
+    /// Tetrahedron at each place.
+    pub ids: BufferRef,
+}
+
+/// What finds the cells of a mesh: the octree, or the baseline that it is compared with.
+#[derive(Clone, Copy, Debug)]
+pub enum Structure {
+    /// The octree.
+    Octree(TreeMemory),
+    /// The binary tree.
+    Binary(BinaryTree),
+}
+
+impl From<&Tree> for Structure {
+    fn from(tree: &Tree) -> Self {
+        Self::Octree(*tree.memory())
+    }
+}
+
+/// Dispatches the kernel for the octree, with `extra` arguments and constants of its `kind`, or its twin for the binary tree, one invocation per item; both take the structure
+/// and the arguments that follow.
+macro_rules! dispatch {
+    ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
+     { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
+        let $crate::query::Searched { mesh, structure } = $searched;
+        let workgroup = $r.gpu().target().each;
+        let groups = $crate::gpu::Groups::Count($items.div_ceil(workgroup));
+        match *structure {
+            $crate::query::Structure::Octree($crate::build::TreeMemory { grid, masks, co, po, p, flags, .. }) => {
+                let arguments = $octree { grid, masks, co, po, p, flags, $($extra,)* $($name: $value),* };
+                $r.dispatch(&arguments, $octree_spec { workgroup, $($kind,)* $($constant,)* ..Default::default() }, groups)
+            }
+            $crate::query::Structure::Binary($crate::query::BinaryTree { nodes, root, ids }) => {
+                let $crate::build::MeshArrays { grid, boundary, .. } = mesh.arrays;
+                let arguments = $binary { grid, nodes, root, ids, boundary, $($name: $value),* };
+                $r.dispatch(&arguments, $binary_spec { workgroup, $($constant,)* ..Default::default() }, groups)
+            }
+        }
+    }};
+}
+use dispatch;
+
+/// A mesh and what finds its cells.
+#[derive(Clone, Copy, Debug)]
+struct Searched {
+    mesh: MeshView,
+    structure: Structure,
+}
+
+impl Searched {
+    fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
+        Self { mesh: MeshView { input: *mesh.input(), arrays: *mesh.arrays() }, structure: structure.into() }
+    }
+
+    /// Which lists an octree keeps, for its kernels.
+    fn lists(&self) -> u32 {
+        if let Structure::Octree(tree) = self.structure { tree.lists as u32 } else { 0 }
+    }
+}
 
 /// A mesh and its tree, as queries get them.
 #[derive(Clone, Copy, Debug)]

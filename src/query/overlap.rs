@@ -208,6 +208,18 @@ impl Direction<'_> {
     }
 }
 
+/// Numbers of the bits that are set, ascending.
+pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
+    let of_word = |(w, mut bits): (u32, u32)| {
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
+            bits &= bits - 1;
+            Some(32 * w + bit)
+        })
+    };
+    (0..).zip(words).flat_map(of_word).collect()
+}
+
 /// What a direction took.
 fn effort(status: &OverlapStatus) -> Effort {
     let narrow = u64::from(status.narrow[0]) | u64::from(status.narrow[1]) << 32;
@@ -280,15 +292,7 @@ impl Job<'_> {
         for (i, (way, status)) in self.ways.iter().zip(&statuses).enumerate() {
             let words: Vec<u32> =
                 self.gpu.download(self.memory, way.arrays.hits.part(0, 4 * u64::from(way.own.mesh.input.tets.div_ceil(32))))?;
-            let of_word = |(w, mut bits): (u32, u32)| {
-                std::iter::from_fn(move || {
-                    let bit = (bits != 0).then(|| bits.trailing_zeros())?;
-                    bits &= bits - 1;
-                    Some(32 * w + bit)
-                })
-            };
-            let hits = (0..).zip(words).flat_map(of_word).collect();
-            *(if i == 0 { &mut done.overlap.a } else { &mut done.overlap.b }) = hits;
+            *(if i == 0 { &mut done.overlap.a } else { &mut done.overlap.b }) = set_bits(words);
             done.overlap.effort[i] = effort(status);
         }
         Ok(())

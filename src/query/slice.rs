@@ -1,10 +1,13 @@
 //! Conservative slicing on the device (SPEC 3.4): rows of voxels at a time, so that memory does not grow with the number of layers.
 
-use super::Scene;
-use crate::build::{DeviceMesh, Tree};
+use super::{Searched, Structure, dispatch};
+use crate::build::DeviceMesh;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
-use crate::kernels::{SliceLocate, SliceLocateSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec};
+use crate::kernels::{
+    LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceLocate, SliceLocateSpec, SliceTouch, SliceTouchSpec,
+    SliceValues, SliceValuesSpec,
+};
 use crate::layout::{RunState, SliceStatus, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
@@ -70,65 +73,52 @@ impl Part {
     }
 }
 
-fn cmd_locate_voxels(r: &mut Recorder<'_>, scene: &Scene, memory: &SliceMemory, part: Part, fresh: bool) -> Result<()> {
-    let workgroup = r.gpu().target().each;
-    let (tree, mesh) = (&scene.tree, &scene.mesh);
-    let arguments = SliceLocate {
-        grid: tree.grid,
-        masks: tree.masks,
-        co: tree.co,
-        po: tree.po,
-        p: tree.p,
-        flags: tree.flags,
-        cells: mesh.input.cells,
-        vertices: mesh.arrays.vertices,
-        neighbours: mesh.arrays.neighbours,
-        plans: memory.plan,
-        states: memory.runs,
-        answers: memory.answers,
-        status: memory.status_of(0),
-        layer: part.rows.layer,
-        first: part.rows.first,
-        rows: part.rows.count,
-        fresh: u32::from(fresh),
-        budget: LOCATE_BUDGET,
-        tolerance: TOLERANCE,
-    };
-    let spec = SliceLocateSpec { workgroup, run: RUN, walk: WALK, lists: tree.lists as u32, ..Default::default() };
+fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: Part, fresh: bool) -> Result<()> {
+    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let items = part.rows.count * part.width.div_ceil(RUN);
-    r.stage("query.slice_locate", |r| r.dispatch(&arguments, spec, Groups::Count(items.div_ceil(workgroup))))
+    let (run, walk, lists) = (RUN, WALK, searched.lists());
+    r.stage("query.slice_locate", |r| {
+        dispatch!(r, items, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
+            cells: input.cells,
+            vertices: arrays.vertices,
+            neighbours: arrays.neighbours,
+            plans: memory.plan,
+            states: memory.runs,
+            answers: memory.answers,
+            status: memory.status_of(0),
+            layer: part.rows.layer,
+            first: part.rows.first,
+            rows: part.rows.count,
+            fresh: u32::from(fresh),
+            budget: LOCATE_BUDGET,
+            tolerance: TOLERANCE,
+        }, { run, walk })
+    })
 }
 
-fn cmd_touch_voxels(r: &mut Recorder<'_>, scene: &Scene, memory: &SliceMemory, part: Part, fresh: bool) -> Result<()> {
-    let workgroup = r.gpu().target().each;
-    let (tree, mesh) = (&scene.tree, &scene.mesh);
-    let arguments = SliceTouch {
-        grid: tree.grid,
-        masks: tree.masks,
-        co: tree.co,
-        po: tree.po,
-        p: tree.p,
-        flags: tree.flags,
-        boundary: mesh.arrays.boundary,
-        cells: mesh.input.cells,
-        vertices: mesh.arrays.vertices,
-        plans: memory.plan,
-        states: memory.touches,
-        answers: memory.answers,
-        status: memory.status,
-        layer: part.rows.layer,
-        first: part.rows.first,
-        voxels: part.voxels(),
-        fresh: u32::from(fresh),
-        budget: TOUCH_BUDGET,
-    };
-    let spec = SliceTouchSpec { workgroup, ..Default::default() };
-    r.stage("query.slice_touch", |r| r.dispatch(&arguments, spec, Groups::Count(part.voxels().div_ceil(workgroup))))
+fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: Part, fresh: bool) -> Result<()> {
+    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
+    let boundary = arrays.boundary;
+    r.stage("query.slice_touch", |r| {
+        dispatch!(r, part.voxels(), searched, SliceTouch SliceTouchSpec { boundary } {}, LbvhSliceTouch LbvhSliceTouchSpec, {
+            cells: input.cells,
+            vertices: arrays.vertices,
+            plans: memory.plan,
+            states: memory.touches,
+            answers: memory.answers,
+            status: memory.status,
+            layer: part.rows.layer,
+            first: part.rows.first,
+            voxels: part.voxels(),
+            fresh: u32::from(fresh),
+            budget: TOUCH_BUDGET,
+        }, {})
+    })
 }
 
 /// Slices one mesh with one field.
 struct Job<'a> {
-    scene: Scene,
+    searched: Searched,
     memory: SliceMemory,
     field: Option<(BufferRef, On)>,
     extrapolate: Extrapolate,
@@ -156,9 +146,9 @@ impl Job<'_> {
         let Some((field, on)) = self.field else { return Ok(()) };
         let workgroup = r.gpu().target().each;
         let arguments = SliceValues {
-            grid: self.scene.tree.grid,
-            cells: self.scene.mesh.input.cells,
-            vertices: self.scene.mesh.arrays.vertices,
+            grid: self.searched.mesh.arrays.grid,
+            cells: self.searched.mesh.input.cells,
+            vertices: self.searched.mesh.arrays.vertices,
             field,
             plans: self.memory.plan,
             answers: self.memory.answers,
@@ -182,11 +172,11 @@ impl Job<'_> {
                 r.fill(if located { memory.status_of(1) } else { memory.status }, 0);
                 r.barrier("slice.clear → slice");
                 if !located {
-                    cmd_locate_voxels(r, &self.scene, memory, part, !begun)?;
+                    cmd_locate_voxels(r, &self.searched, memory, part, !begun)?;
                     r.barrier("slice.locate → slice.touch");
                 }
                 // Does nothing as long as centres wait to be located.
-                cmd_touch_voxels(r, &self.scene, memory, part, !located)?;
+                cmd_touch_voxels(r, &self.searched, memory, part, !located)?;
                 r.barrier("slice.touch → slice.values");
                 self.cmd_values(r, part)
             })?;
@@ -233,15 +223,15 @@ impl Job<'_> {
 /// `sink`.
 pub fn slice(
     mesh: &DeviceMesh,
-    tree: &Tree,
+    structure: impl Into<Structure>,
     field: Option<(&[f32], On)>,
     voxels: &VoxelGrid,
     extrapolate: Extrapolate,
     report: &dyn Fn(u64, u64),
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<Sliced> {
-    let gpu = tree.gpu();
-    let plan = gpu.upload("olbvh.query.voxels", &[voxels.plan(tree.grid())?])?;
+    let gpu = mesh.gpu();
+    let plan = gpu.upload("olbvh.query.voxels", &[voxels.plan(mesh.grid())?])?;
     if let Some((values, on)) = field {
         let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
         if values.len() != expected as usize {
@@ -255,7 +245,7 @@ pub fn slice(
     let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
     let memory = carve(&mut Arena::new(buffer.all()))?;
     let field = uploaded.as_ref().map(|(buffer, on)| (buffer.all(), *on));
-    let job = Job { scene: Scene::new(mesh, tree), memory, field, extrapolate, buffer: &buffer, gpu };
+    let job = Job { searched: Searched::new(mesh, structure), memory, field, extrapolate, buffer: &buffer, gpu };
     let mut sliced = Sliced::default();
     let mut done = 0;
     for rows in bands(voxels, CHUNK) {

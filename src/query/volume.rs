@@ -1,10 +1,12 @@
 //! Direct volume rendering (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of bounded work.
 
-use super::Scene;
-use crate::build::{DeviceMesh, Tree};
+use super::{Searched, Structure, dispatch};
+use crate::build::DeviceMesh;
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
-use crate::kernels::{VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec};
+use crate::gpu::{BufferRef, Recorder};
+use crate::kernels::{
+    LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
+};
 use crate::layout::{Grid, RayState, RenderPlan, RenderStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
@@ -76,48 +78,45 @@ pub struct Drawn {
     pub submissions: u32,
 }
 
-fn cmd_intervals(r: &mut Recorder<'_>, scene: &Scene, canvas: &Canvas) -> Result<()> {
-    let workgroup = r.gpu().target().each;
-    let tree = &scene.tree;
-    let arguments = VolumeIntervals {
-        grid: tree.grid,
-        masks: tree.masks,
-        co: tree.co,
-        flags: tree.flags,
-        plans: canvas.plan,
-        states: canvas.states,
-        po: tree.po,
-        items: canvas.items,
-    };
-    let spec = VolumeIntervalsSpec { workgroup, stack: STACK, ..Default::default() };
-    r.stage("query.intervals", |r| r.dispatch(&arguments, spec, Groups::Count(canvas.items.div_ceil(workgroup))))
+fn cmd_intervals(r: &mut Recorder<'_>, searched: &Searched, canvas: &Canvas) -> Result<()> {
+    let (input, arrays, stack) = (&searched.mesh.input, &searched.mesh.arrays, STACK);
+    r.stage("query.intervals", |r| {
+        dispatch!(r, canvas.items, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
+            cells: input.cells,
+            vertices: arrays.vertices,
+            plans: canvas.plan,
+            states: canvas.states,
+            items: canvas.items,
+        }, { stack })
+    })
 }
 
-fn cmd_march(r: &mut Recorder<'_>, scene: &Scene, canvas: &Canvas, field: BufferRef, on: On, normals: Option<BufferRef>) -> Result<()> {
-    let workgroup = r.gpu().target().each;
-    let (tree, mesh) = (&scene.tree, &scene.mesh);
-    let arguments = VolumeMarch {
-        grid: tree.grid,
-        masks: tree.masks,
-        co: tree.co,
-        po: tree.po,
-        p: tree.p,
-        flags: tree.flags,
-        cells: mesh.input.cells,
-        vertices: mesh.arrays.vertices,
-        neighbours: mesh.arrays.neighbours,
-        field,
-        normals: normals.unwrap_or_else(|| r.gpu().nothing()),
-        plans: canvas.plan,
-        table: canvas.table,
-        states: canvas.states,
-        status: canvas.status,
-        items: canvas.items,
-        budget: BUDGET,
-    };
-    let (shading, on_cells) = (u32::from(normals.is_some()), u32::from(on == On::Cells));
-    let spec = VolumeMarchSpec { workgroup, shading, on_cells, lists: tree.lists as u32, ..Default::default() };
-    r.stage("query.march", |r| r.dispatch(&arguments, spec, Groups::Count(canvas.items.div_ceil(workgroup))))
+fn cmd_march(
+    r: &mut Recorder<'_>,
+    searched: &Searched,
+    canvas: &Canvas,
+    field: BufferRef,
+    on: On,
+    normals: Option<BufferRef>,
+) -> Result<()> {
+    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
+    let (shading, on_cells, lists) = (u32::from(normals.is_some()), u32::from(on == On::Cells), searched.lists());
+    let normals = normals.unwrap_or_else(|| r.gpu().nothing());
+    r.stage("query.march", |r| {
+        dispatch!(r, canvas.items, searched, VolumeMarch VolumeMarchSpec {} { lists }, LbvhMarch LbvhMarchSpec, {
+            cells: input.cells,
+            vertices: arrays.vertices,
+            neighbours: arrays.neighbours,
+            field: field,
+            normals: normals,
+            plans: canvas.plan,
+            table: canvas.table,
+            states: canvas.states,
+            status: canvas.status,
+            items: canvas.items,
+            budget: BUDGET,
+        }, { shading, on_cells })
+    })
 }
 
 /// Draws a plan of a field (values per point or per tetrahedron); `normals`: one per point, for shading. `report` is told how many rays
@@ -127,14 +126,14 @@ fn cmd_march(r: &mut Recorder<'_>, scene: &Scene, canvas: &Canvas, field: Buffer
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field or normals have the wrong length.
 pub fn render(
     mesh: &DeviceMesh,
-    tree: &Tree,
+    structure: impl Into<Structure>,
     plan: &Plan,
     (values, on): (&[f32], On),
     normals: Option<&[[f32; 3]]>,
     report: &dyn Fn(u64, u64),
 ) -> Result<Drawn> {
-    let gpu: &Gpu = tree.gpu();
-    let scene = Scene::new(mesh, tree);
+    let gpu = mesh.gpu();
+    let searched = Searched::new(mesh, structure);
     let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
     if values.len() != expected as usize || normals.is_some_and(|n| n.len() != mesh.input().points as usize) {
         return Err(Error::Invalid(format!(
@@ -144,7 +143,7 @@ pub fn render(
     }
     let field = gpu.upload("olbvh.query.field", values)?;
     let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
-    let kernel_plan = gpu.upload("olbvh.query.plan", &[kernel_plan(plan, tree.grid())])?;
+    let kernel_plan = gpu.upload("olbvh.query.plan", &[kernel_plan(plan, mesh.grid())])?;
     let table = gpu.upload("olbvh.query.table", &plan.table)?;
     let items = Canvas::items(plan.size)?;
     let carve = |a: &mut Arena| Ok((a.take(size_of::<RayState>() as u64 * u64::from(items))?, a.take(size_of::<RenderStatus>() as u64)?));
@@ -153,7 +152,7 @@ pub fn render(
     let canvas = Canvas { plan: kernel_plan.all(), table: table.all(), states, status, items };
     let ((), time) = gpu.run("olbvh.query.intervals", |r| {
         r.fill(canvas.status, 0);
-        cmd_intervals(r, &scene, &canvas)
+        cmd_intervals(r, &searched, &canvas)
     })?;
     let mut drawn = Drawn { interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
     let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
@@ -161,7 +160,7 @@ pub fn render(
         let ((), time) = gpu.run("olbvh.query.march", |r| {
             r.fill(canvas.status.part(16, 4), 0);
             r.barrier("march.clear → march");
-            cmd_march(r, &scene, &canvas, field.all(), on, normals.as_ref().map(crate::gpu::Buffer::all))
+            cmd_march(r, &searched, &canvas, field.all(), on, normals.as_ref().map(crate::gpu::Buffer::all))
         })?;
         drawn.march_ms += time.milliseconds("query.march");
         drawn.submissions += 1;

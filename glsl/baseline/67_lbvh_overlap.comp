@@ -1,0 +1,88 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/separate.glsl"
+#include "shared/overlap.glsl"
+// LBVH baseline, overlap: which primitives of a mesh intersect one of the other's, by the narrow phase with those whose boxes meet.
+layout(constant_id = 2) const uint OWN_STRIDE = 3;
+layout(constant_id = 3) const uint STRIDE = 3;
+layout(constant_id = 4) const uint EACH_ONCE = 0; // of overlap_tets.glsl
+ARGUMENTS(14)
+    uint tets;
+    uint budget; // nodes and candidates per primitive and dispatch
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER16(1, readonly, LbvhNode, nodes)
+BUFFER(2, readonly, uint, root)
+BUFFER(3, readonly, uint, ids)
+BUFFER16(4, readonly, uvec4, cells)
+BUFFER16(5, readonly, vec4, vertices)
+BUFFER(6, readonly, float, positions)
+BUFFER16(7, readonly, uvec4, own_cells)
+BUFFER(8, readonly, float, own_positions)
+BUFFER(9, readonly, uint, bad)
+BUFFER16(10, readonly, NodeFrame, frame)
+BUFFER(11, READ_WRITE, uint, places)   // where to go on, zeroed; all ones: done
+BUFFER(12, READ_WRITE, uint, hits)     // one bit per primitive, zeroed
+BUFFER(13, READ_WRITE, OverlapStatus, status)
+#include "shared/overlap_tets.glsl"
+#include "shared/binary_tree.glsl"
+
+vec3 lo, hi; // the primitive's box within the other mesh's bounds, in that mesh's normalised coordinates, which keep the order of points
+
+bool enters(uint reference) {
+    if ((reference & BINARY_LEAF) != 0u) return true; // the candidate's own box decides
+    vec3 node_lo, node_hi;
+    box_of(reference, node_lo, node_hi);
+    return boxes_meet(node_lo, node_hi, lo, hi);
+}
+#include "shared/binary_walk.glsl"
+
+void main() {
+    uint t = item_index();
+    uint unfinished = 0u, narrow = 0u;
+    if (t < tets && places.at[t] != NONE) {
+        Grid g = grid.at[0];
+        joint = g;
+        joint.lo = frame.at[0].joint_lo;
+        joint.scale = frame.at[0].scale;
+        bool found = false, done = (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+        RawTet own;
+        if (!done) {
+            own = own_tet(t);
+            done = !boxes_meet(own.lo, own.hi, g.lo.xyz, g.hi.xyz);
+        }
+        if (!done) {
+            vec3 v[4];
+            to_joint(own, v);
+            lo = normalise(g, max(own.lo, g.lo.xyz));
+            hi = normalise(g, min(own.hi, g.hi.xyz));
+            BinaryWalk walk = binary_walk_from(places.at[t]);
+            uint limit = binary_budget(0u, budget);
+            for (uint work = 0u; work < limit && !found; ++work) {
+                uint place = next_place(walk, work, limit);
+                if (place >= WALK_PAUSED) break;
+                RawTet other = other_tet(ids.at[place]);
+                if (!boxes_meet(own.lo, own.hi, other.lo, other.hi)) continue;
+                vec3 w[4];
+                to_joint(other, w);
+                ++narrow;
+                found = tets_touch(v, w);
+            }
+            uint next = resume_place(walk);
+            done = found || next == NONE;
+            unfinished = uint(!done);
+            if (!done) places.at[t] = next;
+        }
+        if (found) atomicOr(hits.at[t >> 5u], 1u << (t & 31u));
+        if (done) places.at[t] = NONE;
+    }
+    unfinished = subgroupAdd(unfinished);
+    narrow = subgroupAdd(narrow);
+    if (subgroupElect()) {
+        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+        if (narrow > 0u && atomicAdd(status.at[0].narrow[0], narrow) > NONE - narrow) atomicAdd(status.at[0].narrow[1], 1u);
+    }
+}

@@ -1,0 +1,78 @@
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/structure.glsl"
+#include "shared/voxels.glsl"
+// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in. An invocation takes a run of voxels of a row, and looks for each in the
+// cell of the one before and a short walk across faces from it, before it asks the structure. Twin of src/reference/slice.rs.
+layout(constant_id = 2) const uint RUN = 32;
+layout(constant_id = 3) const uint WALK = 6;
+ARGUMENTS(8 + STRUCTURE_BUFFERS)
+    uint layer;
+    uint first;  // number of the first row in that layer
+    uint rows;
+    uint fresh;  // not 0: nothing has been done yet
+    uint budget; // candidates tested per run and dispatch, roughly
+    float tolerance;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, cells)
+BUFFER16(2, readonly, vec4, vertices)
+BUFFER16(3, readonly, uvec4, neighbours)
+BUFFER16(4, readonly, SlicePlan, plans)
+BUFFER(5, READ_WRITE, RunState, states)
+BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
+BUFFER(7, READ_WRITE, SliceStatus, status)
+STRUCTURE(8)
+#include "shared/structure_owner.glsl"
+
+// The cell that holds x clearly, if it is `cell` or a short walk away from it.
+uint walk_clear(uint cell, vec3 x) {
+    for (uint s = 0u; s < WALK && cell != NONE; ++s) {
+        Tet tet = load_tet(cells.at[cell]);
+        Weights w = weights(tet, x);
+        if (w.clear) return cell;
+        vec4 own = own_weights(w, tet);
+        uint face = 0u;
+        for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+        if (own[face] >= 0.0) return NONE;
+        cell = neighbours.at[cell][face];
+    }
+    return NONE;
+}
+
+void main() {
+    uint i = item_index();
+    uint unfinished = 0u;
+    SlicePlan plan = plans.at[0];
+    uint runs = (plan.width + RUN - 1u) / RUN;
+    if (i < rows * runs) {
+        Grid g = grid.at[0];
+        RunState state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
+        if (fresh == 0u) state = states.at[i];
+        uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
+        uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
+        for (uint work = 0u; state.next < count && work < budget; ++work) {
+            vec3 at = voxel_centre(plan, begin + state.next, y, k);
+            vec3 x = normalise(g, at);
+            uint owner = state.cursor == 0u && near_bounds(g, at) ? walk_clear(state.hint, x) : NONE;
+            if (owner == NONE) {
+                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
+                bool ended = find_owner(search, g, at, x, tolerance, work, budget, owner);
+                state.cursor = search.cursor;
+                state.best = search.best.owner;
+                state.in_box = best_bits(search.best);
+                state.smallest = search.best.smallest;
+                if (!ended) break;
+            }
+            state.hint = owner;
+            answers.at[row * plan.width + begin + state.next] = owner == NONE ? SLICE_PENDING : owner;
+            ++state.next;
+        }
+        unfinished = uint(state.next < count);
+        states.at[i] = state;
+    }
+    unfinished = subgroupAdd(unfinished);
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+}

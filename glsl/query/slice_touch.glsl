@@ -1,0 +1,143 @@
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/structure.glsl"
+#include "shared/node.glsl"
+#include "shared/cell_range.glsl"
+#include "shared/separate.glsl"
+#include "shared/voxels.glsl"
+// Slicing (SPEC 3.4), second part: for voxels whose centre lies in no cell, the boundary primitive that touches the box and is closest to the
+// centre. Boundary leaves only, in Morton order; in the binary tree nodes above boundary primitives, in the order of places. Twin of src/reference/slice.rs.
+#ifdef BINARY_TREE
+ARGUMENTS(7 + STRUCTURE_BUFFERS)
+#else
+ARGUMENTS(8 + STRUCTURE_BUFFERS)
+#endif
+    uint layer;
+    uint first;  // number of the first row in that layer
+    uint voxels;
+    uint fresh;  // not 0: nothing has been done yet
+    uint budget; // nodes and candidates per voxel and dispatch
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, cells)
+BUFFER16(2, readonly, vec4, vertices)
+BUFFER16(3, readonly, SlicePlan, plans)
+BUFFER16(4, READ_WRITE, TouchState, states)
+BUFFER(5, READ_WRITE, uint, answers)
+BUFFER(6, READ_WRITE, SliceStatus, status) // of slice_locate, of this kernel
+STRUCTURE(7)
+#ifndef BINARY_TREE
+BUFFER(7 + STRUCTURE_BUFFERS, readonly, uint, boundary)
+#endif
+
+TouchState state;
+vec3 x;    // centre of the voxel in normalised coordinates
+vec3 h[3]; // half axes of its box
+
+// Keeps the closest of the primitives that touch the box.
+void measure(uint t) {
+    uvec4 ids = cells.at[t];
+    Tet tet = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+    vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
+    if (box_square(v) > state.square || !box_touches(v, h, touch_slack(v, h))) return;
+    vec4 unused;
+    float square = closest(v, unused);
+    if (square < state.square || (square == state.square && t < state.owner)) {
+        state.square = square;
+        state.owner = t;
+    }
+}
+
+#ifdef BINARY_TREE
+#include "shared/binary_tree.glsl"
+
+bool enters(uint reference) {
+    if ((reference & BINARY_BOUNDARY) == 0u) return false;
+    vec3 lo, hi;
+    box_of(reference, lo, hi);
+    vec3 v[4] = vec3[4](difference(lo, x), difference(hi, x), difference(lo, x), difference(hi, x));
+    // Twice what `box_touches` allows, which is more the larger a primitive is.
+    precise vec3 reach = ((abs(h[0]) + abs(h[1])) + abs(h[2])) + 2.0 * touch_slack(v, h);
+    return all(lessThanEqual(v[0], reach)) && all(lessThanEqual(-reach, v[1])) && box_square(v) <= state.square;
+}
+#include "shared/binary_walk.glsl"
+
+// Goes on with a voxel; true once it is done. `code` of the state is a place here.
+bool measure_all(Grid g, vec3 centre, vec3 reach) {
+    uvec3 lo, hi;
+    if (!reached_cells(g, centre, reach, lo, hi)) return true;
+    BinaryWalk walk = binary_walk_from(state.code);
+    uint limit = binary_budget(0u, budget), place = WALK_PAUSED;
+    for (uint work = 0u; work < limit; ++work) {
+        place = next_place(walk, work, limit);
+        if (place >= WALK_PAUSED) break;
+        measure(ids.at[place]);
+    }
+    state.code = resume_place(walk);
+    return place == WALK_DONE || state.code == NONE;
+}
+#else
+#include "shared/tree.glsl"
+
+bool walk_ended = false;
+uvec3 lo, hi;
+
+bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
+
+bool enters(Node node) { return is_boundary_node(node.index) && meets_range(node, lo, hi); }
+#include "shared/leaf_walk.glsl"
+
+// Goes on with a voxel; true once it is done.
+bool measure_all(Grid g, vec3 centre, vec3 reach) {
+    if (!reached_cells(g, centre, reach, lo, hi) || !is_boundary_node(0u)) return true;
+    LeafWalk at = walk_from(state.code);
+    uint leaf = WALK_PAUSED;
+    for (uint work = 0u; work < budget;) {
+        leaf = next_leaf(at, g.level, work, budget);
+        if (leaf >= WALK_PAUSED) break;
+        uvec2 range = entry_range(leaf);
+        uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
+        for (uint e = from; e < to; ++e) {
+            uint t = p.at[e];
+            if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) measure(t);
+        }
+        work += to - from;
+        state.entry = to - range.x;
+        if (to < range.y) break;
+        state.entry = 0u;
+        leaf = walk_past(at, g.level, g.level) ? WALK_PAUSED : WALK_DONE;
+        if (leaf == WALK_DONE) break;
+    }
+    state.code = at.code;
+    return leaf == WALK_DONE;
+}
+#endif
+
+void main() {
+    uint i = item_index();
+    uint unfinished = 0u;
+    // Only once all centres have been located.
+    bool waits = status.at[0].unfinished != 0u;
+    if (waits && i == 0u) unfinished = 1u;
+    if (!waits && i < voxels && answers.at[i] == SLICE_PENDING) {
+        SlicePlan plan = plans.at[0];
+        Grid g = grid.at[0];
+        uint row = i / plan.width;
+        uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
+        vec3 centre = voxel_centre(plan, i - row * plan.width, y, k);
+        state = TouchState(0u, 0u, NONE, 3.40282347e38);
+        if (fresh == 0u) state = states.at[i];
+        x = normalise(g, centre);
+        h = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
+        if (measure_all(g, centre, plan.reach.xyz)) {
+            answers.at[i] = state.owner == NONE ? NONE : state.owner | SLICE_TOUCHED;
+        } else {
+            states.at[i] = state;
+            unfinished = 1u;
+        }
+    }
+    unfinished = subgroupAdd(unfinished);
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[1].unfinished, unfinished);
+}

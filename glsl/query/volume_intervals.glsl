@@ -1,0 +1,132 @@
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/structure.glsl"
+#include "shared/node.glsl"
+#include "shared/boxes.glsl"
+#include "shared/rays.glsl"
+// Ray intervals (SPEC 3.3): from the first to the last boundary leaf that a ray meets, or in the binary tree the box of a boundary primitive.
+// Twin of src/reference/volume/interval.rs.
+layout(constant_id = 2) const uint STACK = 8;
+ARGUMENTS(5 + STRUCTURE_BUFFERS)
+    uint items; // pixels in whole blocks
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, cells)    // for the binary tree
+BUFFER16(2, readonly, vec4, vertices)  // for the binary tree
+BUFFER16(3, readonly, RenderPlan, plans)
+BUFFER16(4, writeonly, RayState, states)
+STRUCTURE(5)
+
+Grid g;
+RenderPlan plan;
+vec3 origin, inverse_way;
+float first, last;
+float entered, left;
+
+// Whether the ray meets a box, and where it enters and leaves it.
+bool hit(vec3 lo, vec3 hi) {
+    precise vec3 a = ((lo - plan.slack.xyz) - origin) * inverse_way;
+    precise vec3 b = ((hi + plan.slack.xyz) - origin) * inverse_way;
+    vec3 near = min(a, b), far = max(a, b);
+    entered = max(max(max(0.0, near.x), near.y), near.z);
+    left = min(min(min(3.40282347e38, far.x), far.y), far.z);
+    return entered <= left;
+}
+
+void extend() {
+    first = min(first, entered);
+    last = max(last, left);
+}
+
+// Nothing in a box that the interval spans already can extend it.
+bool is_spanned() { return first <= entered && left <= last; }
+
+#ifdef BINARY_TREE
+#include "shared/binary_tree.glsl"
+const uint MAX_VISITS = 24000u; // loop limit
+
+// In the units of the mesh, but for rounding, which the slack of the boxes covers.
+vec3 in_units(vec3 x) {
+    precise vec3 unit = x * uintBitsToFloat((127u - 40u) << 23);
+    precise vec3 r = g.lo.xyz + unit * uintBitsToFloat((254u << 23) - floatBitsToUint(g.scale));
+    return r;
+}
+
+bool enters(uint reference) {
+    if ((reference & BINARY_BOUNDARY) == 0u) return false;
+    vec3 lo, hi;
+    box_of(reference, lo, hi);
+    return hit(in_units(lo), in_units(hi)) && !is_spanned();
+}
+#include "shared/binary_walk.glsl"
+
+bool starts_within() { return true; }
+
+bool visit_all() {
+    BinaryWalk walk = binary_walk_from(0u);
+    uint place = 0u;
+    for (uint work = 0u; work < MAX_VISITS; ++work) {
+        place = next_place(walk, work, MAX_VISITS);
+        if (place >= WALK_PAUSED) break;
+        extend(); // by the box that `enters` saw last
+    }
+    return place == WALK_DONE;
+}
+#else
+#include "shared/tree.glsl"
+
+bool meets(Node node) {
+    vec3 lo, hi;
+    cell_box(g, node.level, node.code, lo, hi);
+    return hit(lo, hi);
+}
+
+bool visit_node(Node node) {
+    return (flags.at[node.index >> 5u] >> (node.index & 31u) & 1u) != 0u && meets(node) && !is_spanned();
+}
+
+bool visit_leaf(Node node) {
+    meets(node);
+    extend();
+    return false;
+}
+#include "shared/traverse.glsl"
+
+bool starts_within() { return find_leaf(g.level, quantize(g, origin)) != NONE; }
+
+bool visit_all() { return traverse(g.level); }
+#endif
+
+void main() {
+    uint i = item_index();
+    if (i >= items) return;
+    plan = plans.at[0];
+    uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
+    RayState state = RayState(vec4(0.0), 0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, 0u, 0u);
+    if (pixel_of(i, size, pixel)) {
+        g = grid.at[0];
+        vec3 way;
+        make_ray(plan, pixel, origin, way);
+        const float LEAST = 1e-20;
+        for (uint c = 0u; c < 3u; ++c) {
+            bool parallel = abs(way[c]) < LEAST;
+            bool negative = (floatBitsToUint(way[c]) & 0x80000000u) != 0u;
+            inverse_way[c] = parallel ? (negative ? -1e20 : 1e20) : reciprocal(way[c]);
+        }
+        first = 3.40282347e38;
+        last = -1.0;
+        bool within = all(lessThanEqual(g.lo.xyz, origin)) && all(lessThanEqual(origin, g.hi.xyz));
+        if (within && starts_within()) first = last = 0.0;
+        // Too many nodes to visit: all of the bounds, which holds every leaf.
+        if (!visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
+        if (first <= last) {
+            precise float begin = floor(max(first * plan.inverse_step - 1.5, 0.0));
+            precise float end = floor(max(last * plan.inverse_step + 1.5, 0.0));
+            state.next = uint(begin);
+            state.end = uint(end);
+        }
+    }
+    states.at[i] = state;
+}

@@ -1,0 +1,173 @@
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/structure.glsl"
+#include "shared/rays.glsl"
+// Marching (SPEC 3.3): samples (k + 1/2)·Δ from the ray's origin, front to back, until the ray is opaque or a dispatch's share of work is done.
+// Twin of src/reference/volume/march.rs.
+layout(constant_id = 2) const uint SHADING = 0;
+layout(constant_id = 3) const uint ON_CELLS = 0;
+ARGUMENTS(10 + STRUCTURE_BUFFERS)
+    uint items;  // pixels in whole blocks
+    uint budget; // candidates tested per ray and dispatch, roughly
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, cells)
+BUFFER16(2, readonly, vec4, vertices)
+BUFFER16(3, readonly, uvec4, neighbours)
+BUFFER(4, readonly, float, field)
+BUFFER(5, readonly, float, normals) // three per vertex
+BUFFER16(6, readonly, RenderPlan, plans)
+BUFFER16(7, readonly, vec4, table)
+BUFFER16(8, READ_WRITE, RayState, states)
+BUFFER(9, READ_WRITE, RenderStatus, status)
+STRUCTURE(10)
+#include "shared/structure_owner.glsl"
+
+const uint WALK = 6u; // steps of a walk across faces before the structure is asked
+const uint TABLE = 1024u;
+
+// The current tetrahedron and what its samples need.
+uint cell;
+Tet tet;
+uvec4 corners;
+vec4 cell_values;
+mat4x3 cell_normals;
+
+vec3 normal_of(uint v) { return vec3(normals.at[3u * v], normals.at[3u * v + 1u], normals.at[3u * v + 2u]); }
+
+void enter(uint t) {
+    cell = t;
+    corners = cells.at[t];
+    tet = load_tet(corners);
+    if (ON_CELLS != 0u) cell_values = vec4(field.at[t]);
+    else cell_values = vec4(field.at[corners.x], field.at[corners.y], field.at[corners.z], field.at[corners.w]);
+    if (SHADING != 0u) cell_normals = mat4x3(normal_of(corners.x), normal_of(corners.y), normal_of(corners.z), normal_of(corners.w));
+}
+
+// Colour, and opacity of one step, at a value.
+vec4 lookup(RenderPlan plan, float value) {
+    precise float x = clamp((value - plan.value_lo) * plan.value_scale, 0.0, 1.0) * float(TABLE - 1u);
+    uint i = min(uint(x), TABLE - 2u);
+    precise float t = x - float(i);
+    vec4 a = table.at[i], b = table.at[i + 1u];
+    precise vec4 r = a + (b - a) * t;
+    return r;
+}
+
+// Light on a sample: factor and added white of its colour, added opacity. Twin of `Lighting::shade`.
+vec3 shade(RenderPlan plan, vec3 n, vec3 way, vec3 halfway) {
+    float square = dot_product(n, n);
+    if (square < 1e-8) return vec3(1.0, 0.0, 0.0);
+    float r = inverse_sqrt(square);
+    precise float m = min(square * r, 1.0);
+    precise float c = abs(dot_product(n, plan.to_light.xyz)) * r;
+    precise float g = 1.0 - min(abs(dot_product(n, way)) * r, 1.0);
+    precise float h = min(abs(dot_product(n, halfway)) * r, 1.0);
+    for (int i = 0; i < 5; ++i) {
+        precise float hh = h * h;
+        h = hh;
+    }
+    precise float factor = 1.0 + m * ((plan.strength.x + plan.strength.y * c) - 1.0);
+    precise float added = m * (plan.strength.z * h);
+    precise float rim = m * ((g * g) * (g * g) * plan.strength.w);
+    return vec3(factor, added, rim);
+}
+
+void main() {
+    uint i = item_index();
+    uint samples = 0u, found = 0u, unfinished = 0u;
+    if (i < items && states.at[i].next < states.at[i].end) {
+        RenderPlan plan = plans.at[0];
+        Grid g = grid.at[0];
+        RayState state = states.at[i];
+        uvec2 pixel;
+        pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
+        vec3 origin, way;
+        make_ray(plan, pixel, origin, way);
+        vec3 halfway = vec3(0.0);
+        if (SHADING != 0u) {
+            precise vec3 h = plan.to_light.xyz - way;
+            float square = max(dot_product(h, h), 1e-12);
+            precise vec3 unit = h * inverse_sqrt(square);
+            halfway = unit;
+        }
+        bool in_cell = state.hint != NONE;
+        if (in_cell) enter(state.hint);
+        uint work = 0u;
+        for (; state.next < state.end && work < budget; ++work) {
+            precise float t = (float(state.next) + 0.5) * plan.step_size;
+            precise vec3 at = origin + way * t;
+            vec3 x = normalise(g, at);
+            Weights w;
+            bool inside = false;
+            // The cell of the last sample, or one a short walk across faces away, if it holds the sample clearly.
+            for (uint s = 0u; in_cell && state.cursor == 0u && s < WALK; ++s) {
+                w = weights(tet, x);
+                inside = w.clear;
+                if (inside) break;
+                vec4 own = own_weights(w, tet);
+                uint face = 0u;
+                for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+                uint next = neighbours.at[cell][face];
+                if (own[face] >= 0.0 || next == NONE) break;
+                enter(next);
+                ++work;
+            }
+            if (!inside) {
+                uint owner;
+                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
+                bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
+                state.cursor = search.cursor;
+                state.best = search.best.owner;
+                state.in_box = best_bits(search.best);
+                state.smallest = search.best.smallest;
+                if (!ended) break;
+                if (owner != NONE) {
+                    enter(owner);
+                    in_cell = inside = true;
+                    w = weights(tet, x);
+                } else {
+                    in_cell = false; // behind a gap the structure is asked first
+                }
+            }
+            ++state.next;
+            ++samples;
+            if (!inside) continue;
+            ++found;
+            vec4 b = barycentric(w, tet.rank);
+            precise float value = (b.x * cell_values.x + b.y * cell_values.y) + (b.z * cell_values.z + b.w * cell_values.w);
+            if (ON_CELLS != 0u) value = cell_values.x;
+            if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) continue;
+            vec4 color = lookup(plan, value);
+            if (color.w <= 0.0) continue;
+            if (SHADING != 0u) {
+                precise vec3 n = (b.x * cell_normals[0] + b.y * cell_normals[1]) + (b.z * cell_normals[2] + b.w * cell_normals[3]);
+                vec3 lit = shade(plan, n, way, halfway);
+                precise vec3 c = color.xyz * lit.x + lit.y;
+                color.xyz = min(c, vec3(1.0));
+                precise float a = color.w + (1.0 - color.w) * lit.z;
+                color.w = a;
+            }
+            precise float share = (1.0 - state.color.w) * color.w;
+            precise vec4 sum = state.color + share * vec4(color.xyz, 1.0);
+            state.color = sum;
+            if (sum.w >= plan.termination) {
+                state.end = state.next;
+                break;
+            }
+        }
+        state.hint = in_cell ? cell : NONE;
+        unfinished = uint(state.next < state.end);
+        states.at[i] = state;
+    }
+    samples = subgroupAdd(samples);
+    found = subgroupAdd(found);
+    unfinished = subgroupAdd(unfinished);
+    if (subgroupElect()) {
+        if (samples > 0u && atomicAdd(status.at[0].samples[0], samples) > NONE - samples) atomicAdd(status.at[0].samples[1], 1u);
+        if (found > 0u && atomicAdd(status.at[0].found[0], found) > NONE - found) atomicAdd(status.at[0].found[1], 1u);
+        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+    }
+}

@@ -1,0 +1,27 @@
+// Point location in the structure of structure.glsl.
+#ifdef BINARY_TREE
+#include "shared/binary_owner.glsl"
+#else
+layout(constant_id = 4) const uint LISTS = 0;
+#include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
+#include "shared/owner_walk.glsl"
+#include "shared/owner_search.glsl"
+
+// Goes on with a search for the owner of a point, `x` in normalised coordinates; false: the share of work is done before it has ended.
+bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
+    owner = NONE;
+    uint leaf = near_bounds(g, at) ? find_leaf(g.level, quantize(g, at)) : NONE;
+    if (leaf == NONE) return true;
+    uvec2 range = entry_range(leaf);
+    uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
+    if (walks_in(leaf, range)) s.best = walk_in(g, p.at[range.x], NONE, at, x);
+    else search(s.best, begin, end, x);
+    work += end - begin;
+    s.cursor = end - range.x;
+    if (!s.best.inside && end < range.y) return false;
+    owner = decide(s.best, leaf, tolerance);
+    s = no_search();
+    return true;
+}
+#endif

@@ -1,0 +1,117 @@
+//! Overlap with LBVHs: every primitive of either mesh descends the other's tree to the narrow phase.
+
+use super::Lbvh;
+use crate::build::DeviceMesh;
+use crate::error::Result;
+use crate::gpu::{Buffer, BufferRef, Groups, Recorder};
+use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
+use crate::layout::{NodeFrame, OverlapStatus};
+use crate::primitives::Arena;
+use crate::query::{Overlapped, set_bits};
+use crate::reference::overlap::{joint_grid, node_frame};
+
+/// Nodes and candidates that a primitive may look at in one dispatch.
+const BUDGET: u32 = 4096;
+
+/// The primitives of one mesh against the tree of the other.
+struct Way<'a> {
+    own: &'a DeviceMesh,
+    other: &'a DeviceMesh,
+    lbvh: &'a Lbvh,
+    frame: Buffer,
+    places: BufferRef,
+    hits: BufferRef,
+    status: BufferRef,
+}
+
+impl Way<'_> {
+    fn cmd_search(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let (own, other, tree) = (self.own.input(), self.other.input(), &self.lbvh.tree);
+        let arguments = LbvhOverlap {
+            grid: self.other.arrays().grid,
+            nodes: tree.nodes,
+            root: tree.root,
+            ids: tree.ids,
+            cells: other.cells,
+            vertices: self.other.arrays().vertices,
+            positions: other.positions,
+            own_cells: own.cells,
+            own_positions: own.positions,
+            bad: self.own.arrays().bad,
+            frame: self.frame.all(),
+            places: self.places,
+            hits: self.hits,
+            status: self.status,
+            tets: own.tets,
+            budget: BUDGET,
+        };
+        let workgroup = r.gpu().target().each;
+        let spec = LbvhOverlapSpec { workgroup, own_stride: own.stride, stride: other.stride, ..Default::default() };
+        r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(workgroup)))
+    }
+}
+
+impl Lbvh {
+    /// The primitives of this tree's mesh and of another's that intersect the other mesh; points of both lie in one space. `report` is told how many
+    /// primitives are done.
+    ///
+    /// # Errors
+    /// [`crate::Error::Memory`], or a failed Vulkan call.
+    pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+        let gpu = &self.gpu;
+        let mut done = Overlapped::default();
+        let valid = [self.valid > 0, other.valid > 0];
+        if valid.contains(&false) {
+            return Ok(done);
+        }
+        let joint = joint_grid(mesh.grid(), other_mesh.grid(), valid);
+        let carve = |a: &mut Arena| {
+            let mut way = |m: &DeviceMesh| {
+                let tets = u64::from(m.input().tets);
+                Ok((a.words(tets)?, a.words(tets.div_ceil(32))?, a.take(size_of::<OverlapStatus>() as u64)?))
+            };
+            Ok([way(mesh)?, way(other_mesh)?])
+        };
+        let memory = gpu.buffer("olbvh.lbvh.overlap", Arena::measure(carve)?)?;
+        let [forth, back] = carve(&mut Arena::new(memory.all()))?;
+        let way = |own, other: (_, _), (places, hits, status)| {
+            let (other, lbvh): (&DeviceMesh, _) = other;
+            let frame = gpu.upload::<NodeFrame>("olbvh.lbvh.overlap_frame", &[node_frame(other.grid(), &joint)])?;
+            Ok::<_, crate::Error>(Way { own, other, lbvh, frame, places, hits, status })
+        };
+        let ways = [way(mesh, (other_mesh, other), forth)?, way(other_mesh, (mesh, self), back)?];
+        let all = u64::from(mesh.input().tets) + u64::from(other_mesh.input().tets);
+        let statuses = loop {
+            let ((), time) = gpu.run("olbvh.lbvh.overlap", |r| {
+                for way in &ways {
+                    if done.submissions == 0 {
+                        for part in [way.places, way.hits, way.status] {
+                            r.fill(part, 0);
+                        }
+                    } else {
+                        r.fill(way.status.word(1), 0);
+                    }
+                }
+                r.barrier("lbvh.clear → lbvh.overlap");
+                r.stage("lbvh.overlap", |r| ways.iter().try_for_each(|w| w.cmd_search(r)))
+            })?;
+            done.submissions += 1;
+            done.stages.extend(time.stages);
+            let mut statuses = [OverlapStatus::default(); 2];
+            for (status, way) in statuses.iter_mut().zip(&ways) {
+                *status = gpu.download(&memory, way.status)?.first().copied().unwrap_or_default();
+            }
+            let unfinished = statuses.iter().map(|s| u64::from(s.unfinished)).sum::<u64>();
+            report(all - unfinished, all);
+            if unfinished == 0 {
+                break statuses;
+            }
+        };
+        let hits = |way: &Way<'_>| Ok::<_, crate::Error>(set_bits(gpu.download(&memory, way.hits)?));
+        (done.overlap.a, done.overlap.b) = (hits(&ways[0])?, hits(&ways[1])?);
+        for (effort, status) in done.overlap.effort.iter_mut().zip(statuses) {
+            effort.narrow = u64::from(status.narrow[0]) | u64::from(status.narrow[1]) << 32;
+        }
+        Ok(done)
+    }
+}
