@@ -38,6 +38,8 @@ pub mod baseline;
 #[cfg(feature = "cli")]
 pub mod bench;
 pub mod build;
+#[cfg(feature = "capi")]
+pub mod capi;
 pub mod conformance;
 pub mod error;
 #[cfg(feature = "formats")]

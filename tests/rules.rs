@@ -21,6 +21,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("kernels", &["error", "gpu", "layout"]),
     ("primitives", &["error", "gpu", "kernels", "layout"]),
     ("build", &["error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
+    ("capi", &["build", "error", "glsl", "gpu", "mesh", "options", "query"]),
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),

@@ -1,0 +1,74 @@
+//! A host's Vulkan device, across the border to C.
+
+use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing};
+use crate::error::Error;
+use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice};
+use ash::vk::{self, Handle};
+use std::ffi::c_void;
+use std::sync::{Arc, Mutex};
+
+/// A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OlbvhHostDevice {
+    /// `vkGetInstanceProcAddr`.
+    pub get_instance_proc_addr: *const c_void,
+    /// `VkInstance`, of Vulkan 1.2 or later.
+    pub instance: u64,
+    /// `VkPhysicalDevice`.
+    pub physical_device: u64,
+    /// `VkDevice`.
+    pub device: u64,
+    /// `VkQueue` of that family, which nobody else submits to while a function of olbvh runs.
+    pub queue: u64,
+    /// Queue family with compute.
+    pub queue_family: u32,
+    /// Not 0: the feature `bufferDeviceAddress` is enabled.
+    pub buffer_addresses: u32,
+    /// Not 0: `VK_EXT_subgroup_size_control` is enabled with `subgroupSizeControl` and `computeFullSubgroups`.
+    pub subgroup_size_control: u32,
+    /// Not 0: the instance extension `VK_EXT_debug_utils` is enabled.
+    pub debug_utils: u32,
+}
+
+/// Works on a device of the host's, which outlives everything made from the handle.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
+    border(|| {
+        let host = handle(host, "host")?;
+        let null = [host.instance, host.physical_device, host.device, host.queue].contains(&0);
+        if null || host.get_instance_proc_addr.is_null() {
+            return Err(missing("a handle of the host's device"));
+        }
+        // SAFETY: the host passes handles of one living device, and the loader's function.
+        let gpu = unsafe {
+            let get = std::mem::transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(host.get_instance_proc_addr);
+            let functions = ash::StaticFn { get_instance_proc_addr: get };
+            let instance = ash::Instance::load(&functions, vk::Instance::from_raw(host.instance));
+            let device = ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(host.device));
+            let lent = HostDevice {
+                physical: vk::PhysicalDevice::from_raw(host.physical_device),
+                device,
+                family: host.queue_family,
+                queue: Some(Arc::new(Mutex::new(vk::Queue::from_raw(host.queue)))),
+                allocator: None,
+                pipeline_cache: None,
+                enabled: Enabled {
+                    buffer_addresses: host.buffer_addresses != 0,
+                    subgroup_size_control: host.subgroup_size_control != 0,
+                    debug_utils: host.debug_utils != 0,
+                    ..Enabled::default()
+                },
+                instance,
+            };
+            Gpu::from_raw(lent, &GpuOptions::default())
+        };
+        give(
+            out,
+            OlbvhGpu(gpu.map_err(|e| match e {
+                Error::NoDevice(why) => Error::NoDevice(format!("the host's device: {why}")),
+                other => other,
+            })?),
+        )
+    })
+}

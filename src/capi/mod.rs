@@ -1,0 +1,314 @@
+//! The C interface, `include/olbvh.h`: opaque handles, status codes, a message per thread. Build it with
+//! `cargo rustc --release --lib --no-default-features --features capi --crate-type cdylib` (or `staticlib`).
+//!
+//! Functions return 0 or the code of an error, whose text [`olbvh_last_error`] gives. No panic crosses the border. A handle keeps what it was made
+//! from alive, so the order of freeing means nothing. One handle may be used by many threads at a time.
+#![allow(unsafe_code, reason = "the border to C")]
+#![allow(clippy::not_unsafe_ptr_arg_deref)]
+
+mod host;
+
+use crate::build::{BadCells, DeviceMesh, MeshView, Tree};
+use crate::error::{Error, Result};
+use crate::glsl::SceneBuffers;
+use crate::gpu::{Buffer, Gpu, GpuOptions};
+use crate::mesh::Mesh;
+use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::query::{LocateOptions, locate};
+use std::cell::RefCell;
+use std::ffi::{CStr, CString, c_char};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::Arc;
+
+/// How a call ended.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OlbvhStatus {
+    /// Done.
+    Ok = 0,
+    /// An argument makes no sense.
+    Invalid = 1,
+    /// No Vulkan, or no device that qualifies.
+    Device = 2,
+    /// The device's memory does not suffice.
+    Memory = 3,
+    /// The mesh is larger than 32-bit offsets reach.
+    TooLarge = 4,
+    /// A Vulkan call failed.
+    Vulkan = 5,
+    /// Anything else; please report it.
+    Internal = 6,
+}
+
+/// A device.
+pub struct OlbvhGpu(Gpu);
+
+/// A mesh in the device's memory.
+pub struct OlbvhMesh(Arc<DeviceMesh>);
+
+/// A tree over a mesh.
+pub struct OlbvhTree {
+    mesh: Arc<DeviceMesh>,
+    tree: Tree,
+    /// What shaders get, see `olbvh.glsl`.
+    addresses: Buffer,
+}
+
+/// How to build a tree; `olbvh_default_build_options` fills it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OlbvhBuildOptions {
+    /// The paper's alpha, 0 to 10: how many levels coarser than the cells' size the leaves are.
+    pub alpha: f32,
+    /// 0: cells of the bounding box. 1: of those, the cells that no face plane separates. 2: exactly the cells touched.
+    pub assign: u32,
+    /// 0: all primitives are listed (the paper). 1: where the surface is, seeds and walks elsewhere.
+    pub lists: u32,
+    /// Most entries the tree may have; it gets coarser until it fits. 0: no limit.
+    pub capacity: u32,
+}
+
+/// What was built.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OlbvhTreeInfo {
+    /// Level of the leaves.
+    pub level: u32,
+    /// Primitive ids in the leaves.
+    pub entries: u32,
+    /// Nodes.
+    pub nodes: u32,
+    /// Leaves.
+    pub leaves: u32,
+    /// Lower corner of the mesh.
+    pub lo: [f32; 3],
+    /// Upper corner of the mesh.
+    pub hi: [f32; 3],
+    /// Tetrahedra left out: a vertex that does not exist, occurs twice or is not finite.
+    pub bad_cells: u32,
+    /// Milliseconds of device time.
+    pub build_ms: f64,
+    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses.
+    pub address: u64,
+}
+
+thread_local! {
+    static MESSAGE: RefCell<CString> = RefCell::default();
+}
+
+fn status_of(error: &Error) -> OlbvhStatus {
+    match error {
+        Error::Invalid(_) | Error::BadCells { .. } => OlbvhStatus::Invalid,
+        Error::NoVulkan(_) | Error::NoDevice(_) | Error::SelfTest { .. } => OlbvhStatus::Device,
+        Error::Memory { .. } => OlbvhStatus::Memory,
+        Error::TooLarge(_) => OlbvhStatus::TooLarge,
+        Error::Vulkan { .. } => OlbvhStatus::Vulkan,
+        _ => OlbvhStatus::Internal,
+    }
+}
+
+fn remember(message: &str) {
+    // A text with a zero in it ends there.
+    let text = CString::new(message.split('\0').next().unwrap_or_default()).unwrap_or_default();
+    MESSAGE.with(|m| *m.borrow_mut() = text);
+}
+
+/// Runs the work of a function of the interface; keeps errors and panics on this side.
+fn border(work: impl FnOnce() -> Result<()>) -> OlbvhStatus {
+    match catch_unwind(AssertUnwindSafe(work)) {
+        Ok(Ok(())) => OlbvhStatus::Ok,
+        Ok(Err(error)) => {
+            remember(&error.to_string());
+            status_of(&error)
+        }
+        Err(_) => {
+            remember("a panic inside olbvh; please report it");
+            OlbvhStatus::Internal
+        }
+    }
+}
+
+fn missing(what: &str) -> Error {
+    Error::Invalid(format!("{what} is null"))
+}
+
+/// What a handle means.
+fn handle<'a, T>(pointer: *const T, what: &str) -> Result<&'a T> {
+    // SAFETY: the caller passes null or a handle that is not freed yet (see each function).
+    unsafe { pointer.as_ref() }.ok_or_else(|| missing(what))
+}
+
+/// An array of the caller's; a null pointer is an empty one of no elements.
+fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
+    match (pointer.is_null(), count) {
+        (_, 0) => Ok(&[]),
+        (true, _) => Err(missing(what)),
+        // SAFETY: the caller vouches for `count` elements (see each function).
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts(pointer, count) }),
+    }
+}
+
+/// Hands a value over to the caller.
+fn give<T>(out: *mut *mut T, value: T) -> Result<()> {
+    // SAFETY: the caller passes null or a place for a pointer.
+    *unsafe { out.as_mut() }.ok_or_else(|| missing("the place for the result"))? = Box::into_raw(Box::new(value));
+    Ok(())
+}
+
+/// Takes back what [`give`] gave.
+fn release<T>(pointer: *mut T) {
+    if !pointer.is_null() {
+        let _ = border(|| {
+            // SAFETY: the pointer came from `give` and is not used again.
+            drop(unsafe { Box::from_raw(pointer) });
+            Ok(())
+        });
+    }
+}
+
+/// The text of the last error of this thread; valid until its next call.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_last_error() -> *const c_char {
+    MESSAGE.with(|m| m.borrow().as_ptr())
+}
+
+/// Version of the library, such as "0.1.0".
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_version() -> *const c_char {
+    concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
+}
+
+/// Opens a device: part of its name, or its number; null: the best that qualifies.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_gpu_open(device: *const c_char, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
+    border(|| {
+        // SAFETY: the caller passes null or a C string.
+        let name = (!device.is_null()).then(|| unsafe { CStr::from_ptr(device) }.to_string_lossy().into_owned());
+        give(out, OlbvhGpu(Gpu::new(&GpuOptions { device: name, ..GpuOptions::default() })?))
+    })
+}
+
+/// Lets a device go; null is allowed.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
+    release(gpu);
+}
+
+/// Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_mesh_upload(
+    gpu: *const OlbvhGpu,
+    points: *const f32,
+    point_count: usize,
+    tets: *const u32,
+    tet_count: usize,
+    out: *mut *mut OlbvhMesh,
+) -> OlbvhStatus {
+    border(|| {
+        let limit = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra in one mesh")));
+        limit(point_count)?;
+        limit(tet_count)?;
+        let points = array(points.cast::<[f32; 3]>(), point_count, "points")?.to_vec();
+        let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?.to_vec();
+        let mesh = DeviceMesh::upload(&handle(gpu, "gpu")?.0, &Mesh::new(points, tets), BadCells::Skip)?;
+        give(out, OlbvhMesh(Arc::new(mesh)))
+    })
+}
+
+/// Lets a mesh go; null is allowed.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
+    release(mesh);
+}
+
+/// What `olbvh_tree_build` takes where it is given no options.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
+    let BuildOptions { alpha, assign, lists, capacity, .. } = BuildOptions::default();
+    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, capacity: capacity.unwrap_or(0) }
+}
+
+/// Builds the tree over a mesh. `options` may be null.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const OlbvhBuildOptions, out: *mut *mut OlbvhTree) -> OlbvhStatus {
+    border(|| {
+        let mesh = handle(mesh, "mesh")?.0.clone();
+        // SAFETY: null, or the caller's options.
+        let asked = unsafe { options.as_ref() }.copied().unwrap_or_else(|| olbvh_default_build_options());
+        let unknown = |what: &str, n: u32| Error::Invalid(format!("{what} {n} is not known"));
+        let options = BuildOptions {
+            alpha: asked.alpha,
+            assign: Assign::EVERY.into_iter().find(|a| *a as u32 == asked.assign).ok_or_else(|| unknown("assign", asked.assign))?,
+            lists: Lists::EVERY.into_iter().find(|l| *l as u32 == asked.lists).ok_or_else(|| unknown("lists", asked.lists))?,
+            boxes: false,
+            capacity: (asked.capacity != 0).then_some(asked.capacity),
+        };
+        let gpu = mesh.gpu();
+        let tree = Tree::build(gpu, &mesh, &options)?;
+        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&view, tree.memory(), None).addresses()])?;
+        give(out, OlbvhTree { mesh, tree, addresses })
+    })
+}
+
+/// Lets a tree go; null is allowed.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
+    release(tree);
+}
+
+/// Tells what a tree is like.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, addresses } = handle(tree, "tree")?;
+        let (status, grid) = (tree.status(), tree.grid());
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let info = OlbvhTreeInfo {
+            level: status.level,
+            entries: status.entries,
+            nodes: status.nodes,
+            leaves: status.leaves,
+            lo: corner(grid.lo),
+            hi: corner(grid.hi),
+            bad_cells: mesh.status().bad,
+            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
+            address: addresses.all().address,
+        };
+        // SAFETY: the caller passes null or a place for the struct.
+        *unsafe { out.as_mut() }.ok_or_else(|| missing("out"))? = info;
+        Ok(())
+    })
+}
+
+/// Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
+/// point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
+/// `-tolerance`; below 0 means the default, 1e-5.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_locate(
+    tree: *const OlbvhTree,
+    points: *const f32,
+    count: usize,
+    tolerance: f32,
+    owners: *mut u32,
+    barycentrics: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
+        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
+        if owners.is_null() && count > 0 {
+            return Err(missing("owners"));
+        }
+        let tolerance = if tolerance < 0.0 { TOLERANCE } else { tolerance };
+        let options = LocateOptions { tolerance, ..LocateOptions::default() };
+        let found = locate(mesh, tree, points, None, &options, &|_, _| {})?;
+        // SAFETY: the caller vouches for `count` owners and, unless null, four times as many floats.
+        unsafe {
+            std::ptr::copy_nonoverlapping(found.owners.as_ptr(), owners, found.owners.len());
+            if !barycentrics.is_null() {
+                std::ptr::copy_nonoverlapping(found.barycentrics.as_ptr().cast::<f32>(), barycentrics, 4 * found.barycentrics.len());
+            }
+        }
+        Ok(())
+    })
+}
