@@ -47,8 +47,8 @@ fn a_tiny_mesh_is_measured() {
             let sum: u64 = memory["arrays"].as_array().unwrap().iter().map(|a| a[1].as_u64().unwrap()).sum();
             assert_eq!(Some(sum), memory["total"].as_u64());
             let quantities = strings(&structure["figures"], "quantity");
-            let expected = ["build", "locate_random", "locate_coherent", "intervals", "march", "slice", "overlap"];
-            assert!(quantities.starts_with(&expected[..3]), "{quantities:?}");
+            let expected = ["build", "locate_random", "locate_coherent", "locate_samples", "intervals", "march", "slice", "overlap"];
+            assert!(quantities.starts_with(&expected[..4]), "{quantities:?}");
             if structure["kind"] == "olbvh" {
                 assert_eq!(quantities, expected);
                 assert!(memory["paper"].as_u64().is_some() && structure["nodes"].as_u64().is_some());

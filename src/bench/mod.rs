@@ -25,7 +25,7 @@ pub use structure::Kind;
 pub use suite::{Settings, Suite};
 pub use table::{markdown, text};
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Gpu, StageTime};
 use crate::mesh::Mesh;
 use crate::query::Party;
@@ -46,13 +46,22 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &d
     let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
     let mut expected: Option<Answers> = None;
     for kind in Kind::all() {
-        let built = |mesh| Structure::build(gpu, mesh, kind);
-        let (Some(structure), Some(moved)) = (built(&subject.device)?, built(&subject.moved)?) else {
-            progress(&format!("{name}: {kind}: not on this device"));
-            continue;
+        let structure = match Structure::build(gpu, &subject.device, kind) {
+            Ok(Some(structure)) => structure,
+            Ok(None) => {
+                report.skip(kind, "the device has no ray queries", progress);
+                continue;
+            }
+            // Too large for the device or for 32 bits, which others may not be.
+            Err(error @ (Error::Memory { .. } | Error::TooLarge(_))) => {
+                report.skip(kind, &error.to_string(), progress);
+                continue;
+            }
+            Err(error) => return Err(error),
         };
         progress(&format!("{name}: {kind}"));
-        let answers = Answers::of(&subject, &structure, &moved)?;
+        let moved = if kind.overlaps() { Structure::build(gpu, &subject.moved, kind)? } else { None };
+        let answers = Answers::of(&subject, &structure, moved.as_ref())?;
         if let (Structure::Octree(tree), Some(topology)) = (&structure, &topology) {
             check_tree(&subject, topology, tree, &answers)?;
         }
@@ -60,7 +69,7 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &d
             Some(first) => check(&subject, kind, first, &answers)?,
             None => None,
         };
-        report.structures.push(measure(&subject, kind, [&structure, &moved], &answers, lost, settings)?);
+        report.structures.push(measure(&subject, kind, (&structure, moved.as_ref()), &answers, lost, settings)?);
         expected.get_or_insert(answers);
     }
     report.set_ratios();
@@ -71,7 +80,7 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &d
 fn measure(
     subject: &Subject<'_>,
     kind: Kind,
-    [structure, moved]: [&Structure; 2],
+    (structure, moved): (&Structure, Option<&Structure>),
     answers: &Answers,
     lost: Option<Lost>,
     settings: &Settings,
@@ -86,9 +95,10 @@ fn measure(
     let gpu = subject.gpu;
     let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
     add(Quantity::Build, Some(repeat(budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
-    for (quantity, points) in [(Quantity::LocateRandom, &subject.random), (Quantity::LocateCoherent, &subject.coherent)] {
+    for ((quantity, points), owners) in subject.points.iter().zip(&answers.owners) {
         let runs = repeat(budget, || Ok(structure.locate(&subject.device, points)?.stages))?;
-        add(quantity, Some(runs), None, Some(points.len() as u64));
+        let found = owners.iter().filter(|&&owner| owner != u32::MAX).count();
+        add(*quantity, Some(runs), None, Some(found as u64));
     }
     if let Some((found, _)) = &answers.picture {
         let drawn =
@@ -104,7 +114,7 @@ fn measure(
         };
         add(Quantity::Slice, Some(repeat(budget, sliced)?), None, Some(kinds.len() as u64));
     }
-    if answers.overlap.is_some() {
+    if let Some(moved) = moved {
         let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh: &subject.moved, structure: moved }];
         let runs = repeat(budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
         add(Quantity::Overlap, Some(runs), None, None);

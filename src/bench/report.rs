@@ -25,12 +25,22 @@ pub enum Quantity {
     LocateRandom,
     /// Location of points along a Z curve.
     LocateCoherent,
+    /// Location of the samples of a picture, each by itself.
+    LocateSamples,
 }
 
 impl Quantity {
     /// All, in the paper's order.
-    pub const ALL: [Self; 7] =
-        [Self::Build, Self::Intervals, Self::March, Self::Slice, Self::Overlap, Self::LocateRandom, Self::LocateCoherent];
+    pub const ALL: [Self; 8] = [
+        Self::Build,
+        Self::Intervals,
+        Self::March,
+        Self::LocateSamples,
+        Self::Slice,
+        Self::Overlap,
+        Self::LocateRandom,
+        Self::LocateCoherent,
+    ];
 
     /// Title of a table, with the paper's.
     pub fn title(self) -> &'static str {
@@ -42,6 +52,7 @@ impl Quantity {
             Self::Overlap => "Overlap with the moved mesh (Fig. 10)",
             Self::LocateRandom => "Point location, random points",
             Self::LocateCoherent => "Point location, points along a Z curve",
+            Self::LocateSamples => "Samples inside the mesh, each located by itself (Fig. 7)",
         }
     }
 
@@ -55,12 +66,13 @@ impl Quantity {
             Self::Overlap => "fig10_overlap",
             Self::LocateRandom => "location_random",
             Self::LocateCoherent => "location_coherent",
+            Self::LocateSamples => "fig07_samples_located",
         }
     }
 
     /// Whether it is told in items per second, not in milliseconds.
     pub fn is_rate(self) -> bool {
-        matches!(self, Self::March | Self::LocateRandom | Self::LocateCoherent)
+        matches!(self, Self::March | Self::LocateRandom | Self::LocateCoherent | Self::LocateSamples)
     }
 }
 
@@ -222,6 +234,8 @@ pub struct MeshReport {
     pub topology_ms: f64,
     /// The structures.
     pub structures: Vec<StructureReport>,
+    /// Structures that were not measured, and why.
+    pub skipped: Vec<(String, String)>,
 }
 
 impl MeshReport {
@@ -235,7 +249,13 @@ impl MeshReport {
             quality: Quality::of(subject),
             topology_ms: subject.device.time().stages.iter().map(|s| s.milliseconds).sum(),
             structures: Vec::new(),
+            skipped: Vec::new(),
         }
+    }
+
+    pub(super) fn skip(&mut self, kind: Kind, why: &str, progress: &dyn Fn(&str)) {
+        progress(&format!("{}: {kind}: not measured: {why}", self.name));
+        self.skipped.push((kind.to_string(), why.into()));
     }
 
     /// The LBVH over this mesh.

@@ -34,6 +34,11 @@ impl Kind {
         let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
         octrees.chain([Self::Lbvh, Self::RayQuery]).collect()
     }
+
+    /// Whether it can tell the overlap of two meshes.
+    pub(super) fn overlaps(self) -> bool {
+        matches!(self, Self::Octree { .. })
+    }
 }
 
 impl std::fmt::Display for Kind {

@@ -1,8 +1,8 @@
 //! A mesh on the device and the questions that all structures over it are asked.
 
-use super::Settings;
 use super::party;
 use super::structure::{Built, Structure};
+use super::{Quantity, Settings};
 use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -25,10 +25,8 @@ pub(super) struct Subject<'a> {
     pub device: DeviceMesh,
     /// The same mesh, moved.
     pub moved: DeviceMesh,
-    /// Points all over the volume of the mesh, in no order.
-    pub random: Vec<[f32; 3]>,
-    /// The same along a Z curve.
-    pub coherent: Vec<[f32; 3]>,
+    /// Points to locate, and as what.
+    pub points: Vec<(Quantity, Vec<[f32; 3]>)>,
     field: Field,
     plan: Plan,
     voxels: VoxelGrid,
@@ -59,7 +57,9 @@ impl<'a> Subject<'a> {
         let slice =
             SliceSettings { size: [settings.slice, 0], thickness: Some(f64::from(thickness) * THICKNESS), ..SliceSettings::default() };
         let voxels = slice.voxels(bounds.lo, bounds.hi, [0.0; 3])?;
-        Ok(Self { gpu, mesh, device, moved, random, coherent, field, plan, voxels })
+        let samples = samples(&plan, &bounds, settings.points as usize);
+        let points = vec![(Quantity::LocateRandom, random), (Quantity::LocateCoherent, coherent), (Quantity::LocateSamples, samples)];
+        Ok(Self { gpu, mesh, device, moved, points, field, plan, voxels })
     }
 
     /// Centre of a voxel of the slice, by its number.
@@ -80,6 +80,25 @@ impl<'a> Subject<'a> {
         let field = Some((self.field.values.as_slice(), On::Points));
         query::slice(party.mesh, party.tree, field, &self.voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
     }
+}
+
+/// The samples of a part of a picture's rays that lie in the bounds, in blocks of 8 × 8 rays spread over the picture, front to back in each.
+fn samples(plan: &Plan, bounds: &Bounds, most: usize) -> Vec<[f32; 3]> {
+    let across = plan.size[0].div_ceil(8);
+    let blocks = across * plan.size[1].div_ceil(8);
+    let steps = (2.0 * bounds.diagonal() / f64::from(plan.step)) as u32;
+    let in_bounds = |p: &[f32; 3]| (0..3).all(|c| bounds.lo[c] <= p[c] && p[c] <= bounds.hi[c]);
+    // In an order that soon has visited all of the picture.
+    let mut order: Vec<u32> = (0..blocks).collect();
+    order.sort_by_key(|b| b.wrapping_mul(2_654_435_761));
+    let block = |b: u32| {
+        let corner = [8 * (b % across), 8 * (b / across)];
+        let rays: Vec<_> = (0..64).map(|i| plan.rays.ray(corner[0] + i % 8, corner[1] + i / 8)).collect();
+        let at = move |k: u32| (k as f32 + 0.5) * plan.step;
+        let point = move |(from, way): &([f32; 3], [f32; 3]), t: f32| [0, 1, 2].map(|c| from[c] + way[c] * t);
+        (0..steps).flat_map(move |k| rays.iter().map(|ray| point(ray, at(k))).collect::<Vec<_>>()).filter(in_bounds)
+    };
+    order.into_iter().flat_map(block).take(most).collect()
 }
 
 /// Six times the volume of a tetrahedron with these corners.

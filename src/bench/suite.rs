@@ -78,8 +78,8 @@ impl Settings {
     /// Those of a suite; the paper's pictures have 1024² pixels, its slices 999² voxels, its medians 50 repetitions.
     pub fn of(suite: Suite) -> Self {
         if suite == Suite::Quick {
-            let budget = Budget { repetitions: 50, seconds: 0.1 };
-            return Self { points: 1 << 15, picture: 128, slice: 256, reference_tets: 300_000, budget };
+            let budget = Budget { repetitions: 50, seconds: 0.05 };
+            return Self { points: 1 << 14, picture: 96, slice: 256, reference_tets: 300_000, budget };
         }
         let budget = Budget { repetitions: 50, seconds: 5.0 };
         Self { points: 1 << 20, picture: 1024, slice: 999, reference_tets: 300_000, budget }

@@ -77,7 +77,7 @@ fn main_tables(report: &Report) -> Vec<Table> {
         Some(format!("{}{part}", mebibytes(s.memory.total)))
     });
     let paper = by_structure(report, "Memory as the paper counts, with boxes and without PO, MiB", |_, s| s.memory.paper.map(mebibytes));
-    let lost = by_structure(report, "Points inside that are lost, of those located", |_, s| {
+    let lost = by_structure(report, "Points inside that are lost, of those inside", |_, s| {
         s.lost.map(|l| format!("{} of {} ({:.4} %)", l.points, l.of, 100.0 * l.points as f64 / l.of.max(1) as f64))
     });
     let mut tables = vec![meshes(report)];

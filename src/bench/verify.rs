@@ -17,8 +17,8 @@ const COLOR: f32 = 2.0 / 255.0;
 
 /// What a structure answers; `None`: it cannot.
 pub(super) struct Answers {
-    /// Of the random and of the coherent points.
-    owners: [Vec<u32>; 2],
+    /// Of every set of points.
+    pub owners: Vec<Vec<u32>>,
     /// Samples in the mesh; colours.
     pub picture: Option<(u64, Vec<[f32; 4]>)>,
     /// Kind and owner of every voxel.
@@ -29,9 +29,9 @@ pub(super) struct Answers {
 
 impl Answers {
     /// Asks everything once. `moved`: the same kind of structure over the moved mesh.
-    pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: &Structure) -> Result<Self> {
-        let owners = |points: &[[f32; 3]]| structure.locate(&subject.device, points).map(|found| found.owners);
-        let owners = [owners(&subject.random)?, owners(&subject.coherent)?];
+    pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: Option<&Structure>) -> Result<Self> {
+        let owners = subject.points.iter().map(|(_, points)| structure.locate(&subject.device, points).map(|found| found.owners));
+        let owners = owners.collect::<Result<_>>()?;
         let picture = subject.render(structure)?.map(|drawn| (drawn.found_samples, drawn.colors));
         let (mut kinds, mut cells) = (Vec::new(), Vec::new());
         let sliced = subject.slice(structure, &mut |band| {
@@ -40,8 +40,9 @@ impl Answers {
             Ok(())
         })?;
         let voxels = sliced.map(|_| (kinds, cells));
-        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh: &subject.moved, structure: moved }];
-        let overlap = overlap(a, b)?.map(|found| [found.overlap.a, found.overlap.b]);
+        let built = |mesh, structure| Built { mesh, structure };
+        let overlap = moved.map(|moved| overlap(built(&subject.device, structure), built(&subject.moved, moved))).transpose()?.flatten();
+        let overlap = overlap.map(|found| [found.overlap.a, found.overlap.b]);
         Ok(Self { owners, picture, voxels, overlap })
     }
 }
@@ -62,8 +63,8 @@ fn holds(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
 pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers: &Answers) -> Result<Option<Lost>> {
     let wrong = |what: String| Err(Error::Mismatch(format!("{kind}: {what}")));
     let mut lost = Lost { points: 0, of: 0 };
-    for (points, (expected, found)) in [&subject.random, &subject.coherent].iter().zip(first.owners.iter().zip(&answers.owners)) {
-        lost.of += points.len() as u64;
+    for ((_, points), (expected, found)) in subject.points.iter().zip(first.owners.iter().zip(&answers.owners)) {
+        lost.of += expected.iter().filter(|&&owner| owner != u32::MAX).count() as u64;
         let all = points.iter().zip(expected.iter().zip(found));
         for (&point, (&expected, &found)) in all.filter(|(_, (expected, found))| expected != found) {
             let holding = [expected, found].map(|tet| holds(subject, tet, point));
@@ -108,10 +109,9 @@ pub(super) fn check_tree(subject: &Subject<'_>, topology: &Topology, tree: &Tree
     if host != build(subject.mesh, topology, options)? {
         return wrong("the tree is not the reference's");
     }
-    let expected = Locator::new(subject.mesh, topology, &host).locate_all(&subject.random);
-    if expected.iter().zip(&answers.owners[0]).any(|(e, &found)| e.owner != found) {
-        wrong("owners are not the reference's")
-    } else {
-        Ok(())
-    }
+    let locator = Locator::new(subject.mesh, topology, &host);
+    let same =
+        |(points, owners): (&[[f32; 3]], &Vec<u32>)| locator.locate_all(points).iter().zip(owners).all(|(e, &found)| e.owner == found);
+    let right = subject.points.iter().map(|(_, points)| points.as_slice()).zip(&answers.owners).all(same);
+    if right { Ok(()) } else { wrong("owners are not the reference's") }
 }
