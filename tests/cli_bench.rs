@@ -49,8 +49,10 @@ fn a_tiny_mesh_is_measured() {
             let quantities = strings(&structure["figures"], "quantity");
             let expected = ["build", "locate_random", "locate_coherent", "locate_samples", "intervals", "march", "slice", "overlap"];
             assert!(quantities.starts_with(&expected[..4]), "{quantities:?}");
-            if structure["kind"] == "olbvh" {
+            if structure["kind"] != "ray_query" {
                 assert_eq!(quantities, expected);
+            }
+            if structure["kind"] == "olbvh" {
                 assert!(memory["paper"].as_u64().is_some() && structure["nodes"].as_u64().is_some());
             }
             for figure in structure["figures"].as_array().unwrap() {

@@ -28,7 +28,6 @@ pub use table::{markdown, text};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, StageTime};
 use crate::mesh::Mesh;
-use crate::query::Party;
 use crate::reference::boundary::topology;
 use measure::{Runs, repeat};
 use structure::{Built, Structure};
@@ -124,12 +123,4 @@ fn measure(
 
 fn time(name: &str, milliseconds: f64) -> StageTime {
     StageTime { name: name.into(), milliseconds }
-}
-
-/// A mesh with its octree, as queries get them.
-fn party(built: Built<'_>) -> Option<Party<'_>> {
-    match built.structure {
-        Structure::Octree(tree) => Some(Party { mesh: built.mesh, tree }),
-        _ => None,
-    }
 }

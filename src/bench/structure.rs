@@ -1,12 +1,11 @@
 //! One structure over one mesh, whichever it is.
 
-use super::party;
 use crate::baseline::{Lbvh, RayQuery};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateOptions, Located, Overlapped};
+use crate::query::{self, LocateOptions, Located, Overlapped, Party};
 
 /// Which structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,7 +36,7 @@ impl Kind {
 
     /// Whether it can tell the overlap of two meshes.
     pub(super) fn overlaps(self) -> bool {
-        matches!(self, Self::Octree { .. })
+        self != Self::RayQuery
     }
 }
 
@@ -88,6 +87,15 @@ impl Structure {
         }
     }
 
+    /// As pictures and slices take it; `None` for ray queries, which only locate.
+    pub(super) fn searched(&self) -> Option<query::Structure> {
+        match self {
+            Self::Octree(tree) => Some(tree.into()),
+            Self::Lbvh(lbvh) => Some(lbvh.into()),
+            Self::RayQuery(_) => None,
+        }
+    }
+
     /// Locates points.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
         match self {
@@ -100,6 +108,13 @@ impl Structure {
 
 /// Which primitives of two meshes intersect the other; `None` where the structures cannot tell.
 pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> {
-    let (Some(a), Some(b)) = (party(a), party(b)) else { return Ok(None) };
-    query::overlap(a, b, false, &|_, _| {}).map(Some)
+    let silent = &|_, _| {};
+    match (a.structure, b.structure) {
+        (Structure::Octree(tree), Structure::Octree(other)) => {
+            let [a, b] = [Party { mesh: a.mesh, tree }, Party { mesh: b.mesh, tree: other }];
+            query::overlap(a, b, false, silent).map(Some)
+        }
+        (Structure::Lbvh(tree), Structure::Lbvh(other)) => tree.overlap(a.mesh, other, b.mesh, silent).map(Some),
+        _ => Ok(None),
+    }
 }

@@ -1,7 +1,6 @@
 //! A mesh on the device and the questions that all structures over it are asked.
 
-use super::party;
-use super::structure::{Built, Structure};
+use super::structure::Structure;
 use super::{Quantity, Settings};
 use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
@@ -70,15 +69,15 @@ impl<'a> Subject<'a> {
 
     /// Draws the field; `None` where the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
-        let Some(party) = party(Built { mesh: &self.device, structure }) else { return Ok(None) };
-        query::render(party.mesh, party.tree, &self.plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
+        let Some(searched) = structure.searched() else { return Ok(None) };
+        query::render(&self.device, searched, &self.plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
     }
 
     /// Slices the mesh through its middle; `None` where the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
-        let Some(party) = party(Built { mesh: &self.device, structure }) else { return Ok(None) };
+        let Some(searched) = structure.searched() else { return Ok(None) };
         let field = Some((self.field.values.as_slice(), On::Points));
-        query::slice(party.mesh, party.tree, field, &self.voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
+        query::slice(&self.device, searched, field, &self.voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
     }
 }
 
