@@ -40,7 +40,7 @@ fn a_build_allocates_what_it_needs() {
         let capacity = Capacity { candidates: status.candidates, entries: status.entries, nodes: status.nodes, level: status.level };
         let planned = Arena::measure(|a| {
             CountScratch::carve(&gpu, a, on_device.input().tets)?;
-            FilterScratch::carve(&gpu, a, &options, &capacity)?;
+            FilterScratch::carve(&gpu, a, on_device.input().tets, &options, &capacity)?;
             SortedScratch::carve(&gpu, a, &capacity)
         });
         // The head of 512 bytes and the rounding of each buffer beside it.

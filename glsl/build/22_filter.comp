@@ -3,25 +3,25 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Codes of all but the paper's lists, 1 of 2: which candidates are entries, 32 bits to a word, and how many. Of those that an assignment keeps
-// (SPEC 2.2) STEP LIST_ALL takes all. For Lists::Boundary (2.6) MARK marks the cells of boundary primitives; then LIST_MARKED takes what lies in
-// marked cells, and the owners of the centres of others.
+// Codes of all but the paper's lists, 1 of 2: which candidates are entries, and how many. An invocation takes a share of 32 candidates of one
+// tetrahedron, a word of answers. Of those that an assignment keeps (SPEC 2.2) STEP LIST_ALL takes all. For Lists::Boundary (2.6) MARK marks the
+// cells of boundary primitives; then LIST_MARKED takes what lies in marked cells, and the owners of the centres of others.
 layout(constant_id = 2) const uint ASSIGN = 1;
 layout(constant_id = 3) const uint STEP = 0;
 ARGUMENTS(12)
     uint tets;
     uint stride;
-    uint capacity;
+    uint capacity; // shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER16(4, readonly, vec4, vertices)
-BUFFER(5, readonly, uint, offsets)
-BUFFER(6, readonly, uint, candidates)
+BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
+BUFFER(6, readonly, uint, shares)  // their number
 BUFFER(7, writeonly, uint, hits)   // one bit per candidate
-BUFFER(8, writeonly, uint, counts) // hits per word
+BUFFER(8, writeonly, uint, counts) // hits per share
 BUFFER(9, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves, zeroed
 BUFFER(10, readonly, uint, boundary)
 BUFFER16(11, readonly, uvec4, neighbours)
@@ -36,64 +36,45 @@ const uint LIST_ALL = 0u;
 const uint MARK = 1u;
 const uint LIST_MARKED = 2u;
 
-// The primitive of the candidates at hand.
-uint t;
-CellBox box;
-Tet tet;
-Filter cell_filter;
-bool inner; // no boundary primitive
-vec3 lo, hi;
-
-void load_primitive(Grid g) {
-    box = coarser(finest_box(g, t, stride), g.level);
-    if (STEP != LIST_ALL) inner = (boundary.at[t >> 5u] >> (t & 31u) & 1u) == 0u;
-    if (STEP == MARK && inner) return;
-    tet = load_tet(cells.at[t]);
-    if (ASSIGN != 0u) cell_filter = make_filter(tet, g, g.level, ASSIGN);
-    lo = min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3]));
-    hi = max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]));
-}
-
-bool is_listed(uvec3 cell, uint code, vec3 h) {
-    if (STEP == LIST_MARKED && !is_marked(code)) {
-        if (!inner) return false;
-        vec3 centre = cell_centre(h, cell);
-        return all(lessThanEqual(lo, centre)) && all(lessThanEqual(centre, hi)) && owns_centre(t, tet, centre);
-    }
-    return ASSIGN == 0u || touches(cell_filter, cell);
-}
-
 void main() {
-    uint n = min(candidates.at[0], capacity);
-    uint word = item_index();
-    uint first = 32u * word;
-    if (first >= n) return;
-    uint end = min(n, first + 32u);
+    uint share = item_index();
+    if (share >= min(shares.at[0], capacity)) return;
     Grid g = grid.at[0];
+    uint t = owner_of(share, tets);
+    bool inner = STEP != LIST_ALL && (boundary.at[t >> 5u] >> (t & 31u) & 1u) == 0u;
+    if (STEP == MARK && inner) return;
+    CellBox box = coarser(finest_box(g, t, stride), g.level);
+    uint first = 32u * (share - offsets.at[t]);
+    uint n = min(32u, box.size.x * box.size.y * box.size.z - first);
+    Tet tet = load_tet(cells.at[t]);
+    Filter cell_filter;
+    if (ASSIGN != 0u) cell_filter = make_filter(tet, g, g.level, ASSIGN);
     vec3 h = half_cell(g, g.level);
-    t = owner_of(first, tets);
-    uint next = offsets.at[t + 1u];
-    load_primitive(g);
-    uvec3 at = candidate(box, first - offsets.at[t]);
-    uint bits = 0u;
-    for (uint i = first; i < end; ++i) {
-        if (i >= next) {
-            while (next <= i && t + 1u < tets) next = offsets.at[++t + 1u];
-            load_primitive(g);
-            at = box.lo;
-        }
-        if (STEP == MARK && inner) {
-            i = next - 1u;
-            continue;
-        }
-        uint code = STEP == LIST_ALL ? 0u : morton(at);
-        if (is_listed(at, code, h)) {
+    vec3 lo = min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), hi = max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]));
+    uvec3 at = first == 0u ? box.lo : candidate(box, first), central;
+    uint bits = 0u, centres = 0u;
+    for (uint i = 0u; i < n; ++i) {
+        uint code = morton(at);
+        if (STEP == LIST_MARKED && !is_marked(code)) {
+            vec3 centre = cell_centre(h, at);
+            if (inner && all(lessThanEqual(lo, centre)) && all(lessThanEqual(centre, hi))) {
+                if (centres == 0u) central = at;
+                centres |= 1u << i;
+            }
+        } else if (ASSIGN == 0u || touches(cell_filter, at)) {
+            bits |= 1u << i;
             if (STEP == MARK && !is_marked(code)) atomicOr(marks.at[code >> 5u], 1u << (code & 31u));
-            bits |= 1u << (i - first);
         }
         at = next_candidate(box, at);
     }
     if (STEP == MARK) return;
-    hits.at[word] = bits;
-    counts.at[word] = bitCount(bits);
+    // Apart from the loop above, so that neighbouring invocations, whose centres have other numbers, do this side by side.
+    while (centres != 0u) {
+        uint i = uint(findLSB(centres));
+        if (owns_centre(t, tet, cell_centre(h, central))) bits |= 1u << i;
+        centres &= centres - 1u;
+        if (centres != 0u) central = candidate(box, first + uint(findLSB(centres)));
+    }
+    hits.at[share] = bits;
+    counts.at[share] = bitCount(bits);
 }

@@ -54,11 +54,10 @@ void main() {
         if (w.clear) best = Best(hint, true, true, 0.0);
     }
     uvec2 range = entry_range(leaf);
-    if (walks_in(leaf, range)) {
-        if (slice == 0u && !best.inside) best = walk_in(g, p.at[range.x], hint, at, x);
-    } else {
+    if (slice == 0u && !best.inside) best = walked(g, leaf, range, hint, at, x);
+    if (!best.inside && !walks_in(leaf, range)) {
         uint begin = min(range.y, range.x + slice * SLICE);
-        if (!best.inside) search(best, begin, min(range.y, begin + SLICE), x);
+        search(best, begin, min(range.y, begin + SLICE), x);
     }
     if (last == 0u) {
         owners.at[i] = best.owner;

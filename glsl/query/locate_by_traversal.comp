@@ -54,10 +54,9 @@ void main() {
     }
     if (leaf_found != NONE) {
         vec3 x = normalise(g, at);
-        Best best = no_best();
         uvec2 range = entry_range(leaf_found);
-        if (walks_in(leaf_found, range)) best = walk_in(g, p.at[range.x], NONE, at, x);
-        else search(best, range.x, min(range.y, range.x + 32000u), x);
+        Best best = walked(g, leaf_found, range, NONE, at, x);
+        if (!best.inside && !walks_in(leaf_found, range)) search(best, range.x, min(range.y, range.x + 32000u), x);
         owner = decide(best, leaf_found, tolerance);
         if (owner != NONE) {
             Tet tet = load_tet(cells.at[owner]);

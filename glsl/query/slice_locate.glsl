@@ -27,21 +27,6 @@ BUFFER(7, READ_WRITE, SliceStatus, status)
 STRUCTURE(8)
 #include "shared/structure_owner.glsl"
 
-// The cell that holds x clearly, if it is `cell` or a short walk away from it.
-uint walk_clear(uint cell, vec3 x) {
-    for (uint s = 0u; s < WALK && cell != NONE; ++s) {
-        Tet tet = load_tet(cells.at[cell]);
-        Weights w = weights(tet, x);
-        if (w.clear) return cell;
-        vec4 own = own_weights(w, tet);
-        uint face = 0u;
-        for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
-        if (own[face] >= 0.0) return NONE;
-        cell = neighbours.at[cell][face];
-    }
-    return NONE;
-}
-
 void main() {
     uint i = item_index();
     uint unfinished = 0u;
@@ -56,7 +41,8 @@ void main() {
         for (uint work = 0u; state.next < count && work < budget; ++work) {
             vec3 at = voxel_centre(plan, begin + state.next, y, k);
             vec3 x = normalise(g, at);
-            uint owner = state.cursor == 0u && near_bounds(g, at) ? walk_clear(state.hint, x) : NONE;
+            uint owner = state.hint;
+            if (state.cursor != 0u || !near_bounds(g, at) || !stride_to(owner, x, WALK)) owner = NONE;
             if (owner == NONE) {
                 OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
                 bool ended = find_owner(search, g, at, x, tolerance, work, budget, owner);

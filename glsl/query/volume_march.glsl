@@ -108,8 +108,7 @@ void main() {
                 inside = w.clear;
                 if (inside) break;
                 vec4 own = own_weights(w, tet);
-                uint face = 0u;
-                for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+                uint face = outermost(own);
                 uint next = neighbours.at[cell][face];
                 if (own[face] >= 0.0 || next == NONE) break;
                 enter(next);

@@ -2,6 +2,7 @@
 
 // The last tetrahedron t with offsets[t] <= i, for i below the total; skips those without candidates.
 uint owner_of(uint i, uint tets) {
+    if (i < tets && offsets.at[i] == i && offsets.at[i + 1u] > i) return i; // as where each before has one
     uint lo = 0u, hi = tets;
     while (hi - lo > 1u) {
         uint mid = lo + (hi - lo) / 2u;

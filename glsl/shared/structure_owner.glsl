@@ -1,6 +1,7 @@
 // Point location in the structure of structure.glsl.
 #ifdef BINARY_TREE
 #include "shared/binary_owner.glsl"
+#include "shared/stride.glsl"
 #else
 layout(constant_id = 4) const uint LISTS = 0;
 #include "shared/tree.glsl"
@@ -15,8 +16,8 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     if (leaf == NONE) return true;
     uvec2 range = entry_range(leaf);
     uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
-    if (walks_in(leaf, range)) s.best = walk_in(g, p.at[range.x], NONE, at, x);
-    else search(s.best, begin, end, x);
+    if (s.cursor == 0u) s.best = walked(g, leaf, range, NONE, at, x);
+    if (!s.best.inside && !walks_in(leaf, range)) search(s.best, begin, end, x);
     work += end - begin;
     s.cursor = end - range.x;
     if (!s.best.inside && end < range.y) return false;

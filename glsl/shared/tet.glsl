@@ -82,6 +82,33 @@ bool near(Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.ma
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 own_weights(Weights w, Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
 
+// The face that says outside most.
+uint outermost(vec4 own) {
+    uint face = 0u;
+    for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+    return face;
+}
+
+// What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
+struct Sides {
+    vec4 w;     // as in Weights, opposite to the vertices in the caller's order
+    bool clear; // as in Weights
+};
+
+Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
+    precise vec3 a = v0 - p, b = v1 - p, c = v2 - p, d = v3 - p;
+    vec3 ab = cross_product(a, b), cd = cross_product(c, d);
+    vec4 w = vec4(dot_product(cd, b), -dot_product(cd, a), dot_product(ab, d), -dot_product(ab, c));
+    precise float sum = (w.x + w.y) + (w.z + w.w);
+    Sides r;
+    r.w = sum < 0.0 ? -w : w;
+    vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
+    precise vec3 size = hi - lo;
+    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
+    return r;
+}
+
 const float SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; the smallest float for a flat cell.

@@ -2,11 +2,14 @@
 // candidates.glsl, cells and neighbours.
 const uint STAR = 128u;    // tetrahedra of a star
 const uint STEPS = 512u;   // of part 1
-const uint HINTED = 16u;   // from a hint
+const uint HINTED = 16u;   // of a stride from a hint
+const uint STRIDE = 64u;   // of a stride through a leaf
 const uint LEG = 1024u;    // along one segment
 const uint DETOURS = 8u;   // points to go by
 const uint ARRIVALS = 2u;  // stars that part 1 looks at
 const float GAP = -7.62939453125e-6; // -2^-17
+
+#include "shared/stride.glsl"
 
 // Cell of a leaf in normalised coordinates.
 struct Room {
@@ -65,8 +68,7 @@ bool walk_towards(uint t, vec3 x, uint most, inout Best best) {
             if (settled(best) || ++arrivals == ARRIVALS) break;
         }
         vec4 own = own_weights(w, tet);
-        uint face = 0u;
-        for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+        uint face = outermost(own);
         if (own[face] >= 0.0) break;
         t = neighbours.at[t][face];
         if (t == NONE) break;

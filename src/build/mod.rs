@@ -43,7 +43,7 @@ impl BuildScratch {
     pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
         Ok(Self {
             counts: CountScratch::carve(gpu, arena, tets)?,
-            filter: FilterScratch::carve(gpu, arena, options, capacity)?,
+            filter: FilterScratch::carve(gpu, arena, tets, options, capacity)?,
             sorted: SortedScratch::carve(gpu, arena, capacity)?,
         })
     }
@@ -67,9 +67,9 @@ pub fn cmd_build(
 ) -> Result<()> {
     let BuildScratch { counts, filter, sorted } = scratch;
     cmd_depth(r, mesh, tree.status, tree.grid, options, (capacity.candidates, capacity.level), counts)?;
-    cmd_count(r, mesh, tree.grid, counts)?;
+    cmd_count(r, mesh, tree.grid, options, counts)?;
     if let Some(filter) = filter {
-        cmd_filter(r, mesh, tree.grid, options, capacity.candidates, counts, filter)?;
+        cmd_filter(r, mesh, tree.grid, options, counts, filter)?;
     }
     cmd_codes(r, mesh, tree, capacity, counts, filter.as_ref(), sorted)?;
     let entries = entries(capacity, counts, filter.as_ref());

@@ -106,39 +106,49 @@ impl CountScratch {
     }
 }
 
-/// Scratch memory of the filter that all but the paper's lists need: two words per 32 candidates, and for `Lists::Boundary` one bit per cell of the
-/// level of the leaves.
+/// Candidates of one tetrahedron that the filter tests at once.
+pub(crate) const SHARE: u32 = 32;
+
+/// Whether candidates have to be tested before they are entries; only the paper's lists take them all.
+pub(crate) fn filtered(options: &BuildOptions) -> bool {
+    options.assign != Assign::Aabb || options.lists != Lists::All
+}
+
+/// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron, and for `Lists::Boundary` one bit per cell of the level
+/// of the leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterScratch {
+    /// Most shares.
+    pub(crate) most: u32,
     pub(crate) hits: BufferRef,
     pub(crate) counts: BufferRef,
     pub(crate) entries: BufferRef,
-    pub(crate) words: BufferRef,
     pub(crate) arguments: BufferRef,
     pub(crate) marks: Option<BufferRef>,
     pub(crate) scan: ScanScratch,
 }
 
 impl FilterScratch {
-    /// For the candidates and the level of `capacity`; nothing where every candidate is an entry.
+    /// For a mesh of `tets` tetrahedra and the candidates and the level of `capacity`; nothing where every candidate is an entry.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
-    pub fn carve(gpu: &Gpu, arena: &mut Arena, options: &BuildOptions, capacity: &Capacity) -> Result<Option<Self>> {
-        if options.assign == Assign::Aabb && options.lists == Lists::All {
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32, options: &BuildOptions, capacity: &Capacity) -> Result<Option<Self>> {
+        if !filtered(options) {
             return Ok(None);
         }
-        let words = capacity.candidates.div_ceil(32);
+        // All full but the last one of each.
+        let most = tets.saturating_add(capacity.candidates / SHARE);
         let cells = 8u64.pow(capacity.level);
         let marks = if options.lists == Lists::Boundary { Some(arena.words(cells.div_ceil(32))?) } else { None };
         Ok(Some(Self {
-            hits: arena.words(u64::from(words))?,
-            counts: arena.words(u64::from(words))?,
+            most,
+            hits: arena.words(u64::from(most))?,
+            counts: arena.words(u64::from(most))?,
             entries: arena.words(1)?,
-            words: arena.words(1)?,
             arguments: arena.words(3)?,
             marks,
-            scan: ScanScratch::carve(gpu, arena, words)?,
+            scan: ScanScratch::carve(gpu, arena, most)?,
         }))
     }
 }

@@ -1,13 +1,13 @@
 //! The stages of a build as functions that append to a recorder; [`super`] puts them in order.
 
 use super::mesh::{MeshArrays, MeshInput, STRIDED_GROUPS};
-use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SortedScratch, TreeMemory, filtered};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     ChooseDepth, ChooseDepthSpec, Count as CountCells, CountSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec,
     EmitSplits, EmitSplitsSpec, EstimateDepth, EstimateDepthSpec, Filter, FilterSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves,
-    FlagLeavesSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, WordsOf, WordsOfSpec,
+    FlagLeavesSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
 };
 use crate::layout::{BuildStatus, Grid};
 use crate::options::BuildOptions;
@@ -56,13 +56,20 @@ pub(crate) fn cmd_depth(
     })
 }
 
-/// Stage 2, first part: how many entries every tetrahedron has, and where they begin.
-pub(crate) fn cmd_count(r: &mut Recorder<'_>, mesh: &MeshView, grid: BufferRef, scratch: &CountScratch) -> Result<()> {
+/// Stage 2, first part: how many candidates every tetrahedron has (or shares of them, where they are filtered), and where they begin.
+pub(crate) fn cmd_count(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+) -> Result<()> {
     let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
     r.stage("build.count", |r| {
         let count = CountCells { grid, positions, cells, bad: mesh.arrays.bad, counts: scratch.offsets, tets, stride };
-        r.dispatch(&count, CountSpec { workgroup, ..Default::default() }, Groups::Count((tets + 1).div_ceil(workgroup)))?;
+        let spec = CountSpec { workgroup, share: if filtered(options) { SHARE } else { 1 }, ..Default::default() };
+        r.dispatch(&count, spec, Groups::Count((tets + 1).div_ceil(workgroup)))?;
         cmd_exclusive_scan(r, scratch.offsets, scratch.offsets, scratch.total, Count::host(tets + 1), &scratch.scan)
     })
 }
@@ -73,23 +80,18 @@ pub(crate) fn cmd_filter(
     mesh: &MeshView,
     grid: BufferRef,
     options: &BuildOptions,
-    max_candidates: u32,
     scratch: &CountScratch,
     filter: &FilterScratch,
 ) -> Result<()> {
     let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
-    let candidates = scratch.candidates;
     r.stage("build.filter", |r| {
-        let once = r.gpu().subgroup_size();
         if let Some(marks) = filter.marks {
             r.fill(marks, 0);
         }
-        let words = WordsOf { bits: candidates, words: filter.words, most: max_candidates };
-        r.dispatch(&words, WordsOfSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
-        r.barrier("filter.words → filter");
-        let count = Count::device(max_candidates.div_ceil(32), filter.words);
-        let groups = count.groups(r, workgroup, filter.arguments, "codes.scan → codes.filter")?;
+        r.barrier("codes.scan → filter.shares");
+        let shares = Count::device(filter.most, scratch.total);
+        let groups = shares.groups(r, workgroup, filter.arguments, "filter.shares → codes.filter")?;
         let arguments = Filter {
             grid,
             positions,
@@ -97,7 +99,7 @@ pub(crate) fn cmd_filter(
             bad: mesh.arrays.bad,
             vertices: mesh.arrays.vertices,
             offsets: scratch.offsets,
-            candidates,
+            shares: scratch.total,
             hits: filter.hits,
             counts: filter.counts,
             marks: filter.marks.unwrap_or_else(|| r.gpu().nothing()),
@@ -105,7 +107,7 @@ pub(crate) fn cmd_filter(
             neighbours: mesh.arrays.neighbours,
             tets,
             stride,
-            capacity: max_candidates,
+            capacity: filter.most,
         };
         let spec = FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() };
         if filter.marks.is_some() {
@@ -115,7 +117,7 @@ pub(crate) fn cmd_filter(
         } else {
             r.dispatch(&arguments, spec, groups)?;
         }
-        cmd_exclusive_scan(r, filter.counts, filter.counts, filter.entries, count, &filter.scan)
+        cmd_exclusive_scan(r, filter.counts, filter.counts, filter.entries, shares, &filter.scan)
     })
 }
 
@@ -135,8 +137,8 @@ pub(crate) fn cmd_codes(
     let target = *r.gpu().target();
     r.stage("build.emit", |r| {
         if let Some(filter) = filter {
-            let words = Count::device(capacity.candidates.div_ceil(32), filter.words);
-            let groups = words.groups(r, target.each, filter.arguments, "codes.filter → codes.emit")?;
+            let shares = Count::device(filter.most, counts.total);
+            let groups = shares.groups(r, target.each, filter.arguments, "codes.filter → codes.emit")?;
             let (hits, places) = (filter.hits, filter.counts);
             let emit = EmitHits {
                 grid,
@@ -144,14 +146,14 @@ pub(crate) fn cmd_codes(
                 cells,
                 bad,
                 offsets,
-                candidates,
+                shares: counts.total,
                 hits,
                 places,
                 codes,
                 ids,
                 tets,
                 stride,
-                capacity: capacity.candidates,
+                capacity: filter.most,
                 room: capacity.entries,
             };
             r.dispatch(&emit, EmitHitsSpec { workgroup: target.each, ..Default::default() }, groups)?;

@@ -54,7 +54,7 @@ impl Tree {
         let (counts_buffer, counts) = reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
         let ((), time) = gpu.run("olbvh.build.counts", |r| {
             cmd_depth(r, &view, status, grid, options, (u32::MAX, MAX_LEVEL), &counts)?;
-            cmd_count(r, &view, grid, &counts)
+            cmd_count(r, &view, grid, options, &counts)
         })?;
         stages.extend(time.stages);
         let measured: BuildStatus = first(gpu, &head, status)?;
@@ -63,11 +63,10 @@ impl Tree {
         let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
 
         // Which candidates are entries.
-        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, options, &capacity))?;
+        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         let (filter_buffer, filter) = filter_buffer;
         if let Some(filter) = &filter {
-            let ((), time) =
-                gpu.run("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, capacity.candidates, &counts, filter))?;
+            let ((), time) = gpu.run("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
             stages.extend(time.stages);
             capacity.entries = first(gpu, &filter_buffer, filter.entries)?;
         }

@@ -17,7 +17,7 @@ pub(crate) struct Expected {
     pub sizes: Sizes,
     /// The level that the heuristic alone chooses.
     pub heuristic: u32,
-    /// Where the candidates of every tetrahedron begin, and behind them their number.
+    /// Where the candidates of every tetrahedron begin, or shares of 32 where they are filtered, and behind them their number.
     pub offsets: Vec<u32>,
     /// Sorted codes.
     pub codes: Vec<u32>,
@@ -53,8 +53,9 @@ impl Expected {
 
         let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: Assign::Aabb, marks: None };
         let mut offsets = vec![0];
-        offsets.extend(stage.count().iter().scan(0u32, |sum, n| {
-            *sum += n;
+        let share = if options.assign == Assign::Aabb && options.lists == Lists::All { 1 } else { 32 };
+        offsets.extend(stage.count().iter().scan(0u32, |sum, n: &u32| {
+            *sum += n.div_ceil(share);
             Some(*sum)
         }));
         let stage = Stage { assign: options.assign, ..stage };

@@ -6,8 +6,9 @@ use super::candidates::Best;
 use super::grid::{Grid, MAX_LEVEL, canonical, morton};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
-use super::walk::{HINTED, Room, Walked, Walker};
+use super::walk::{HINTED, Room, STRIDE, Walked, Walker};
 use crate::mesh::{Field, Mesh, On};
+use crate::options::Lists;
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
@@ -153,6 +154,12 @@ impl<'a> Locator<'a> {
         Some(self.walker().walk(seed, &self.room(cell), x))
     }
 
+    /// The cell that holds `p` clearly, if it is `hint` or at most `most` steps across faces away from it.
+    pub fn stride_to(&self, p: [f32; 3], hint: u32, most: u32) -> Option<Location> {
+        let (_, x) = place(&self.tree.grid, p)?;
+        Some(self.location(self.walker().stride_to(hint, x, most)?, x))
+    }
+
     /// The cell of a leaf, from one of its finest cells.
     fn room(&self, finest: [u32; 3]) -> Room {
         let (grid, level) = (&self.tree.grid, self.tree.grid.level);
@@ -162,18 +169,19 @@ impl<'a> Locator<'a> {
 
     /// The owner among the primitives of a leaf, listed or not.
     fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3, hint: u32) -> Location {
-        let best = if let Some(seed) = self.tree.seed(leaf) {
-            let mut hinted = Walked::default();
-            if hint != NONE && self.walker().towards(hint, x, HINTED, &mut hinted) {
-                hinted.best
-            } else {
-                self.walker().walk(seed, &self.room(finest), x).best
-            }
-        } else {
-            self.listed(leaf, x)
-        };
+        let best = self.walked(leaf, finest, x, hint).unwrap_or_else(|| self.listed(leaf, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
+    }
+
+    /// By a stride from a hint (or [`NONE`]) or from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh.
+    fn walked(&self, leaf: u32, finest: [u32; 3], x: Vec3, hint: u32) -> Option<Best> {
+        let list = self.tree.primitives(leaf);
+        let middle = *list.get(list.len() / 2).filter(|_| self.tree.lists == Lists::Boundary)?;
+        let walker = self.walker();
+        let strode = walker.stride_to(hint, x, HINTED).or_else(|| walker.stride_to(middle, x, STRIDE));
+        let walk = |seed| walker.walk(seed, &self.room(finest), x).best;
+        strode.map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk))
     }
 
     /// The best of a leaf's list, up to the first that contains x.

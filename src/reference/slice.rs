@@ -2,7 +2,7 @@
 
 use super::boundary::{NONE, Topology};
 use super::leaf_walk::{meets, reached_cells, walk_leaves};
-use super::locate::{Location, Locator, place};
+use super::locate::{Location, Locator};
 use super::separate::{Closest, box_square, box_touches, closest, touch_slack};
 use super::tet::{Tet, Vec3, sub};
 use crate::error::Result;
@@ -77,7 +77,7 @@ impl<'a> Slicer<'a> {
         (begin..end)
             .map(|x| {
                 let centre = self.voxels.centre([x, y, layer]);
-                let location = self.walk(centre, hint).unwrap_or_else(|| self.locator.locate(centre));
+                let location = self.locator.stride_to(centre, hint, WALK).unwrap_or_else(|| self.locator.locate(centre));
                 hint = location.owner;
                 match location.found() {
                     Some(owner) => Voxel { value: self.value(&location), kind: INSIDE, owner },
@@ -85,28 +85,6 @@ impl<'a> Slicer<'a> {
                 }
             })
             .collect()
-    }
-
-    /// The cell that holds `p` clearly, if it is `hint` or a short walk across faces away from it.
-    fn walk(&self, p: [f32; 3], hint: u32) -> Option<Location> {
-        let (_, x) = place(&self.tree.grid, p)?;
-        let mut cell = hint;
-        for _ in 0..WALK {
-            let ids = *self.mesh.tets.get(cell as usize)?;
-            let tet = Tet::new(ids, &self.normalised);
-            let weights = tet.weights(x);
-            if weights.clear {
-                return Some(Location { owner: cell, barycentric: weights.barycentric(tet.rank) });
-            }
-            let own = tet.rank.map(|r| weights.w[r]);
-            let face = (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face });
-            let next = self.topology.neighbours[cell as usize][face];
-            if own[face] >= 0.0 || next == NONE {
-                return None;
-            }
-            cell = next;
-        }
-        None
     }
 
     fn value(&self, location: &Location) -> f32 {

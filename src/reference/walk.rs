@@ -6,6 +6,8 @@
 //!    crosses interior faces only, and each of them nearer to x than the one before. Rounding can still mislead where it meets an edge, so
 //! 3. the same again by way of other points of the cell, whose two segments meet other edges.
 //!
+//! Before all that, a *stride*: part 1 without a look at anything but cells that hold x clearly, as most points are held.
+//!
 //! Each part is bounded. Where all of them fail, the best of the tetrahedra in which they ended is the answer: no point is lost. A walk that comes
 //! near to x ends with the *star* of x: the tetrahedra reached across faces that x is so near to that rounding could put it on either side. The
 //! owner is chosen among them, so it does not depend on the way.
@@ -13,15 +15,17 @@
 use super::boundary::NONE;
 use super::candidates::Best;
 use super::grid::reciprocal;
-use super::tet::{Tet, Vec3, Weights};
+use super::tet::{Tet, Vec3, Weights, sides_of};
 use crate::mesh::Mesh;
 
 /// Most tetrahedra of a star.
 pub const STAR: usize = 128;
 /// Most steps of part 1.
 pub const STEPS: u32 = 512;
-/// Most steps from a hint.
+/// Most steps of a stride from a hint.
 pub const HINTED: u32 = 16;
+/// Most steps of a stride through a leaf.
+pub const STRIDE: u32 = 64;
 /// Most steps along one segment.
 pub const LEG: u32 = 1024;
 /// Points to go by, the first being x itself.
@@ -49,6 +53,11 @@ pub struct Walked {
     pub steps: u32,
     /// Points gone by, 0 if the first part was enough.
     pub detours: u32,
+}
+
+/// The face that says outside most.
+pub fn outermost(own: [f32; 4]) -> usize {
+    (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face })
 }
 
 /// Walks through one mesh.
@@ -96,10 +105,35 @@ impl Walker<'_> {
         best.inside || (best.in_box && best.smallest >= GAP)
     }
 
-    /// Part 1, from `t` for at most `most` steps; whether the owner is settled.
-    pub fn towards(&self, mut t: u32, x: Vec3, most: u32, walked: &mut Walked) -> bool {
-        let mut arrivals = 0;
+    /// Goes from `t` to the tetrahedron that holds x clearly, if it is not far.
+    pub fn stride_to(&self, mut t: u32, x: Vec3, most: u32) -> Option<u32> {
+        let mut cell = *self.mesh.tets.get(t as usize)?;
+        let mut ids = cell;
+        let mut v = ids.map(|id| self.normalised[id as usize]);
+        let xor = |ids: [u32; 4]| ids.iter().fold(0, |a, b| a ^ b);
         for _ in 0..most {
+            let at = sides_of(v, x);
+            if at.clear {
+                return Some(t);
+            }
+            let face = outermost(at.w);
+            let left = ids[face];
+            if at.w[face] >= 0.0 {
+                break;
+            }
+            t = self.neighbours[t as usize][cell.iter().position(|&id| id == left).unwrap_or(3)];
+            // Three corners are shared; the fourth takes the place of the one left behind.
+            cell = *self.mesh.tets.get(t as usize)?;
+            ids[face] = xor(cell) ^ xor(ids) ^ left;
+            v[face] = self.normalised[ids[face] as usize];
+        }
+        None
+    }
+
+    /// Part 1, from `t`; whether the owner is settled.
+    fn towards(&self, mut t: u32, x: Vec3, walked: &mut Walked) -> bool {
+        let mut arrivals = 0;
+        for _ in 0..STEPS {
             walked.steps += 1;
             let (tet, weights) = self.weights(t, x);
             if weights.clear {
@@ -113,7 +147,7 @@ impl Walker<'_> {
                 }
             }
             let own = tet.rank.map(|r| weights.w[r]);
-            let face = (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face });
+            let face = outermost(own);
             let next = self.neighbours[t as usize][face];
             if own[face] >= 0.0 || next == NONE {
                 break;
@@ -152,7 +186,7 @@ impl Walker<'_> {
     /// Walks to a point x of a cell that is full of mesh, from its seed.
     pub fn walk(&self, seed: u32, room: &Room, x: Vec3) -> Walked {
         let mut walked = Walked::default();
-        if self.towards(seed, x, STEPS, &mut walked) {
+        if self.towards(seed, x, &mut walked) {
             return walked;
         }
         for k in 0..DETOURS {

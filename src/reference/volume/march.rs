@@ -4,6 +4,7 @@ use super::Scene;
 use crate::mesh::On;
 use crate::reference::boundary::NONE;
 use crate::reference::tet::Tet;
+use crate::reference::walk::outermost;
 use crate::render::Plan;
 
 /// Steps of a walk across faces before the tree is asked.
@@ -92,9 +93,8 @@ impl<'a> Marcher<'a> {
                     self.cell = Some(cell);
                     return Some((cell, weights.barycentric(cell.tet.rank)));
                 }
-                // On through the face that says outside most.
                 let own = cell.tet.rank.map(|r| weights.w[r]);
-                let face = (1..4).fold(0, |best, i| if own[i] < own[best] { i } else { best });
+                let face = outermost(own);
                 let next = self.scene.topology.neighbours[cell.id as usize][face];
                 if own[face] >= 0.0 || next == NONE {
                     break;
