@@ -150,6 +150,15 @@ fn heading(report: &Report) -> String {
     )
 }
 
+/// What was not measured, and why.
+fn notes(report: &Report) -> String {
+    let skipped = report
+        .meshes
+        .iter()
+        .flat_map(|m| m.skipped.iter().map(move |(name, why)| format!("{name} over {}: not measured: {why}\n", m.name)));
+    skipped.fold(String::new(), |text, line| text + "\n" + &line)
+}
+
 /// The main tables for a terminal.
 pub fn text(report: &Report) -> String {
     let mut text = heading(report);
@@ -165,7 +174,7 @@ pub fn text(report: &Report) -> String {
             let _ = writeln!(text, "{}", line.trim_end());
         }
     }
-    text
+    text + &notes(report)
 }
 
 /// All tables as Markdown.
@@ -177,7 +186,7 @@ pub fn markdown(report: &Report) -> String {
             let _ = writeln!(text, "| {} |", row.join(" | "));
         }
     }
-    text
+    text + &notes(report)
 }
 
 #[cfg(test)]
