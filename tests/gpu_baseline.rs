@@ -29,12 +29,25 @@ impl Both {
     }
 }
 
-/// All degenerate meshes, a jittered grid, and more equal cells than a dispatch can look at.
+/// Numbers from 0 to 1, always the same.
+fn random() -> impl FnMut() -> f32 {
+    let mut state = 1u32;
+    move || {
+        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
+        (state >> 8) as f32 / 16_777_216.0
+    }
+}
+
+/// All degenerate meshes, a jittered grid, and more cells in one place than a dispatch can look at: equal ones, and different ones, of which none
+/// may be passed over.
 fn meshes() -> Vec<(&'static str, Mesh)> {
     let mut meshes: Vec<_> = cases().unwrap().into_iter().map(|c| (c.name, c.mesh)).collect();
     meshes.push(("jittered", kuhn_jittered([9, 8, 7], 0.3, 5).unwrap()));
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     meshes.push(("identical-9000", Mesh::new(one.points.clone(), vec![one.tets[0]; 9_000])));
+    let mut random = random();
+    let crossing = (0..4 * 1500).map(|_| [random(), random(), random()]).collect();
+    meshes.push(("crossing", Mesh::new(crossing, (0..1500).map(|i| [0, 1, 2, 3].map(|k| 4 * i + k)).collect())));
     meshes
 }
 
@@ -87,11 +100,7 @@ fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
     let (lo, hi) = mesh.points.iter().fold(([0f32; 3], [1f32; 3]), |(lo, hi), p| {
         if p.iter().all(|x| x.abs() < 1e37) { ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))) } else { (lo, hi) }
     });
-    let mut state = 1u32;
-    let mut random = || {
-        state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);
-        (state >> 8) as f32 / 16_777_216.0
-    };
+    let mut random = random();
     points.extend((0..2000).map(|_| [0, 1, 2].map(|c| lo[c] + (random() * 1.2 - 0.1) * (hi[c] - lo[c]))));
     points.extend([[f32::NAN; 3], [f32::INFINITY; 3], [1e38; 3], [-1e38, 1.0, 1.0]]);
     points
@@ -115,22 +124,29 @@ fn check_owners(name: &str, b: &Both) {
 
 /// Few pixels and voxels where each looks at thousands of cells, in many dispatches, or has thousands of samples.
 fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
-    if name.starts_with("identical") || name == "very-far" { [4, 3] } else { size }
+    if name.starts_with("identical") || name == "very-far" {
+        [4, 3]
+    } else if name == "crossing" {
+        [12, 9]
+    } else {
+        size
+    }
 }
 
-/// A picture of the first coordinate, if there is something to see.
+/// Pictures of numbers of points and cells, if there is something to see.
 fn check_picture(name: &str, b: &Both) -> u64 {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     let bounds = Bounds { lo: three(b.device.grid().lo), hi: three(b.device.grid().hi) };
-    let field = Field { name: "x".into(), on: On::Points, values: b.mesh.points.iter().map(|p| p[0]).collect() };
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
     let mut found = 0;
-    for camera in ["iso", "azimuth=100,elevation=-10,zoom=1.5"] {
+    for (camera, on, n) in [("iso", On::Points, b.mesh.points.len()), ("azimuth=100,elevation=-10,zoom=1.5", On::Cells, b.mesh.tets.len())]
+    {
+        let field = Field { name: "number".into(), on, values: (0..n).map(|i| (i % 17) as f32).collect() };
         let settings = RenderSettings { size: size(name, [28, 20]), camera: camera.parse().unwrap(), ..RenderSettings::default() };
         let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
         let Ok(prepared) = Prepared::new(&settings, &b.mesh, &bounds, &neighbours, valid, &field) else { continue };
         let draw = |structure: Structure| {
-            query::render(&b.device, structure, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), &|_, _| {}).unwrap()
+            query::render(&b.device, structure, &prepared.plan, (&field.values, on), Some(&prepared.normals), &|_, _| {}).unwrap()
         };
         let (expected, drawn) = (draw((&b.tree).into()), draw((&b.lbvh).into()));
         assert_eq!(expected.found_samples, drawn.found_samples, "{name}, {camera}: samples in the mesh");
