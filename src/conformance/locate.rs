@@ -13,6 +13,9 @@ use crate::reference::boundary::{NONE, topology};
 use crate::reference::build::build;
 use crate::reference::locate::{Location, Locator};
 
+/// Meshes with cells turned over, 93 of 10,296 here: they overlap their neighbours' neighbours.
+const OVERLAPPING: [&str; 1] = ["jitter-12x13x11"];
+
 /// How points are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum How {
@@ -146,8 +149,10 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
             if let Some(i) = first.owners[..inside].iter().position(|&o| o == NONE) {
                 return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
             }
+            // Where cells overlap, only lists name the lowest of those that contain a point (SPEC 3.1).
+            let kinds = if OVERLAPPING.contains(&case.mesh.name) { vec![Lists::All] } else { Lists::EVERY.to_vec() };
             for alpha in [0.0, 1.0, 2.0, 4.0] {
-                for (assign, lists) in Assign::ALL.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
+                for (assign, &lists) in Assign::ALL.into_iter().flat_map(|assign| kinds.iter().map(move |lists| (assign, lists))) {
                     let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, lists, ..options })?;
                     let found = locate(&device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
                     compare(
