@@ -14,6 +14,15 @@ use std::{env, fs, process, thread};
 
 const GLSL: &str = "glsl";
 
+/// A shader of somebody else's, to see that `glsl/olbvh.glsl` compiles.
+const FOREIGN: &str = "#version 460
+#define OLBVH_TRAVERSE
+#include \"olbvh.glsl\"
+bool visit_node(Node node) { return true; }
+bool visit_leaf(Node node) { return false; }
+void main() { olbvh_open(uvec2(0u)); }
+";
+
 fn main() {
     println!("cargo:rerun-if-changed={GLSL}");
     println!("cargo:rerun-if-changed=build");
@@ -39,6 +48,9 @@ fn generate(out: &Path) -> Result<(), String> {
     });
     let interfaces = [left??, right?].concat();
     write(&out.join("kernels.rs"), &kernels_source(&interfaces))?;
+    for descriptors in [false, true] {
+        compile(FOREIGN, "foreign.comp", descriptors, false)?;
+    }
     write(&out.join("olbvh.glsl"), &export::export(Path::new(GLSL))?)?;
     write(&out.join("layout.rs"), &layout_source()?)
 }

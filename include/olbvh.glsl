@@ -374,6 +374,33 @@ bool olbvh_near(olbvh_Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
 
+// The face that says outside most.
+uint olbvh_outermost(vec4 own) {
+    uint face = 0u;
+    for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+    return face;
+}
+
+// What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
+struct olbvh_Sides {
+    vec4 w;     // as in Weights, opposite to the vertices in the caller's order
+    bool clear; // as in Weights
+};
+
+olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
+    precise vec3 a = v0 - olbvh_p, b = v1 - olbvh_p, c = v2 - olbvh_p, d = v3 - olbvh_p;
+    vec3 ab = olbvh_cross_product(a, b), cd = olbvh_cross_product(c, d);
+    vec4 w = vec4(olbvh_dot_product(cd, b), -olbvh_dot_product(cd, a), olbvh_dot_product(ab, d), -olbvh_dot_product(ab, c));
+    precise float sum = (w.x + w.y) + (w.z + w.w);
+    olbvh_Sides r;
+    r.w = sum < 0.0 ? -w : w;
+    vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
+    precise vec3 size = hi - lo;
+    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
+    return r;
+}
+
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; the smallest float for a flat cell.
@@ -474,8 +501,7 @@ uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
     if (best.owner == olbvh_NONE || best.inside) return best.owner;
     return !olbvh_is_boundary_node(leaf) || best.olbvh_smallest >= -tolerance ? best.owner : olbvh_NONE;
 }
-// Point location in a leaf without list. Twin of `in_leaf` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and
-// neighbours.
+// Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and neighbours.
 
 // Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
 
@@ -496,11 +522,41 @@ vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
 // candidates.glsl, cells and neighbours.
 const uint olbvh_STAR = 128u;    // tetrahedra of a star
 const uint olbvh_STEPS = 512u;   // of part 1
-const uint olbvh_HINTED = 16u;   // from a hint
+const uint olbvh_HINTED = 16u;   // of a stride from a hint
+const uint olbvh_STRIDE = 64u;   // of a stride through a leaf
 const uint olbvh_LEG = 1024u;    // along one segment
 const uint olbvh_DETOURS = 8u;   // points to go by
 const uint olbvh_ARRIVALS = 2u;  // stars that part 1 looks at
 const float olbvh_GAP = -7.62939453125e-6; // -2^-17
+
+// The hot part of a walk (SPEC 2.6). Twin of `stride_to` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
+
+uint olbvh_xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
+
+// Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.
+bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
+    if (t == olbvh_NONE) return false;
+    uvec4 cell = olbvh_cells.at[t], ids = cell;
+    vec3 v0 = olbvh_vertices.at[ids.x].xyz, v1 = olbvh_vertices.at[ids.y].xyz, v2 = olbvh_vertices.at[ids.z].xyz, v3 = olbvh_vertices.at[ids.w].xyz;
+    for (uint s = 0u; s < most; ++s) {
+        olbvh_Sides at = olbvh_sides_of(v0, v1, v2, v3, x);
+        if (at.clear) return true;
+        uint face = olbvh_outermost(at.w), left = ids[face];
+        if (at.w[face] >= 0.0) break;
+        t = olbvh_neighbours.at[t][cell.x == left ? 0u : cell.y == left ? 1u : cell.z == left ? 2u : 3u];
+        if (t == olbvh_NONE) break;
+        // Three corners are shared; the fourth takes the place of the one left behind.
+        cell = olbvh_cells.at[t];
+        uint fresh = olbvh_xor_of(cell) ^ olbvh_xor_of(ids) ^ left;
+        ids[face] = fresh;
+        vec3 v = olbvh_vertices.at[fresh].xyz;
+        if (face == 0u) v0 = v;
+        else if (face == 1u) v1 = v;
+        else if (face == 2u) v2 = v;
+        else v3 = v;
+    }
+    return false;
+}
 
 // Cell of a leaf in normalised coordinates.
 struct olbvh_Room {
@@ -559,8 +615,7 @@ bool olbvh_walk_towards(uint t, vec3 x, uint most, inout olbvh_Best best) {
             if (olbvh_settled(best) || ++arrivals == olbvh_ARRIVALS) break;
         }
         vec4 own = olbvh_own_weights(w, tet);
-        uint face = 0u;
-        for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
+        uint face = olbvh_outermost(own);
         if (own[face] >= 0.0) break;
         t = olbvh_neighbours.at[t][face];
         if (t == olbvh_NONE) break;
@@ -623,14 +678,25 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
 // Whether a leaf is one to walk through: full of mesh, its list left out.
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
-// The owner of x, the normalised point `at`, from a hint (or NONE) or the leaf's seed.
-olbvh_Best olbvh_walk_in(olbvh_Grid g, uint seed, uint hint, vec3 at, vec3 x) {
+// The owner of x, the normalised point `at`, in a leaf with these entries: by a stride from a hint (or NONE) or from the middle of the list; where that
+// fails, by a whole walk if the leaf is full of mesh. None, if its list must be searched.
+olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, uint hint, vec3 at, vec3 x) {
     olbvh_Best best = olbvh_no_best();
-    if (hint != olbvh_NONE && olbvh_walk_towards(hint, x, olbvh_HINTED, best)) return best;
-    olbvh_Room room;
-    room.half_size = olbvh_half_cell(g, g.level);
-    room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-    return olbvh_walk_from_seed(seed, room, x);
+    if (olbvh_LISTS == 0u || range.x >= range.y) return best;
+    uint t = hint;
+    bool found = hint != olbvh_NONE && olbvh_stride_to(t, x, olbvh_HINTED);
+    if (!found) {
+        t = olbvh_p.at[range.x + (range.y - range.x) / 2u];
+        found = olbvh_stride_to(t, x, olbvh_STRIDE);
+    }
+    if (found) best = olbvh_Best(t, true, true, 0.0);
+    if (!found && !olbvh_is_boundary_node(leaf)) {
+        olbvh_Room room;
+        room.half_size = olbvh_half_cell(g, g.level);
+        room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+        best = olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
+    }
+    return best;
 }
 
 // Names the tree that the functions below mean.
@@ -661,9 +727,8 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (leaf == olbvh_NONE) return olbvh_NONE;
     vec3 x = olbvh_normalise(g, place);
     uvec2 range = olbvh_entry_range(leaf);
-    olbvh_Best best = olbvh_no_best();
-    if (olbvh_walks_in(leaf, range)) best = olbvh_walk_in(g, olbvh_p.at[range.x], olbvh_NONE, place, x);
-    else olbvh_search(best, range.x, range.y, x);
+    olbvh_Best best = olbvh_walked(g, leaf, range, olbvh_NONE, place, x);
+    if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, x);
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
     olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[owner]);
@@ -683,7 +748,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uvec2 range = olbvh_entry_range(leaf);
     bool by_walk = olbvh_walks_in(leaf, range);
     if (by_walk) {
-        olbvh_Best first = olbvh_walk_in(g, olbvh_p.at[range.x], olbvh_NONE, place, x), unused = olbvh_no_best();
+        olbvh_Best first = olbvh_walked(g, leaf, range, olbvh_NONE, place, x), unused = olbvh_no_best();
         olbvh_arrive(first.owner, x, unused);
         range = uvec2(0u, olbvh_star_size);
     }
