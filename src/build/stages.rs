@@ -89,7 +89,6 @@ pub(crate) fn cmd_filter(
         if let Some(marks) = filter.marks {
             r.fill(marks, 0);
         }
-        r.barrier("codes.scan → filter.shares");
         let shares = Count::device(filter.most, scratch.total);
         let groups = shares.groups(r, workgroup, filter.arguments, "filter.shares → codes.filter")?;
         let arguments = Filter {
