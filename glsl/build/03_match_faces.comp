@@ -58,11 +58,12 @@ void main() {
             uint me = (4u * t + f) | (positive ? SIDE : 0u);
             uint h = mix_bits(face.y ^ mix_bits(face.z));
             uint near_base = min(face.x * near_slots, slots - near_slots);
-            uint high, low;
-            umulExtended(mix_bits(h ^ face.x), slots, high, low);
             uint probe = 0u;
             for (; probe < MAX_PROBES; ++probe) {
-                uint slot = probe < NEAR_PROBES ? near_base + (h + probe) % near_slots : (high + probe) % slots;
+                // Anywhere anew at each probe: where the faces of many vertices crowd, long stretches of the table are full.
+                uint anywhere, low;
+                umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, anywhere, low);
+                uint slot = probe < NEAR_PROBES ? near_base + (h + probe) % near_slots : anywhere;
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
                 uint other_face = other & ~SIDE;
