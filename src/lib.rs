@@ -39,7 +39,7 @@ pub mod baseline;
 pub mod bench;
 pub mod build;
 #[cfg(feature = "capi")]
-pub mod capi;
+mod capi;
 pub mod conformance;
 pub mod error;
 #[cfg(feature = "formats")]

@@ -3,8 +3,9 @@
 //!
 //! Functions return 0 or the code of an error, whose text [`olbvh_last_error`] gives. No panic crosses the border. A handle keeps what it was made
 //! from alive, so the order of freeing means nothing. One handle may be used by many threads at a time.
+//!
+//! Not for Rust, where a pointer cannot be trusted as a C caller's must be: the module is private, and its functions reach C by their names.
 #![allow(unsafe_code, reason = "the border to C")]
-#![allow(clippy::not_unsafe_ptr_arg_deref)]
 
 mod host;
 

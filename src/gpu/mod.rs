@@ -1,4 +1,4 @@
-//! The Vulkan layer, and the only folder with `unsafe`: device, memory, pipelines, and the recorder of commands.
+//! The Vulkan layer, the only folder with `unsafe` but for the border to C: device, memory, pipelines, and the recorder of commands.
 #![allow(unsafe_code)]
 
 mod acceleration;

@@ -114,7 +114,7 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
     Ok(())
 }
 
-/// The commit of the sources that this program was built from, if they are still there and under Git.
+/// The commit that the sources of this program are at now, if they are still there and under Git; `-dirty` with changes that are not committed.
 fn commit() -> Option<String> {
     let told = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"]).output().ok()?;
     let name = String::from_utf8(told.stdout).ok()?.trim().to_owned();
