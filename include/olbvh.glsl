@@ -236,6 +236,8 @@ uint olbvh_LISTS;
 
 const uint olbvh_MAX_LEVEL = 10u;
 
+float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
+
 // x without denormals.
 float olbvh_canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
@@ -255,8 +257,8 @@ uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
 vec3 olbvh_normalise(olbvh_Grid g, vec3 x) {
     precise vec3 unit = olbvh_from_corner(g, x) * g.scale;
     unit = vec3(olbvh_canonical(unit.x), olbvh_canonical(unit.y), olbvh_canonical(unit.z));
-    precise vec3 whole = floor(unit * uintBitsToFloat((82u + 127u) << 23));
-    precise vec3 r = whole * uintBitsToFloat((127u - 42u) << 23);
+    precise vec3 whole = floor(unit * olbvh_two_to(82));
+    precise vec3 r = whole * olbvh_two_to(-42);
     return r;
 }
 
@@ -362,7 +364,7 @@ olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
     float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
     r.inside = r.in_box && vol != 0.0 && least >= 0.0;
     precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
     r.clear = r.inside && least > margin;
     r.margin = margin;
     return r;
@@ -396,7 +398,7 @@ olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
     r.w = sum < 0.0 ? -w : w;
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
     r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
     return r;
 }
@@ -504,8 +506,6 @@ uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
 // Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and neighbours.
 
 // Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
-
-float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
 vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
     precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
@@ -653,10 +653,10 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
 vec3 olbvh_room_point(olbvh_Room room, uint k) {
     vec3 olbvh_p;
     for (uint c = 0u; c < 3u; ++c) {
-        precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * uintBitsToFloat((127u - 23u) << 23) - 1.0;
+        precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * olbvh_two_to(-23) - 1.0;
         float away = k == 0u ? 0.0 : part;
         precise float at = room.centre[c] + room.half_size[c] * away;
-        precise float whole = floor(at * uintBitsToFloat((127u + 42u) << 23)) * uintBitsToFloat((127u - 42u) << 23);
+        precise float whole = floor(at * olbvh_two_to(42)) * olbvh_two_to(-42);
         olbvh_p[c] = whole;
     }
     return olbvh_p;
@@ -863,7 +863,7 @@ float olbvh_cell_side(olbvh_Grid g, uint c, uint level, uint k) {
     if (k == 0u) return g.lo[c];
     if (k == 1u << level || g.inv[c] == 0.0) return g.hi[c];
     precise float extent = g.hi[c] - g.lo[c];
-    precise float along = float(k) * uintBitsToFloat((127u - level) << 23);
+    precise float along = float(k) * olbvh_two_to(-int(level));
     precise float offset = olbvh_canonical(extent) * along;
     precise float x = g.lo[c] + offset;
     return olbvh_canonical(x);

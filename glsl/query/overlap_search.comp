@@ -44,13 +44,13 @@ uint phase;
 
 bool touches_node(Node node) {
     NodeFrame f = frame.at[0];
-    float part = power_of_two(-int(node.level));
+    float part = two_to(-int(node.level));
     precise vec3 scaled = f.half_size.xyz * part;
     vec3 size = vec3(f.flat_axis.x == 0.0 ? scaled.x : f.half_size.x, f.flat_axis.y == 0.0 ? scaled.y : f.half_size.y,
                      f.flat_axis.z == 0.0 ? scaled.z : f.half_size.z);
     precise vec3 at = f.corner.xyz + vec3(2u * unmorton(node.code) + 1u) * size;
-    precise vec3 centre = floor(at * power_of_two(42)) * power_of_two(-42);
-    precise vec3 h = size + power_of_two(18);
+    precise vec3 centre = floor(at * two_to(42)) * two_to(-42);
+    precise vec3 h = size + two_to(18);
     vec3 around[4] = vec3[4](difference(v[0], centre), difference(v[1], centre), difference(v[2], centre), difference(v[3], centre));
     return box_touches(around, vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z)), vec3(0.0));
 }

@@ -49,7 +49,7 @@ const uint MAX_VISITS = 24000u; // loop limit
 
 // In the units of the mesh, but for rounding, which the slack of the boxes covers.
 vec3 in_units(vec3 x) {
-    precise vec3 unit = x * uintBitsToFloat((127u - 40u) << 23);
+    precise vec3 unit = x * two_to(-40);
     precise vec3 r = g.lo.xyz + unit * uintBitsToFloat((254u << 23) - floatBitsToUint(g.scale));
     return r;
 }

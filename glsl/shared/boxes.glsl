@@ -4,7 +4,7 @@ float cell_side(Grid g, uint c, uint level, uint k) {
     if (k == 0u) return g.lo[c];
     if (k == 1u << level || g.inv[c] == 0.0) return g.hi[c];
     precise float extent = g.hi[c] - g.lo[c];
-    precise float along = float(k) * uintBitsToFloat((127u - level) << 23);
+    precise float along = float(k) * two_to(-int(level));
     precise float offset = canonical(extent) * along;
     precise float x = g.lo[c] + offset;
     return canonical(x);

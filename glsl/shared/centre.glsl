@@ -1,7 +1,5 @@
 // Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
 
-float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
-
 vec3 half_cell(Grid g, uint level) {
     precise vec3 cell = g.extent.xyz * two_to(-1 - int(level));
     precise vec3 whole = g.extent.xyz * 0.5;

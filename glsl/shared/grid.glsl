@@ -2,6 +2,8 @@
 
 const uint MAX_LEVEL = 10u;
 
+float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
+
 // x without denormals.
 float canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
@@ -21,8 +23,8 @@ uvec3 quantize(Grid g, vec3 x) {
 vec3 normalise(Grid g, vec3 x) {
     precise vec3 unit = from_corner(g, x) * g.scale;
     unit = vec3(canonical(unit.x), canonical(unit.y), canonical(unit.z));
-    precise vec3 whole = floor(unit * uintBitsToFloat((82u + 127u) << 23));
-    precise vec3 r = whole * uintBitsToFloat((127u - 42u) << 23);
+    precise vec3 whole = floor(unit * two_to(82));
+    precise vec3 r = whole * two_to(-42);
     return r;
 }
 

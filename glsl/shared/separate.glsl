@@ -5,8 +5,6 @@ const uvec3 SEPARATE_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0
 const uvec4 SEPARATE_EDGES[6] =
     uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
 
-float power_of_two(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
-
 vec3 difference(vec3 a, vec3 b) {
     precise vec3 r = a - b;
     return r;
@@ -23,7 +21,7 @@ vec3 touch_slack(vec3 v[4], vec3 h[3]) {
     vec3 lo = min(min(v[0], v[1]), min(v[2], v[3])), hi = max(max(v[0], v[1]), max(v[2], v[3]));
     vec3 far = max(abs(hi), abs(lo));
     precise vec3 extent = (abs(h[0]) + abs(h[1])) + abs(h[2]);
-    precise vec3 slack = (far + extent) * power_of_two(-20) + power_of_two(-42);
+    precise vec3 slack = (far + extent) * two_to(-20) + two_to(-42);
     return slack;
 }
 
@@ -94,7 +92,7 @@ bool tets_touch(vec3 a[4], vec3 b[4]) {
 // Squared distance of the tetrahedron's box to 0, scaled by 2^-42.
 float box_square(vec3 v[4]) {
     vec3 lo = min(min(v[0], v[1]), min(v[2], v[3])), hi = max(max(v[0], v[1]), max(v[2], v[3]));
-    precise vec3 d = max(max(lo, -hi), vec3(0.0)) * power_of_two(-21);
+    precise vec3 d = max(max(lo, -hi), vec3(0.0)) * two_to(-21);
     return dot_product(d, d);
 }
 
@@ -153,7 +151,7 @@ float closest(vec3 v[4], out vec4 weights_of) {
     weights_of = vec4(0.0);
     for (uint f = 0u; f < 4u; ++f) {
         uvec3 face = SEPARATE_FACES[f];
-        precise vec3 a = v[face.x] * power_of_two(-21), b = v[face.y] * power_of_two(-21), c = v[face.z] * power_of_two(-21);
+        precise vec3 a = v[face.x] * two_to(-21), b = v[face.y] * two_to(-21), c = v[face.z] * two_to(-21);
         vec3 w = closest_in_triangle(a, b, c);
         precise vec3 at = (w.x * a + w.y * b) + w.z * c;
         precise vec3 squares = at * at;

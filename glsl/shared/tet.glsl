@@ -70,7 +70,7 @@ Weights weights(Tet t, vec3 p) {
     float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
     r.inside = r.in_box && vol != 0.0 && least >= 0.0;
     precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
     r.clear = r.inside && least > margin;
     r.margin = margin;
     return r;
@@ -104,7 +104,7 @@ Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
     r.w = sum < 0.0 ? -w : w;
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * uintBitsToFloat((127u - 16u) << 23);
+    precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
     r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
     return r;
 }

@@ -106,10 +106,10 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
 vec3 room_point(Room room, uint k) {
     vec3 p;
     for (uint c = 0u; c < 3u; ++c) {
-        precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * uintBitsToFloat((127u - 23u) << 23) - 1.0;
+        precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * two_to(-23) - 1.0;
         float away = k == 0u ? 0.0 : part;
         precise float at = room.centre[c] + room.half_size[c] * away;
-        precise float whole = floor(at * uintBitsToFloat((127u + 42u) << 23)) * uintBitsToFloat((127u - 42u) << 23);
+        precise float whole = floor(at * two_to(42)) * two_to(-42);
         p[c] = whole;
     }
     return p;

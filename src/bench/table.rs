@@ -167,9 +167,10 @@ pub fn text(report: &Report) -> String {
         let widths: Vec<usize> = (0..header.len()).map(width).collect();
         let _ = writeln!(text, "\n{title}");
         for row in std::iter::once(&header).chain(&rows) {
-            let mut line = format!("  {:1$}", row[0], widths[0]);
+            let room = |cell: &str, width: usize| " ".repeat(width.saturating_sub(cell.chars().count()));
+            let mut line = format!("  {}{}", row[0], room(&row[0], widths[0]));
             for (cell, &w) in row.iter().zip(&widths).skip(1) {
-                let _ = write!(line, "  {cell:>w$}");
+                let _ = write!(line, "  {}{cell}", room(cell, w));
             }
             let _ = writeln!(text, "{}", line.trim_end());
         }

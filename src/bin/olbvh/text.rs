@@ -2,6 +2,9 @@
 
 use std::fmt::Write as _;
 
+/// Longest label that values are aligned behind; a longer one moves its own value only.
+const ALIGNED: usize = 40;
+
 /// Sections of labelled values, aligned.
 #[derive(Default)]
 pub struct Page {
@@ -23,12 +26,17 @@ impl Page {
 impl std::fmt::Display for Page {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         let valued = self.rows.iter().filter(|row| !row.1.is_empty());
-        let width = valued.map(|row| row.0.chars().count()).max().unwrap_or(0) + 2;
+        let width = valued.map(|row| row.0.chars().count()).filter(|&n| n <= ALIGNED).max().unwrap_or(0);
         for (label, value) in &self.rows {
-            if value.is_empty() { writeln!(f, "{label}")? } else { writeln!(f, "{label:width$}{value}")? }
+            if value.is_empty() { writeln!(f, "{label}")? } else { writeln!(f, "{}  {value}", padded(label, width))? }
         }
         Ok(())
     }
+}
+
+/// Text with spaces behind it up to a width.
+fn padded(text: &str, width: usize) -> String {
+    text.to_owned() + &" ".repeat(width.saturating_sub(text.chars().count()))
 }
 
 /// 12290298 as 12,290,298.
@@ -77,6 +85,17 @@ pub fn joined<T: std::fmt::Display>(values: &[T], separator: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_long_label_moves_its_own_value_only() {
+        let mut page = Page::default();
+        page.row("cells", 7);
+        page.row("points", 8);
+        page.row("x".repeat(70_000), 9);
+        let lines: Vec<String> = page.to_string().lines().map(str::to_owned).collect();
+        assert_eq!(lines[..2], ["  cells   7", "  points  8"]);
+        assert!(lines[2].ends_with("x  9"), "{}", &lines[2][69_990..]);
+    }
 
     #[test]
     fn numbers_read_well() {
