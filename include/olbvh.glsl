@@ -253,6 +253,10 @@ uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
 }
 
+// A finest cell in one word.
+uint olbvh_pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
+uvec3 olbvh_unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }
+
 // Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
 vec3 olbvh_normalise(olbvh_Grid g, vec3 x) {
     precise vec3 unit = olbvh_from_corner(g, x) * g.scale;

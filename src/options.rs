@@ -23,10 +23,10 @@ pub enum Assign {
 #[repr(u32)]
 pub enum Lists {
     /// All that the assignment puts there (the paper).
-    #[default]
     All = 0,
     /// The same in leaves that the boundary touches; in a leaf that is full of mesh one primitive, the owner of the cell's centre, from which a
     /// walk across faces finds the others. Entries grow with the mesh's surface instead of its volume.
+    #[default]
     Boundary = 1,
 }
 
@@ -89,7 +89,7 @@ pub struct BuildOptions {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, boxes: false, capacity: None }
+        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::default(), boxes: false, capacity: None }
     }
 }
 

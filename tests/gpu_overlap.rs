@@ -4,7 +4,7 @@
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{Party, overlap};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::overlap::{Side, overlap as reference};
@@ -62,7 +62,7 @@ fn everything(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     let mut hits = 0;
     for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (10.0, Assign::Planes)] {
-        let options = BuildOptions { alpha, assign, ..BuildOptions::default() };
+        let options = BuildOptions { alpha, assign, lists: Lists::All, ..BuildOptions::default() };
         let cube = Both::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap(), &options);
         for (i, scale) in [1.0, 0.3, 1.7].into_iter().enumerate() {
             let at = [0.4 + i as f32, 0.37 * i as f32 - 1.0, 1.1];
@@ -89,8 +89,9 @@ fn by_descriptors() {
 fn long_lists_take_several_submissions() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
+    let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     // A primitive that touches none of 20,000 others in its cell, and one that touches all.
-    let many = Both::new(&gpu, Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]), &BuildOptions::default());
+    let many = Both::new(&gpu, Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]), &options);
     let apart = Mesh::new(
         vec![
             [0.1, 0.5, 0.9],
@@ -104,7 +105,7 @@ fn long_lists_take_several_submissions() {
         ],
         vec![[0, 1, 2, 3], [4, 5, 6, 7]],
     );
-    let apart = Both::new(&gpu, apart, &BuildOptions::default());
+    let apart = Both::new(&gpu, apart, &options);
     check("long lists", &apart, &many);
     check("long lists", &many, &apart);
     let found = overlap(apart.party(), many.party(), true, &|_, _| {}).unwrap();

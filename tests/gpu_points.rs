@@ -7,7 +7,7 @@
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{LocateOptions, locate};
 use std::env;
 
@@ -58,7 +58,8 @@ fn point(mesh: &Mesh, cells: f32, i: usize) -> [f32; 3] {
 /// α, and how many of a thousand points its trees are asked for: lists grow with α, to thousands of cells at 4.
 const SHARES: [(f32, usize); 4] = [(0.0, 450), (1.0, 400), (2.0, 145), (4.0, 5)];
 
-/// The share of `n` points in the trees of one α and every assignment, a third each, beside a tree of α = 0: each point is located twice.
+/// The share of `n` points in the trees of one α and every assignment, a third each, with both kinds of lists, beside a tree of
+/// α = 0: each point is located three times.
 fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     let (alpha, share) = SHARES[which];
     let before: usize = SHARES[..which].iter().map(|s| s.1).sum();
@@ -67,8 +68,9 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     let side = 40;
     let mesh = kuhn_jittered([side; 3], 0.3, 11).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let build = |alpha, assign| Tree::build(&gpu, &device, &BuildOptions { alpha, assign, ..BuildOptions::default() }).unwrap();
-    let first = build(0.0, Assign::Exact);
+    let build =
+        |alpha, assign, lists| Tree::build(&gpu, &device, &BuildOptions { alpha, assign, lists, ..BuildOptions::default() }).unwrap();
+    let first = build(0.0, Assign::Exact, Lists::Boundary);
     let third = count.div_ceil(3);
     let mut located = 0;
     for (k, assign) in Assign::ALL.into_iter().enumerate() {
@@ -76,10 +78,12 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
         let points: Vec<_> = (from..(from + third).min(begin + count)).map(|i| point(&mesh, side as f32, i)).collect();
         let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners;
         let expected = find(&first);
-        let found = find(&build(alpha, assign));
-        for (i, (a, b)) in expected.iter().zip(&found).enumerate() {
-            assert_ne!(*a, u32::MAX, "point {} {:?} is lost", from + i, points[i]);
-            assert_eq!(a, b, "owner of point {} {:?} with alpha {alpha}, {assign}", from + i, points[i]);
+        for lists in Lists::EVERY {
+            let found = find(&build(alpha, assign, lists));
+            for (i, (a, b)) in expected.iter().zip(&found).enumerate() {
+                assert_ne!(*a, u32::MAX, "point {} {:?} is lost", from + i, points[i]);
+                assert_eq!(a, b, "owner of point {} {:?} with alpha {alpha}, {assign}, lists {lists}", from + i, points[i]);
+            }
         }
         located += points.len();
     }

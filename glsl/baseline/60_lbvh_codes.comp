@@ -13,7 +13,8 @@ BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, writeonly, uint, codes)
 BUFFER(5, writeonly, uint, ids)
-#include "shared/cells.glsl"
+#include "shared/positions.glsl"
+#include "shared/bad.glsl"
 
 void main() {
     uint t = item_index();

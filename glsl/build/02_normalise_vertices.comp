@@ -2,18 +2,20 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Vertices in normalised coordinates, 16 bytes each: what every query reads.
+// Vertices in normalised coordinates, which every query reads, and their finest cells, which the construction reads: 16 bytes each.
 ARGUMENTS(3)
     uint points;
     uint stride; // floats from one point to the next
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
-BUFFER16(2, writeonly, vec4, vertices)
+BUFFER16(2, writeonly, uvec4, vertices)
+#include "shared/positions.glsl"
 
 void main() {
     uint i = item_index();
     if (i >= points) return;
-    vec3 x = vec3(positions.at[i * stride], positions.at[i * stride + 1u], positions.at[i * stride + 2u]);
-    vertices.at[i] = vec4(normalise(grid.at[0], x), 0.0);
+    vec3 x = position(i, stride);
+    Grid g = grid.at[0];
+    vertices.at[i] = uvec4(floatBitsToUint(normalise(g, x)), pack_cell(quantize(g, x)));
 }

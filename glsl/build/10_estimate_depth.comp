@@ -13,7 +13,8 @@ BUFFER(1, readonly, float, positions)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, READ_WRITE, BuildStatus, status)
-#include "shared/cells.glsl"
+#include "shared/positions.glsl"
+#include "shared/bad.glsl"
 
 // 64-bit sums of the workgroup: 0 the estimates, 1 + k the entries of level k.
 shared uint low[12];
@@ -46,9 +47,9 @@ void main() {
         float largest = min(max(max(extent.x, extent.y), extent.z), 1024.0);
         uint across = uint(largest);
         sums[0].x += across == 0u ? 0u : uint(findMSB(across));
-        CellBox finest = finest_box(g, t, stride);
+        uvec3 first = quantize(g, lo), last = quantize(g, hi); // the box of the vertices' cells, since quantization is monotone
         for (uint level = 0u; level <= MAX_LEVEL; ++level) {
-            uvec3 n = coarser(finest, level).size;
+            uvec3 n = (last >> MAX_LEVEL - level) - (first >> MAX_LEVEL - level) + 1u;
             uint before = sums[1u + level].x, product = n.x * n.y * n.z;
             sums[1u + level].x = before + product;
             sums[1u + level].y += uint(before > NONE - product);

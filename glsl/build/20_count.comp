@@ -6,10 +6,9 @@
 layout(constant_id = 2) const uint SHARE = 1;
 ARGUMENTS(5)
     uint tets;
-    uint stride;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, float, positions)
+BUFFER16(1, readonly, uvec4, quantized)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, writeonly, uint, counts) // tets + 1
@@ -21,7 +20,7 @@ void main() {
     uint n = 0u;
     if (t < tets) {
         Grid g = grid.at[0];
-        uvec3 size = coarser(finest_box(g, t, stride), g.level).size;
+        uvec3 size = coarser(finest_box(t), g.level).size;
         n = size.x * size.y * size.z;
         n = n / SHARE + uint(n % SHARE != 0u);
     }

@@ -6,11 +6,10 @@
 // among small ones is no long loop.
 ARGUMENTS(8)
     uint tets;
-    uint stride;
     uint capacity;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, float, positions)
+BUFFER16(1, readonly, uvec4, quantized)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, offsets)
@@ -28,12 +27,12 @@ void main() {
     Grid g = grid.at[0];
     uint t = owner_of(first, tets);
     uint next = offsets.at[t + 1u];
-    CellBox box = coarser(finest_box(g, t, stride), g.level);
+    CellBox box = coarser(finest_box(t), g.level);
     uvec3 at = candidate(box, first - offsets.at[t]);
     for (uint i = first; i < end; ++i) {
         if (i >= next) {
             while (next <= i && t + 1u < tets) next = offsets.at[++t + 1u];
-            box = coarser(finest_box(g, t, stride), g.level);
+            box = coarser(finest_box(t), g.level);
             at = box.lo;
         }
         codes.at[i] = morton(at);

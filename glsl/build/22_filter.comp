@@ -10,11 +10,10 @@ layout(constant_id = 2) const uint ASSIGN = 1;
 layout(constant_id = 3) const uint STEP = 0;
 ARGUMENTS(12)
     uint tets;
-    uint stride;
     uint capacity; // shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, float, positions)
+BUFFER16(1, readonly, uvec4, quantized)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER16(4, readonly, vec4, vertices)
@@ -43,7 +42,7 @@ void main() {
     uint t = owner_of(share, tets);
     bool inner = STEP != LIST_ALL && (boundary.at[t >> 5u] >> (t & 31u) & 1u) == 0u;
     if (STEP == MARK && inner) return;
-    CellBox box = coarser(finest_box(g, t, stride), g.level);
+    CellBox box = coarser(finest_box(t), g.level);
     uint first = 32u * (share - offsets.at[t]);
     uint n = min(32u, box.size.x * box.size.y * box.size.z - first);
     Tet tet = load_tet(cells.at[t]);

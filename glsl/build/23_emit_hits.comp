@@ -5,12 +5,11 @@
 // Codes of all but the paper's lists, 2 of 2: the entries of the candidates that were hit.
 ARGUMENTS(10)
     uint tets;
-    uint stride;
     uint capacity; // shares
     uint room;     // entries
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, float, positions)
+BUFFER16(1, readonly, uvec4, quantized)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, offsets) // of the shares
@@ -29,7 +28,7 @@ void main() {
     if (bits == 0u) return;
     Grid g = grid.at[0];
     uint t = owner_of(share, tets);
-    CellBox box = coarser(finest_box(g, t, stride), g.level);
+    CellBox box = coarser(finest_box(t), g.level);
     uint first = 32u * (share - offsets.at[t]);
     uvec3 at = first == 0u ? box.lo : candidate(box, first);
     for (; bits != 0u && place < room; bits >>= 1) {

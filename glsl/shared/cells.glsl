@@ -1,15 +1,13 @@
-// The quantized box of a tetrahedron at a level (the paper's Eq. 5), from its vertices as the caller stores them. The including kernel declares grid,
-// positions, cells and bad.
+// The quantized box of a tetrahedron at a level (the paper's Eq. 5). The including kernel declares cells, bad, and `quantized`: the vertices, of which the
+// last word is the finest cell.
+#include "shared/bad.glsl"
+
 struct CellBox {
     uvec3 lo;   // first cell
     uvec3 size; // cells per axis; 0 for a bad tetrahedron
 };
 
-bool is_bad(uint t) { return (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u; }
-
-vec3 position(uint v, uint stride) { return vec3(positions.at[v * stride], positions.at[v * stride + 1u], positions.at[v * stride + 2u]); }
-
-CellBox finest_box(Grid g, uint t, uint stride) {
+CellBox finest_box(uint t) {
     CellBox box;
     box.lo = uvec3(0u);
     box.size = uvec3(0u);
@@ -17,7 +15,7 @@ CellBox finest_box(Grid g, uint t, uint stride) {
     uvec3 lo = uvec3(1023u), hi = uvec3(0u);
     uvec4 ids = cells.at[t];
     for (uint i = 0u; i < 4u; ++i) {
-        uvec3 q = quantize(g, position(ids[i], stride));
+        uvec3 q = unpack_cell(quantized.at[ids[i]].w);
         lo = min(lo, q);
         hi = max(hi, q);
     }

@@ -19,6 +19,10 @@ uvec3 quantize(Grid g, vec3 x) {
     return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
 }
 
+// A finest cell in one word.
+uint pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
+uvec3 unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }
+
 // Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
 vec3 normalise(Grid g, vec3 x) {
     precise vec3 unit = from_corner(g, x) * g.scale;

@@ -42,7 +42,7 @@ pub struct MeshArrays {
     pub bad: BufferRef,
     /// One bit per tetrahedron: boundary primitive.
     pub boundary: BufferRef,
-    /// 16 bytes per point: normalised coordinates.
+    /// 16 bytes per point: normalised coordinates and the finest cell.
     pub vertices: BufferRef,
     /// 16 bytes per tetrahedron: the neighbour across the face opposite to each vertex, or all ones.
     pub neighbours: BufferRef,
@@ -211,7 +211,7 @@ impl DeviceMesh {
         self.gpu.download(&self.memory, self.arrays.neighbours.part(0, 16 * u64::from(self.input.tets)))
     }
 
-    /// Normalised coordinates of every point, x, y, z and 0.
+    /// Normalised coordinates of every point, x, y, z; the bits of the last word are its finest cell, 10 bits per axis from the lowest.
     ///
     /// # Errors
     /// A failed transfer.

@@ -64,10 +64,10 @@ pub(crate) fn cmd_count(
     options: &BuildOptions,
     scratch: &CountScratch,
 ) -> Result<()> {
-    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let MeshInput { cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
     r.stage("build.count", |r| {
-        let count = CountCells { grid, positions, cells, bad: mesh.arrays.bad, counts: scratch.offsets, tets, stride };
+        let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: scratch.offsets, tets };
         let spec = CountSpec { workgroup, share: if filtered(options) { SHARE } else { 1 }, ..Default::default() };
         r.dispatch(&count, spec, Groups::Count((tets + 1).div_ceil(workgroup)))?;
         cmd_exclusive_scan(r, scratch.offsets, scratch.offsets, scratch.total, Count::host(tets + 1), &scratch.scan)
@@ -83,7 +83,7 @@ pub(crate) fn cmd_filter(
     scratch: &CountScratch,
     filter: &FilterScratch,
 ) -> Result<()> {
-    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let MeshInput { cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
     r.stage("build.filter", |r| {
         if let Some(marks) = filter.marks {
@@ -93,7 +93,7 @@ pub(crate) fn cmd_filter(
         let groups = shares.groups(r, workgroup, filter.arguments, "filter.shares → codes.filter")?;
         let arguments = Filter {
             grid,
-            positions,
+            quantized: mesh.arrays.vertices,
             cells,
             bad: mesh.arrays.bad,
             vertices: mesh.arrays.vertices,
@@ -105,7 +105,6 @@ pub(crate) fn cmd_filter(
             boundary: mesh.arrays.boundary,
             neighbours: mesh.arrays.neighbours,
             tets,
-            stride,
             capacity: filter.most,
         };
         let spec = FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() };
@@ -130,9 +129,9 @@ pub(crate) fn cmd_codes(
     filter: Option<&FilterScratch>,
     scratch: &SortedScratch,
 ) -> Result<()> {
-    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
-    let (grid, bad, offsets, candidates, codes, ids) =
-        (tree.grid, mesh.arrays.bad, counts.offsets, counts.candidates, scratch.codes, tree.p);
+    let MeshInput { cells, tets, .. } = mesh.input;
+    let (grid, quantized, bad) = (tree.grid, mesh.arrays.vertices, mesh.arrays.bad);
+    let (offsets, candidates, codes, ids) = (counts.offsets, counts.candidates, scratch.codes, tree.p);
     let target = *r.gpu().target();
     r.stage("build.emit", |r| {
         if let Some(filter) = filter {
@@ -141,7 +140,7 @@ pub(crate) fn cmd_codes(
             let (hits, places) = (filter.hits, filter.counts);
             let emit = EmitHits {
                 grid,
-                positions,
+                quantized,
                 cells,
                 bad,
                 offsets,
@@ -151,7 +150,6 @@ pub(crate) fn cmd_codes(
                 codes,
                 ids,
                 tets,
-                stride,
                 capacity: filter.most,
                 room: capacity.entries,
             };
@@ -163,7 +161,7 @@ pub(crate) fn cmd_codes(
                 scratch.emit_arguments,
                 "codes.scan → codes.emit",
             )?;
-            let emit = Emit { grid, positions, cells, bad, offsets, candidates, codes, ids, tets, stride, capacity: capacity.entries };
+            let emit = Emit { grid, quantized, cells, bad, offsets, candidates, codes, ids, tets, capacity: capacity.entries };
             r.dispatch(&emit, EmitSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
         }
         Ok(())

@@ -6,7 +6,7 @@ use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
-use crate::options::{Assign, BuildOptions};
+use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{Party, overlap};
 use crate::reference::boundary::{Topology, topology};
 use crate::reference::overlap::{Side, overlap as reference};
@@ -66,7 +66,11 @@ impl Both {
 }
 
 pub(crate) fn check(gpu: &Gpu, case: &OverlapCase) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, ..BuildOptions::default() };
+    Lists::EVERY.into_iter().try_for_each(|lists| check_lists(gpu, case, lists))
+}
+
+fn check_lists(gpu: &Gpu, case: &OverlapCase, lists: Lists) -> Verdict {
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists, ..BuildOptions::default() };
     let own = Both::new(gpu, case.mesh.mesh()?, &options)?;
     let other = match case.other {
         Other::Grid => kuhn_jittered([6, 5, 4], 0.3, 9)?,
@@ -83,7 +87,9 @@ pub(crate) fn check(gpu: &Gpu, case: &OverlapCase) -> Verdict {
 }
 
 fn compare_overlaps(a: &Both, b: &Both) -> Verdict {
-    for pairs in [false, true] {
+    // Pairs are found by lists.
+    let kinds: &[bool] = if a.host.lists == Lists::All { &[false, true] } else { &[false] };
+    for &pairs in kinds {
         let expected = reference(a.side(), b.side(), pairs);
         let found = overlap(a.party(), b.party(), pairs, &|_, _| {})?.overlap;
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };

@@ -26,10 +26,12 @@ pub(crate) fn compare_mesh(mesh: &Mesh, expected: &Topology, found: &DeviceMesh)
     // Points that are not finite have no place; no valid cell uses them.
     let vertices = Vertices::new(mesh, &expected.grid);
     let finite: Vec<bool> = mesh.points.iter().map(|p| p.iter().all(|x| x.is_finite())).collect();
-    let normalised = vertices.normalised.iter().zip(&finite).map(|(v, f)| if *f { v.map(f32::to_bits) } else { [0; 3] });
-    let on_device = found.vertices()?;
-    let on_device = on_device.iter().zip(&finite).map(|(v, f)| if *f { [v[0], v[1], v[2]].map(f32::to_bits) } else { [0; 3] });
-    compare("build.normalise_vertices", "vertices", &normalised.collect::<Vec<_>>(), &on_device.collect::<Vec<_>>())?;
+    let pack_cell = |q: [u32; 3]| q[0] | q[1] << 10 | q[2] << 20;
+    let pack = |(v, q): (&[f32; 3], &[u16; 3])| [v[0].to_bits(), v[1].to_bits(), v[2].to_bits(), pack_cell(q.map(u32::from))];
+    let placed = |words: Vec<[u32; 4]>| words.into_iter().zip(&finite).map(|(w, f)| if *f { w } else { [0; 4] }).collect::<Vec<_>>();
+    let expected_words = placed(vertices.normalised.iter().zip(&vertices.cell).map(pack).collect());
+    let words = placed(found.vertices()?.into_iter().map(|v| v.map(f32::to_bits)).collect());
+    compare("build.normalise_vertices", "vertices", &expected_words, &words)?;
     compare_one("build.match_faces", "status.zero_volume", &counts.flat, &status.zero_volume)?;
     compare_one("build.match_faces", "status.negative", &counts.negative, &status.negative)?;
     compare_one("build.match_faces", "status.overflow", &0, &status.overflow)?;

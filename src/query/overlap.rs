@@ -370,7 +370,7 @@ impl Job<'_> {
 /// the lists that they are found by.
 pub fn overlap(a: Party<'_>, b: Party<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
     if pairs && b.tree.options().lists != Lists::All {
-        return Err(Error::Invalid("pairs of cells need a tree with all lists over the second mesh".into()));
+        return Err(Error::Invalid("pairs of cells are found by lists: build the tree over the second mesh with `Lists::All`".into()));
     }
     let gpu = a.tree.gpu();
     let valid = [a, b].map(|p| p.mesh.input().tets > p.mesh.status().bad);

@@ -14,7 +14,7 @@ mod traverse;
 mod validate;
 
 use olbvh::mesh::Mesh;
-use olbvh::options::{Assign, BuildOptions};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::tree::TreeArrays;
@@ -23,7 +23,7 @@ use olbvh::tree::TreeArrays;
 const ALPHAS: [f32; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 7.25, 10.0];
 
 fn options(alpha: f32, assign: Assign) -> BuildOptions {
-    BuildOptions { alpha, assign, boxes: true, ..BuildOptions::default() }
+    BuildOptions { alpha, assign, lists: Lists::All, boxes: true, ..BuildOptions::default() }
 }
 
 fn tree(mesh: &Mesh, topology: &Topology, alpha: f32, assign: Assign) -> TreeArrays {

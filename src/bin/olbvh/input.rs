@@ -16,8 +16,8 @@ pub struct TreeArgs {
     /// build. Answers are the same.
     #[arg(long, default_value = "aabb", value_name = "aabb|planes|exact")]
     pub assign: Assign,
-    /// Which tetrahedra a leaf lists: all of them, as in the paper; or all where the surface is and elsewhere one, from which points are walked to.
-    /// Answers are the same.
+    /// Which tetrahedra a leaf lists: all where the surface is and elsewhere one, from which points are walked to; or all everywhere, as in the
+    /// paper. Answers are the same.
     #[arg(long, default_value_t = BuildOptions::default().lists, value_name = "all|boundary")]
     pub lists: Lists,
 }
