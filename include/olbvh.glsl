@@ -535,31 +535,60 @@ const float olbvh_GAP = -7.62939453125e-6; // -2^-17
 
 // The hot part of a walk (SPEC 2.6). Twin of `stride_to` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
 
+// The tetrahedron that a stride stands in.
+struct olbvh_Stand {
+    uint t;
+    uvec4 cell; // vertices in the caller's order
+    uvec4 ids;  // and as held here
+    vec3 v0, v1, v2, v3;
+};
+
+olbvh_Stand olbvh_stand_in(uint t) {
+    uvec4 ids = olbvh_cells.at[t];
+    return olbvh_Stand(t, ids, ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
+}
+
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(s.v0, s.v1, s.v2, s.v3, x); }
+
+// The first of the smallest. (As a mask: where vectors are indexed by a variable, compilers put them into memory.)
+bvec4 olbvh_outermost_of(vec4 w) {
+    bvec4 least = equal(w, vec4(min(min(w.x, w.y), min(w.z, w.w))));
+    return bvec4(least.x, least.y && !least.x, least.z && !(least.x || least.y), !(least.x || least.y || least.z));
+}
+
 uint olbvh_xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
+
+// One step through the face that says outside most; false, and nowhere, if none does or there is nothing behind it.
+bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
+    bvec4 out_most = olbvh_outermost_of(at.w);
+    uint left = olbvh_xor_of(mix(uvec4(0u), s.ids, out_most));
+    if (min(min(at.w.x, at.w.y), min(at.w.z, at.w.w)) >= 0.0) return false;
+    s.t = olbvh_neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
+    if (s.t == olbvh_NONE) return false;
+    // Three corners are shared; the fourth takes the place of the one left behind.
+    s.cell = olbvh_cells.at[s.t];
+    uint fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
+    vec3 v = olbvh_vertices.at[fresh].xyz;
+    s.ids = mix(s.ids, uvec4(fresh), out_most);
+    s.v0 = mix(s.v0, v, bvec3(out_most.x));
+    s.v1 = mix(s.v1, v, bvec3(out_most.y));
+    s.v2 = mix(s.v2, v, bvec3(out_most.z));
+    s.v3 = mix(s.v3, v, bvec3(out_most.w));
+    return true;
+}
 
 // Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.
 bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     if (t == olbvh_NONE) return false;
-    uvec4 cell = olbvh_cells.at[t], ids = cell;
-    vec3 v0 = olbvh_vertices.at[ids.x].xyz, v1 = olbvh_vertices.at[ids.y].xyz, v2 = olbvh_vertices.at[ids.z].xyz, v3 = olbvh_vertices.at[ids.w].xyz;
-    for (uint s = 0u; s < most; ++s) {
-        olbvh_Sides at = olbvh_sides_of(v0, v1, v2, v3, x);
-        if (at.clear) return true;
-        uint face = olbvh_outermost(at.w), left = ids[face];
-        if (at.w[face] >= 0.0) break;
-        t = olbvh_neighbours.at[t][cell.x == left ? 0u : cell.y == left ? 1u : cell.z == left ? 2u : 3u];
-        if (t == olbvh_NONE) break;
-        // Three corners are shared; the fourth takes the place of the one left behind.
-        cell = olbvh_cells.at[t];
-        uint fresh = olbvh_xor_of(cell) ^ olbvh_xor_of(ids) ^ left;
-        ids[face] = fresh;
-        vec3 v = olbvh_vertices.at[fresh].xyz;
-        if (face == 0u) v0 = v;
-        else if (face == 1u) v1 = v;
-        else if (face == 2u) v2 = v;
-        else v3 = v;
+    olbvh_Stand s = olbvh_stand_in(t);
+    bool found = false;
+    for (uint k = 0u; k < most; ++k) {
+        olbvh_Sides at = olbvh_sides_of(s, x);
+        found = at.clear;
+        if (found || !olbvh_step_on(s, at)) break;
     }
-    return false;
+    t = s.t;
+    return found;
 }
 
 // Cell of a leaf in normalised coordinates.

@@ -6,7 +6,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
-use olbvh::options::{BuildOptions, TOLERANCE};
+use olbvh::options::{BuildOptions, Lists, TOLERANCE};
 use olbvh::query::{self, LocateOptions, Party, Structure};
 use olbvh::reference::boundary::NONE;
 use olbvh::render::{Bounds, Prepared, RenderSettings};
@@ -23,7 +23,7 @@ struct Both {
 impl Both {
     fn new(gpu: &Gpu, mesh: Mesh) -> Self {
         let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap();
-        let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
+        let tree = Tree::build(gpu, &device, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
         let lbvh = Lbvh::build(gpu, &device).unwrap();
         Self { mesh, device, tree, lbvh }
     }

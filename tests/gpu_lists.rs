@@ -218,7 +218,7 @@ fn overlaps() {
         let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
         let parties = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| Party { mesh: &s.device, tree });
         if lists == Lists::Boundary {
-            assert!(overlap(parties[0], parties[1], true, QUIET).is_err_and(|e| e.to_string().contains("all lists")));
+            assert!(overlap(parties[0], parties[1], true, QUIET).is_err_and(|e| e.to_string().contains("Lists::All")));
         }
         let found = overlap(parties[0], parties[1], false, QUIET).unwrap().overlap;
         (found.a, found.b)

@@ -38,23 +38,39 @@ void main() {
         if (fresh == 0u) state = states.at[i];
         uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
         uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
+        uint line = row * plan.width + begin;
+        bool stands = state.hint != NONE && state.cursor == 0u;
+        Stand stand = Stand(NONE, uvec4(0u), uvec4(0u), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+        if (stands) stand = stand_in(state.hint);
         for (uint work = 0u; state.next < count && work < budget; ++work) {
-            vec3 at = voxel_centre(plan, begin + state.next, y, k);
-            vec3 x = normalise(g, at);
-            uint owner = state.hint;
-            if (state.cursor != 0u || !near_bounds(g, at) || !stride_to(owner, x, WALK)) owner = NONE;
-            if (owner == NONE) {
-                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
-                bool ended = find_owner(search, g, at, x, tolerance, work, budget, owner);
-                state.cursor = search.cursor;
-                state.best = search.best.owner;
-                state.in_box = best_bits(search.best);
-                state.smallest = search.best.smallest;
-                if (!ended) break;
+            // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
+            uint misses = 0u;
+            for (; stands && state.next < count && work < budget; ++work) {
+                Sides sides = sides_of(stand, normalise(g, voxel_centre(plan, begin + state.next, y, k)));
+                if (sides.clear) {
+                    state.hint = stand.t;
+                    answers.at[line + state.next] = stand.t;
+                    ++state.next;
+                    misses = 0u;
+                } else {
+                    stands = ++misses < WALK && step_on(stand, sides);
+                }
             }
+            if (state.next >= count || work >= budget) break;
+            vec3 at = voxel_centre(plan, begin + state.next, y, k);
+            OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
+            uint owner;
+            bool ended = find_owner(search, g, at, normalise(g, at), tolerance, work, budget, owner);
+            state.cursor = search.cursor;
+            state.best = search.best.owner;
+            state.in_box = best_bits(search.best);
+            state.smallest = search.best.smallest;
+            if (!ended) break;
             state.hint = owner;
-            answers.at[row * plan.width + begin + state.next] = owner == NONE ? SLICE_PENDING : owner;
+            answers.at[line + state.next] = owner == NONE ? SLICE_PENDING : owner;
             ++state.next;
+            stands = owner != NONE;
+            if (stands) stand = stand_in(owner);
         }
         unfinished = uint(state.next < count);
         states.at[i] = state;

@@ -170,7 +170,7 @@ impl<'a> Assembly<'a> {
         }
         let used = self.used()?;
         let (lo, hi) = bounds(&self.points, &used);
-        let origin = self.origin(&used, lo, hi);
+        let origin = Self::origin(lo, hi);
         let points = self.convert(&used, origin)?;
         let fields = self.fields();
         let unused = used.iter().filter(|&&u| !u).count();
@@ -218,14 +218,13 @@ impl<'a> Assembly<'a> {
         self.source.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
     }
 
-    /// What to subtract on each axis: the lower bound where the mesh is small against its distance from 0 and single precision
-    /// cannot hold the coordinates as they are. Up to 16 extents away 20 bits are left for the shape.
-    fn origin(&self, used: &[bool], lo: [f64; 3], hi: [f64; 3]) -> [f64; 3] {
+    /// What to subtract on each axis: the lower bound where the mesh is small against its distance from 0, so that single precision is left for
+    /// its shape, and for points, voxels and samples within. Up to 16 extents away these keep 20 bits.
+    fn origin(lo: [f64; 3], hi: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|c| {
             let extent = hi[c] - lo[c];
             let far = lo[c].abs().max(hi[c].abs()) > 16.0 * extent && extent > 0.0;
-            let inexact = || self.points.iter().zip(used).any(|(p, &u)| u && f64::from(p[c] as f32) != p[c]);
-            if far && inexact() { lo[c] } else { 0.0 }
+            if far { lo[c] } else { 0.0 }
         })
     }
 

@@ -103,7 +103,7 @@ impl fmt::Display for Report {
         }
         if self.origin != [0.0; 3] {
             let [x, y, z] = self.origin;
-            writeln!(f, "  coordinates are kept relative to ({x}, {y}, {z}), which single precision needs here")?;
+            writeln!(f, "  coordinates are kept relative to ({x}, {y}, {z}), for precision")?;
         }
         self.warnings.iter().try_for_each(|w| writeln!(f, "  warning: {w}"))
     }

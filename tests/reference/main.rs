@@ -10,6 +10,7 @@ mod locate;
 mod oracle;
 mod overlap;
 mod slice;
+mod slice_files;
 mod traverse;
 mod validate;
 

@@ -11,7 +11,7 @@ use olbvh::reference::slice::Slicer;
 use olbvh::slicing::{Band, EMPTY, Extrapolate, INSIDE, Plane, SliceSettings, TOUCHED, Tally, VoxelGrid, bands};
 use olbvh::tree::TreeArrays;
 
-fn wide(p: [f32; 3]) -> P {
+pub fn wide(p: [f32; 3]) -> P {
     p.map(f64::from)
 }
 
@@ -27,12 +27,19 @@ fn settings() -> Vec<SliceSettings> {
     ]
 }
 
-fn bounds(tree: &TreeArrays) -> ([f32; 3], [f32; 3]) {
+pub fn bounds(tree: &TreeArrays) -> ([f32; 3], [f32; 3]) {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     (three(tree.grid.lo), three(tree.grid.hi))
 }
 
-fn slice(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, field: Option<&Field>, voxels: VoxelGrid, extrapolate: Extrapolate) -> Band {
+pub fn slice(
+    mesh: &Mesh,
+    topology: &Topology,
+    tree: &TreeArrays,
+    field: Option<&Field>,
+    voxels: VoxelGrid,
+    extrapolate: Extrapolate,
+) -> Band {
     let slicer = Slicer::new(mesh, topology, tree, field, voxels, extrapolate).unwrap();
     let mut all = Band::default();
     for rows in bands(&voxels, 100) {
@@ -124,35 +131,6 @@ fn slices_are_conservative_and_the_same_from_every_tree() {
         }
     }
     assert!(tally.inside > 1000 && tally.touched > 1000 && tally.empty > 1000, "{tally:?}");
-}
-
-/// Files of the repository, and of the meshes to develop with where they are.
-#[test]
-fn slices_of_files_are_conservative() {
-    let root = std::path::Path::new(env!("CARGO_MANIFEST_DIR"));
-    let more = root.join("../shared/meshes/self");
-    let mut files = vec![root.join("tests/data/flow_sphere_50k.vtu"), root.join("tests/data/bracket_50k.vtu")];
-    if more.is_dir() {
-        files.extend(
-            ["bracket_5k", "flow_sphere_5k", "parts_disconnected_5k", "kuhn_jitter_24"].map(|name| more.join(name).with_extension("vtu")),
-        );
-    } else {
-        eprintln!("SKIPPED: no folder {}; slices of its meshes are not tested", more.display());
-    }
-    for file in files {
-        let mesh = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap().mesh;
-        let (mesh, topology) = prepared(mesh);
-        let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
-        let (lo, hi) = bounds(&tree);
-        for settings in [
-            SliceSettings { size: [12, 9], ..SliceSettings::default() },
-            SliceSettings { plane: Plane::Normal([1.0, 2.0, -1.0]), size: [10, 8], layers: 2, ..SliceSettings::default() },
-        ] {
-            let voxels = settings.voxels(lo, hi, mesh.origin).unwrap();
-            let band = slice(&mesh, &topology, &tree, None, voxels, Extrapolate::Nearest);
-            check(&file.display().to_string(), &mesh, &topology, &tree, &voxels, &band);
-        }
-    }
 }
 
 #[test]
