@@ -6,6 +6,7 @@ mod host;
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use host::queries::Queries;
 use host::{Frame, Host};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
@@ -147,14 +148,19 @@ fn recording_neither_makes_nor_submits_nor_waits() {
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &GpuOptions::default()) }.unwrap();
     let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
     let frame = Frame::new(&gpu, &mesh);
+    let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 1000);
+    let record = |r: &mut Recorder<'_>| {
+        frame.record(r)?;
+        queries.record(r)
+    };
     let mut rehearsal = Recorder::rehearse(&gpu);
-    frame.record(&mut rehearsal).unwrap();
+    record(&mut rehearsal).unwrap();
     rehearsal.finish().unwrap();
 
     let before = CALLS.load(Relaxed);
     gpu.run("olbvh.test.frame", |r| {
         ARMED.set(true);
-        let result = frame.record(r);
+        let result = record(r);
         ARMED.set(false);
         result
     })

@@ -2,6 +2,10 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod host;
+
+use host::Frame;
+use host::queries::Queries;
 use olbvh::Error;
 use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh,
@@ -90,6 +94,28 @@ fn primitives() {
             });
         }
     }
+}
+
+#[test]
+fn queries() {
+    let mesh = kuhn_jittered([4, 3, 5], 0.3, 1).unwrap();
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let sink = gpu.buffer("olbvh.test.sink", 4096).unwrap();
+    let frame = Frame::new(&gpu, &mesh);
+    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 100);
+    let barriers = every_barrier_counts(&gpu, "slice, sets, pairs", |r| {
+        queries.record(r)?;
+        r.barrier("queries → caller");
+        let (slice, sets) = (&queries.slice, &queries.sets);
+        read(
+            r,
+            &[slice.answers, slice.values, slice.status, sets.hits[0], sets.hits[1], sets.status[0], sets.status[1], queries.found],
+            &sink,
+        );
+        Ok(())
+    });
+    assert!(barriers >= 40, "{barriers}");
 }
 
 #[test]

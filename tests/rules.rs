@@ -11,7 +11,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("layout", &[]),
     ("options", &["error"]),
     ("mesh", &["error"]),
-    ("slicing", &["error", "layout", "mesh", "options"]),
+    ("slicing", &["error", "layout", "mesh", "options", "reference"]),
     ("reference", &["error", "layout", "mesh", "options", "tree", "render", "slicing"]),
     ("tree", &["error", "layout", "mesh", "options", "reference"]),
     ("render", &["error", "layout", "mesh", "options", "reference", "tree"]),

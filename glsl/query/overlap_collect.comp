@@ -28,7 +28,7 @@ void main() {
     uint word = item_index();
     uint begin = word * 32u, hit = 0u, wait = 0u;
     if (begin < tets) {
-        uint healthy = ~bad.at[word], held = around.at[word];
+        uint healthy = status.at[0].empty != 0u ? 0u : ~bad.at[word], held = around.at[word];
         for (uint k = 0u; k < min(32u, tets - begin); ++k) {
             uint bit = 1u << k;
             if ((healthy & bit) == 0u) continue;

@@ -7,7 +7,7 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0) or written (FILL 1) behind the scanned counts. Twin of src/reference/overlap.rs.
+// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0), then written (FILL 1) behind the scanned counts; those past the capacity are not. Twin of src/reference/overlap.rs.
 layout(constant_id = 2) const uint EACH_ONCE = 1;
 layout(constant_id = 3) const uint BUDGET = 256;
 layout(constant_id = 4) const uint OWN_STRIDE = 3;
@@ -44,13 +44,21 @@ bool enters(Node node) { return meets_range(node, lo, hi); }
 void main() {
     uint t = item_index();
     uint unfinished = 0u, narrow = 0u, pairs = 0u;
-    if (t < tets && states.at[t].code != NONE) {
-        SearchState state = states.at[t];
+    SearchState state = SearchState(NONE, 0u, 0u, 0u);
+    // Nothing is written before all pairs are counted, or if 32 bits cannot number them.
+    bool waits = FILL != 0u && status.at[0].unfinished != 0u;
+    if (waits && t == 0u) unfinished = 1u;
+    if (t < tets && !waits && (FILL == 0u || status.at[0].pairs[1] == 0u)) {
+        state = states.at[t];
+        if (FILL == 0u && state.phase != 0u) state.code = NONE;
+        if (FILL != 0u && state.phase == 0u) state = SearchState(0u, 0u, 1u, 0u);
+    }
+    if (state.code != NONE) {
         Grid g = grid.at[0];
         joint = g;
         joint.lo = frame.at[0].joint_lo;
         joint.scale = frame.at[0].scale;
-        bool done = (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+        bool done = status.at[0].empty != 0u || (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
         RawTet own;
         if (!done) {
             own = own_tet(t);
@@ -104,7 +112,8 @@ void main() {
     narrow = subgroupAdd(narrow);
     pairs = subgroupAdd(pairs);
     if (subgroupElect()) {
-        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+        if (FILL == 0u && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+        if (FILL != 0u && unfinished > 0u) atomicAdd(status.at[0].unfilled, unfinished);
         if (FILL == 0u && narrow > 0u && atomicAdd(status.at[0].narrow[0], narrow) > NONE - narrow) atomicAdd(status.at[0].narrow[1], 1u);
         if (FILL == 0u && pairs > 0u && atomicAdd(status.at[0].pairs[0], pairs) > NONE - pairs) atomicAdd(status.at[0].pairs[1], 1u);
     }

@@ -30,7 +30,7 @@ BUFFER(12, READ_WRITE, OverlapStatus, status)
 void main() {
     uint i = item_index();
     uint located = 0u;
-    bool look = i < points && (used.at[i >> 5u] >> (i & 31u) & 1u) != 0u;
+    bool look = i < points && status.at[0].empty == 0u && (used.at[i >> 5u] >> (i & 31u) & 1u) != 0u;
     if (look && slice > 0u) look = places.at[i] == 0u;
     if (i < points && slice == 0u) places.at[i] = 0u;
     if (look) {

@@ -23,7 +23,7 @@ BUFFER16(3, readonly, uvec4, neighbours)
 BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, READ_WRITE, RunState, states)
 BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
-BUFFER(7, READ_WRITE, SliceStatus, status)
+BUFFER(7, READ_WRITE, SliceStatus, status) // zeroed
 STRUCTURE(8)
 #include "shared/structure_owner.glsl"
 
@@ -32,6 +32,7 @@ void main() {
     uint unfinished = 0u;
     SlicePlan plan = plans.at[0];
     uint runs = (plan.width + RUN - 1u) / RUN;
+    if (i == 0u) status.at[0].refused = plan.refused;
     if (i < rows * runs) {
         Grid g = grid.at[0];
         RunState state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
@@ -39,6 +40,7 @@ void main() {
         uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
         uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
         uint line = row * plan.width + begin;
+        for (; plan.refused != 0u && state.next < count; ++state.next) answers.at[line + state.next] = NONE;
         bool stands = state.hint != NONE && state.cursor == 0u;
         Stand stand = Stand(NONE, uvec4(0u), uvec4(0u), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
         if (stands) stand = stand_in(state.hint);
@@ -76,5 +78,5 @@ void main() {
         states.at[i] = state;
     }
     unfinished = subgroupAdd(unfinished);
-    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].locating, unfinished);
 }

@@ -26,7 +26,7 @@ BUFFER16(2, readonly, vec4, vertices)
 BUFFER16(3, readonly, SlicePlan, plans)
 BUFFER16(4, READ_WRITE, TouchState, states)
 BUFFER(5, READ_WRITE, uint, answers)
-BUFFER(6, READ_WRITE, SliceStatus, status) // of slice_locate, of this kernel
+BUFFER(6, READ_WRITE, SliceStatus, status)
 STRUCTURE(7)
 #ifndef BINARY_TREE
 BUFFER(7 + STRUCTURE_BUFFERS, readonly, uint, boundary)
@@ -119,8 +119,9 @@ void main() {
     uint i = item_index();
     uint unfinished = 0u;
     // Only once all centres have been located.
-    bool waits = status.at[0].unfinished != 0u;
+    bool waits = status.at[0].locating != 0u;
     if (waits && i == 0u) unfinished = 1u;
+    if (waits && fresh != 0u && i < voxels) states.at[i] = TouchState(0u, 0u, NONE, 3.40282347e38);
     if (!waits && i < voxels && answers.at[i] == SLICE_PENDING) {
         SlicePlan plan = plans.at[0];
         Grid g = grid.at[0];
@@ -139,5 +140,5 @@ void main() {
         }
     }
     unfinished = subgroupAdd(unfinished);
-    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[1].unfinished, unfinished);
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].touching, unfinished);
 }

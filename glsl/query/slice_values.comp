@@ -5,9 +5,10 @@
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), last part: values of a field. Twin of src/reference/slice.rs.
+// Slicing (SPEC 3.4), last part: voxels by kind, and values of a field if there is one. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint ON_CELLS = 0;
 layout(constant_id = 3) const uint LINEAR = 0;
+layout(constant_id = 4) const uint FIELD = 1;
 ARGUMENTS(8)
     uint layer;
     uint first; // number of the first row in that layer
@@ -20,13 +21,20 @@ BUFFER(3, readonly, float, field)
 BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, readonly, uint, answers)
 BUFFER(6, writeonly, float, values)
-BUFFER(7, readonly, SliceStatus, status)
+BUFFER(7, READ_WRITE, SliceStatus, status)
 
 void main() {
     uint i = item_index();
     // Only once all answers are there.
-    if (i >= voxels || (status.at[0].unfinished | status.at[1].unfinished) != 0u) return;
+    if (i >= voxels || (status.at[0].locating | status.at[0].touching) != 0u) return;
     uint answer = answers.at[i], owner = answer & ~SLICE_TOUCHED;
+    uint inside = subgroupAdd(uint(answer == owner)), empty = subgroupAdd(uint(answer == NONE)), all = subgroupAdd(1u);
+    if (subgroupElect()) {
+        if (inside > 0u) atomicAdd(status.at[0].inside, inside);
+        if (empty > 0u) atomicAdd(status.at[0].empty, empty);
+        if (inside + empty < all) atomicAdd(status.at[0].touched, all - inside - empty);
+    }
+    if (FIELD == 0u) return;
     float value = uintBitsToFloat(0x7fc00000u);
     if (answer != NONE && ON_CELLS != 0u) {
         value = field.at[owner];

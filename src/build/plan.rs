@@ -30,6 +30,8 @@ impl Capacity {
 /// The arrays of a tree in device memory (SPEC 2.5), parts of one range.
 #[derive(Clone, Copy, Debug)]
 pub struct TreeMemory {
+    /// Which cells list a primitive.
+    pub assign: Assign,
     /// Which primitives a leaf lists.
     pub lists: Lists,
     /// [`BuildStatus`]: what was built.
@@ -69,6 +71,7 @@ impl TreeMemory {
         // Leaves are not internal: what is left of the nodes bounds CO and the masks.
         let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
         Ok(Self {
+            assign: options.assign,
             lists: options.lists,
             status,
             grid,

@@ -46,7 +46,7 @@ impl Tree {
     /// [`Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
-        let (tets, lists) = (view.input.tets, options.lists);
+        let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
         let mut stages = Vec::new();
 
         // Depth and counts: the level, and the number of candidates.
@@ -78,6 +78,7 @@ impl Tree {
         let entries = entries(&capacity, &counts, filter.as_ref());
         let nothing = gpu.nothing();
         let mut memory = TreeMemory {
+            assign,
             lists,
             status,
             grid,
@@ -102,6 +103,7 @@ impl Tree {
             let (status, grid) = TreeMemory::carve_head(a)?;
             let (nodes, internal) = (u64::from(planned.nodes), u64::from(planned.internal));
             Ok(TreeMemory {
+                assign,
                 lists,
                 status,
                 grid,

@@ -42,14 +42,17 @@ impl Count {
     /// Workgroups for `per_group` items each, behind a barrier with this label. Where the device knows the number, `arguments` (12 bytes)
     /// receives them first, from a number that must be visible before.
     pub(crate) fn groups(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef, label: &'static str) -> Result<Groups> {
-        let Some(live) = self.live else {
-            r.barrier(label);
-            return Ok(Groups::Count(self.max.div_ceil(per_group)));
-        };
+        let groups = self.arguments(r, per_group, arguments)?;
+        r.barrier(label);
+        Ok(groups)
+    }
+
+    /// As [`Count::groups`], and leaves the barrier to the caller.
+    pub(crate) fn arguments(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef) -> Result<Groups> {
+        let Some(live) = self.live else { return Ok(Groups::Count(self.max.div_ceil(per_group))) };
         let words = arguments.part(0, 12);
         let spec = DispatchArgsSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
         r.dispatch(&DispatchArgs { live, groups: words, count: self.max, per_group }, spec, Groups::Count(1))?;
-        r.barrier(label);
         Ok(Groups::Indirect(words))
     }
 }

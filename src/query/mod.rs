@@ -7,8 +7,8 @@ mod volume;
 
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate, locate_all};
 pub(crate) use overlap::set_bits;
-pub use overlap::{Overlapped, Party, overlap};
-pub use slice::{SliceMemory, Sliced, slice};
+pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
+pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub use volume::{Drawn, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
@@ -63,15 +63,40 @@ macro_rules! dispatch {
 }
 use dispatch;
 
+/// How far one recording goes with work that takes as many dispatches as it takes: each looks at so many candidates per item and no more, so that no
+/// device is kept busy for seconds. What is finished is passed over.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rounds {
+    /// Dispatches recorded, one after the other.
+    pub count: u32,
+    /// Goes on where an earlier recording ended.
+    pub resume: bool,
+}
+
+impl Rounds {
+    /// That many, from the beginning.
+    pub fn begin(count: u32) -> Self {
+        Self { count, resume: false }
+    }
+
+    /// That many more.
+    pub fn resume(count: u32) -> Self {
+        Self { count, resume: true }
+    }
+}
+
 /// A mesh and what finds its cells.
 #[derive(Clone, Copy, Debug)]
-struct Searched {
-    mesh: MeshView,
-    structure: Structure,
+pub struct Searched {
+    /// The mesh.
+    pub mesh: MeshView,
+    /// What finds its cells.
+    pub structure: Structure,
 }
 
 impl Searched {
-    fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
+    /// A mesh in memory of our own.
+    pub fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
         Self { mesh: MeshView { input: *mesh.input(), arrays: *mesh.arrays() }, structure: structure.into() }
     }
 

@@ -16,6 +16,7 @@ pub use settings::{Plane, SliceSettings};
 
 use crate::error::{Error, Result};
 use crate::layout::{Grid, SlicePlan};
+use crate::reference::grid::canonical;
 
 /// Kind of a voxel that the mesh does not touch.
 pub const EMPTY: u8 = 0;
@@ -77,11 +78,11 @@ impl VoxelGrid {
         self.layer_voxels() * u64::from(self.layers)
     }
 
-    /// What the kernels and the reference need of these voxels over the mesh with grid `grid`.
+    /// Whether this is a stack of voxels at all.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there are no voxels or too many, or if their boxes are flat, not finite, or more than twice as large as the mesh.
-    pub fn plan(&self, grid: &Grid) -> Result<SlicePlan> {
+    /// [`Error::Invalid`] if there are no voxels or too many, or if they are not finite.
+    pub fn check(&self) -> Result<()> {
         let [w, h] = self.size;
         if w == 0 || h == 0 || self.layers == 0 || w.max(h).max(self.layers) > MOST {
             return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST} along each axis", self.layers)));
@@ -91,34 +92,54 @@ impl VoxelGrid {
         if vectors.iter().flatten().any(|x| !x.is_finite() || x.abs() >= 1e37) {
             return Err(Error::Invalid("voxels with coordinates that are not finite or beyond 1e37".into()));
         }
-        let two_to = |n: i32| 2f64.powi(n);
-        // Half axes in normalised coordinates, in the mesh's units, and their sum per axis.
-        let normalised =
-            self.half.map(|a| a.map(|x| ((f64::from(x) * f64::from(grid.scale) * two_to(40)) * two_to(42)).round() * two_to(-42)));
-        let sum = [0, 1, 2].map(|c| normalised.iter().map(|a| a[c].abs()).sum::<f64>());
-        if normalised.iter().any(|a| a.iter().all(|&x| x == 0.0)) {
-            return Err(Error::Invalid("voxels without volume; size and thickness must be above 0".into()));
-        }
-        if sum.iter().any(|&x| x > two_to(41)) {
-            return Err(Error::Invalid("voxels more than twice as large as the mesh; take a smaller thickness or more voxels".into()));
-        }
-        let largest = (0..3).map(|c| f64::from(grid.hi[c]) - f64::from(grid.lo[c])).fold(0.0, f64::max);
-        let reach = |c: usize| self.half.iter().map(|a| f64::from(a[c].abs())).sum::<f64>() * (1.0 + two_to(-10)) + largest * two_to(-14);
+        Ok(())
+    }
+
+    /// What the kernels and the reference need of these voxels over the mesh with grid `grid`. Twin of `glsl/query/slice_plan`.
+    pub fn over(&self, grid: &Grid) -> SlicePlan {
+        let two_to = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
+        // Twice the mesh; what is larger need not be scaled, which could overflow.
+        let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
+        let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
+        let normalise = |x: f32| {
+            let unit = if x.abs() > most { 0.0 } else { canonical(x * grid.scale) };
+            (unit * two_to(82)).round() * two_to(-42)
+        };
+        let normalised = self.half.map(|axis| axis.map(normalise));
+        let sum = |axes: &[[f32; 3]; 3], c: usize| (axes[0][c].abs() + axes[1][c].abs()) + axes[2][c].abs();
+        let flat = normalised.iter().any(|axis| axis.iter().all(|&x| x == 0.0));
+        let large = beyond || (0..3).any(|c| sum(&normalised, c) > two_to(41));
+        let largest = (0..3).map(|c| canonical(grid.hi[c] - grid.lo[c])).fold(0.0, f32::max);
+        let reach = |c: usize| sum(&self.half, c) * (1.0 + two_to(-10)) + largest * two_to(-14);
         let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-        Ok(SlicePlan {
+        SlicePlan {
             origin: pad(self.origin),
             across: pad(self.across),
             down: pad(self.down),
             up: pad(self.up),
-            half0: pad(normalised[0].map(|x| x as f32)),
-            half1: pad(normalised[1].map(|x| x as f32)),
-            half2: pad(normalised[2].map(|x| x as f32)),
-            reach: pad([0, 1, 2].map(|c| reach(c) as f32)),
-            width: w,
-            height: h,
+            half0: pad(normalised[0]),
+            half1: pad(normalised[1]),
+            half2: pad(normalised[2]),
+            reach: pad([0, 1, 2].map(reach)),
+            width: self.size[0],
+            height: self.size[1],
             layers: self.layers,
-            pad: 0,
-        })
+            refused: if large { 2 } else { u32::from(flat) },
+        }
+    }
+
+    /// As [`VoxelGrid::over`], of voxels that can be sliced.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or more than twice as large as the mesh.
+    pub fn plan(&self, grid: &Grid) -> Result<SlicePlan> {
+        self.check()?;
+        let plan = self.over(grid);
+        match plan.refused {
+            0 => Ok(plan),
+            1 => Err(Error::Invalid("voxels without volume; size and thickness must be above 0".into())),
+            _ => Err(Error::Invalid("voxels more than twice as large as the mesh; take a smaller thickness or more voxels".into())),
+        }
     }
 }
 

@@ -1,6 +1,8 @@
 //! A program with a Vulkan device of its own, and what it records every frame.
 
-#![allow(dead_code, reason = "each test uses a part")]
+#![allow(dead_code, unsafe_code, reason = "each test uses a part; a device is made by hand")]
+
+pub mod queries;
 
 use ash::vk;
 use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};

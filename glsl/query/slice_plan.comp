@@ -1,0 +1,94 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// Slicing (SPEC 3.4), before all: voxels in the units of the mesh as the kernels need them, over bounds that only the device knows. Twin of
+// `VoxelGrid::over` in src/slicing/mod.rs.
+ARGUMENTS(2)
+    float origin[3];
+    float across[3];
+    float down[3];
+    float up[3];
+    float half0[3];
+    float half1[3];
+    float half2[3];
+    uint width;
+    uint height;
+    uint layers;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, writeonly, SlicePlan, plans)
+
+vec4 wide(float a[3]) { return vec4(a[0], a[1], a[2], 0.0); }
+
+// To the nearest integer, halves away from 0. The difference to the floor is exact, which x + 0.5 is not.
+float rounded(float x) {
+    float whole = floor(abs(x));
+    precise float rest = abs(x) - whole;
+    float up_or_down = rest >= 0.5 ? whole + 1.0 : whole;
+    return x < 0.0 ? -up_or_down : up_or_down;
+}
+
+// x in normalised coordinates, in steps of 2^-42. Devices may flush denormals, so of those the mantissa is taken.
+float steps(float x, float scale) {
+    uint bits = floatBitsToUint(x);
+    if ((bits & 0x7f800000u) == 0u) {
+        precise float small = float(bits & 0x007fffffu) * (scale * uintBitsToFloat((127u - 67u) << 23));
+        return (bits & 0x80000000u) != 0u ? -small : small;
+    }
+    precise float unit = x * scale;
+    precise float many = canonical(unit) * uintBitsToFloat((82u + 127u) << 23);
+    return many;
+}
+
+void main() {
+    if (item_index() > 0u) return;
+    Grid g = grid.at[0];
+    SlicePlan plan;
+    plan.origin = wide(origin);
+    plan.across = wide(across);
+    plan.down = wide(down);
+    plan.up = wide(up);
+    plan.width = width;
+    plan.height = height;
+    plan.layers = layers;
+    // 2 / scale: a half axis beyond is larger than twice the mesh, and need not be scaled.
+    float most = uintBitsToFloat((255u << 23) - floatBitsToUint(g.scale));
+    vec4 axes[3] = vec4[3](wide(half0), wide(half1), wide(half2)), normalised[3];
+    bool flat_box = false, large = false;
+    for (uint k = 0u; k < 3u; ++k) {
+        bool nothing = true;
+        normalised[k] = vec4(0.0);
+        for (uint c = 0u; c < 3u; ++c) {
+            float x = axes[k][c];
+            if (abs(x) > most) {
+                large = true;
+                continue;
+            }
+            precise float fine = rounded(steps(x, g.scale)) * uintBitsToFloat((127u - 42u) << 23);
+            normalised[k][c] = fine;
+            nothing = nothing && fine == 0.0;
+        }
+        flat_box = flat_box || nothing;
+    }
+    float largest = 0.0;
+    plan.reach = vec4(0.0);
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float sum = (abs(normalised[0][c]) + abs(normalised[1][c])) + abs(normalised[2][c]);
+        large = large || sum > uintBitsToFloat((41u + 127u) << 23);
+        precise float extent = g.hi[c] - g.lo[c];
+        largest = max(largest, canonical(extent));
+    }
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float sum = (abs(axes[0][c]) + abs(axes[1][c])) + abs(axes[2][c]);
+        precise float far = sum * (1.0 + 1.0 / 1024.0);
+        precise float more = largest * (1.0 / 16384.0);
+        precise float reach = far + more;
+        plan.reach[c] = reach;
+    }
+    plan.half0 = normalised[0];
+    plan.half1 = normalised[1];
+    plan.half2 = normalised[2];
+    plan.refused = large ? 2u : uint(flat_box);
+    plans.at[0] = plan;
+}

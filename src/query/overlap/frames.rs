@@ -1,0 +1,47 @@
+//! What sets and pairs share: counters, and the trees of both meshes in one frame.
+
+use crate::error::Result;
+use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::kernels::{OverlapFrames, OverlapFramesSpec};
+use crate::layout::{NodeFrame, OverlapStatus};
+use crate::options::Assign;
+use crate::primitives::Arena;
+use crate::query::Scene;
+
+/// Counters of both directions, and [`NodeFrame`] of either tree.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Frames {
+    pub(super) status: [BufferRef; 2],
+    pub(super) of: [BufferRef; 2],
+}
+
+impl Frames {
+    pub(super) fn carve(arena: &mut Arena) -> Result<Self> {
+        let mut status = || arena.take(size_of::<OverlapStatus>() as u64);
+        let status = [status()?, status()?];
+        let mut frame = || arena.take(size_of::<NodeFrame>() as u64);
+        Ok(Self { status, of: [frame()?, frame()?] })
+    }
+
+    /// Into zeroed counters; no barrier.
+    pub(super) fn cmd(&self, r: &mut Recorder<'_>, a: &Scene, b: &Scene) -> Result<()> {
+        let arguments = OverlapFrames {
+            grid_a: a.tree.grid,
+            grid_b: b.tree.grid,
+            mesh_a: a.mesh.arrays.status,
+            mesh_b: b.mesh.arrays.status,
+            frame_a: self.of[0],
+            frame_b: self.of[1],
+            status_a: self.status[0],
+            status_b: self.status[1],
+            tets_a: a.mesh.input.tets,
+            tets_b: b.mesh.input.tets,
+        };
+        r.dispatch(&arguments, OverlapFramesSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
+    }
+}
+
+/// Whether two primitives meet in one leaf only, as far as the kernels are concerned: with filtered lists the cell of the corner may lack one of them.
+pub(super) fn each_once(scene: &Scene) -> u32 {
+    u32::from(scene.tree.assign == Assign::Aabb)
+}

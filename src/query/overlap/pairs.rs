@@ -1,0 +1,124 @@
+//! Pairs of primitives that intersect, recorded: counted, then written within what memory there is.
+
+use super::frames::{Frames, each_once};
+use super::sets::BUDGET;
+use crate::error::{Error, Result};
+use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::kernels::{OverlapPairs, OverlapPairsSpec};
+use crate::layout::SearchState;
+use crate::options::Lists;
+use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+use crate::query::{Rounds, Scene};
+
+/// Counters and scratch memory of pairs: 24 bytes per tetrahedron of A.
+#[derive(Clone, Copy, Debug)]
+pub struct PairMemory {
+    /// [`crate::layout::OverlapStatus`]: `pairs` touch, whether or not there was room for them.
+    pub status: BufferRef,
+    frames: Frames,
+    states: BufferRef,
+    counts: BufferRef,
+    places: BufferRef,
+    total: BufferRef,
+    scan: ScanScratch,
+}
+
+impl PairMemory {
+    /// For a first mesh of `tets` tetrahedra.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32) -> Result<Self> {
+        let n = u64::from(tets);
+        let frames = Frames::carve(arena)?;
+        Ok(Self {
+            status: frames.status[0],
+            frames,
+            states: arena.take(size_of::<SearchState>() as u64 * n)?,
+            counts: arena.words(n)?,
+            places: arena.words(n)?,
+            total: arena.words(1)?,
+            scan: ScanScratch::carve(gpu, arena, tets)?,
+        })
+    }
+}
+
+/// Records how many pairs of a primitive of A and one of B touch: [`crate::layout::OverlapStatus::pairs`], complete once `unfinished` is 0. With filtered
+/// assignments a pair counts once per leaf that lists both. Nothing is submitted, waited for, allocated or read back.
+///
+/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier before or
+/// after. With [`Rounds::resume`] it goes on with those not finished.
+///
+/// # Errors
+/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by.
+pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, rounds: Rounds) -> Result<()> {
+    if b.tree.lists != Lists::All {
+        return Err(Error::Invalid("pairs of cells are found by lists: build the tree over the second mesh with `Lists::All`".into()));
+    }
+    if !rounds.resume {
+        [memory.states, memory.frames.status[0], memory.frames.status[1]].into_iter().for_each(|part| r.fill(part, 0));
+        r.barrier("overlap.clear → overlap.frames");
+        memory.frames.cmd(r, a, b)?;
+    }
+    for round in 0..rounds.count {
+        if round > 0 {
+            r.barrier("overlap.pairs → overlap.clear");
+        }
+        if round > 0 || rounds.resume {
+            r.fill(memory.status.word(1), 0);
+        }
+        r.barrier("overlap.clear → overlap.pairs");
+        cmd_pairs(r, a, b, memory, 0, r.gpu().nothing())?;
+    }
+    Ok(())
+}
+
+/// Records the pairs themselves, behind [`cmd_count_pairs`]: two words each in `found`, the primitive of A and that of B, ascending by A, within one of A
+/// in the order of B's leaves. As many are written as `found` holds; `pairs` of the status says how many there are. If 32 bits cannot number them,
+/// none is written. Complete once [`crate::layout::OverlapStatus::unfilled`] is 0; with [`Rounds::resume`] it goes on with those not finished.
+///
+/// Begins with a barrier (with [`Rounds::resume`]: with a transfer write of the status). Last use: compute reads and writes; no barrier after.
+///
+/// # Errors
+/// [`Error::Vulkan`] if a pipeline cannot be made.
+pub fn cmd_list_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, found: BufferRef, rounds: Rounds) -> Result<()> {
+    if !rounds.resume {
+        cmd_exclusive_scan(r, memory.counts, memory.places, memory.total, Count::host(a.mesh.input.tets), &memory.scan)?;
+    }
+    for round in 0..rounds.count {
+        if round > 0 {
+            r.barrier("overlap.pairs → overlap.clear");
+        }
+        r.fill(memory.status.word(5), 0);
+        r.barrier("overlap.clear → overlap.pairs");
+        cmd_pairs(r, a, b, memory, 1, found)?;
+    }
+    Ok(())
+}
+
+fn cmd_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, fill: u32, found: BufferRef) -> Result<()> {
+    let (tree, mesh, own) = (&b.tree, &b.mesh.input, &a.mesh.input);
+    let workgroup = r.gpu().target().each;
+    let arguments = OverlapPairs {
+        grid: tree.grid,
+        masks: tree.masks,
+        co: tree.co,
+        po: tree.po,
+        p: tree.p,
+        cells: mesh.cells,
+        positions: mesh.positions,
+        own_cells: own.cells,
+        own_positions: own.positions,
+        bad: a.mesh.arrays.bad,
+        frame: memory.frames.of[1],
+        states: memory.states,
+        places: if fill == 0 { memory.counts } else { memory.places },
+        found,
+        status: memory.status,
+        tets: own.tets,
+        capacity: u32::try_from(found.size / 8).unwrap_or(u32::MAX),
+    };
+    let (each_once, stride, own_stride) = (each_once(b), mesh.stride, own.stride);
+    let spec = OverlapPairsSpec { workgroup, each_once, budget: BUDGET, own_stride, stride, fill, ..Default::default() };
+    r.stage("overlap.pairs", |r| r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(workgroup))))
+}

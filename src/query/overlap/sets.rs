@@ -1,0 +1,222 @@
+//! Sets of primitives that intersect the other mesh, recorded: both directions side by side.
+
+use super::frames::{Frames, each_once};
+use crate::error::Result;
+use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::kernels::{
+    OverlapCollect, OverlapCollectSpec, OverlapPlaces, OverlapPlacesSpec, OverlapSearch, OverlapSearchSpec, OverlapUsed, OverlapUsedSpec,
+};
+use crate::layout::SearchState;
+use crate::primitives::{Arena, Count};
+use crate::query::{Rounds, Scene};
+
+/// Nodes and entries that a primitive may look at in one dispatch.
+pub(super) const BUDGET: u32 = 512;
+/// Entries of a list that one dispatch searches for a vertex.
+const SLICE: u32 = 16_384;
+
+/// Arrays of one direction: the primitives of one mesh against the tree of the other.
+#[derive(Clone, Copy, Debug)]
+struct Arrays {
+    used: BufferRef,
+    places: BufferRef,
+    around: BufferRef,
+    hits: BufferRef,
+    waiting: BufferRef,
+    states: BufferRef,
+    status: BufferRef,
+    frame: BufferRef,
+    groups: BufferRef,
+}
+
+impl Arrays {
+    fn carve(arena: &mut Arena, own: &Scene, other: &Scene, status: BufferRef, frame: BufferRef) -> Result<Self> {
+        let (points, tets) = (u64::from(own.mesh.input.points), u64::from(own.mesh.input.tets));
+        Ok(Self {
+            used: arena.words(points.div_ceil(32))?,
+            places: arena.words(points)?,
+            around: arena.words(u64::from(other.mesh.input.tets).div_ceil(32))?,
+            hits: arena.words(tets.div_ceil(32))?,
+            waiting: arena.words(tets)?,
+            states: arena.take(size_of::<SearchState>() as u64 * tets)?,
+            status,
+            frame,
+            groups: arena.words(3)?,
+        })
+    }
+}
+
+/// Answers and scratch memory of the sets of two meshes: about 20 bytes per tetrahedron and 4 per point.
+#[derive(Clone, Copy, Debug)]
+pub struct OverlapMemory {
+    /// One bit per tetrahedron of A: intersects B; the same of B.
+    pub hits: [BufferRef; 2],
+    /// [`crate::layout::OverlapStatus`] of A against B, of B against A.
+    pub status: [BufferRef; 2],
+    frames: Frames,
+    ways: [Arrays; 2],
+}
+
+impl OverlapMemory {
+    /// For these two meshes, or others of the same numbers of points and tetrahedra.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, a: &Scene, b: &Scene) -> Result<Self> {
+        let frames = Frames::carve(arena)?;
+        let [forth, back] = frames.status;
+        let ways = [Arrays::carve(arena, a, b, forth, frames.of[1])?, Arrays::carve(arena, b, a, back, frames.of[0])?];
+        Ok(Self { hits: ways.map(|w| w.hits), status: frames.status, frames, ways })
+    }
+}
+
+/// Records which primitives of A intersect B and which of B intersect A; points of both lie in one space. Nothing is submitted, waited for, allocated
+/// or read back.
+///
+/// A dispatch looks at so many nodes and entries per primitive and no more. Three rounds are enough for most; after the recorded ones
+/// [`crate::layout::OverlapStatus::unfinished`] says how many primitives are undecided, whose bits are 0. Recorded again with [`Rounds::resume`]
+/// (same scenes, same memory) it goes on. Trees with [`crate::options::Lists::Boundary`] will do.
+///
+/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier before or
+/// after, so a host puts one from compute shader writes to whatever reads the answers.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made.
+pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapMemory, rounds: Rounds) -> Result<()> {
+    let [forth, back] = memory.ways;
+    let ways = [
+        Direction { own: *a, other: *b, arrays: forth, held: back.around },
+        Direction { own: *b, other: *a, arrays: back, held: forth.around },
+    ];
+    if !rounds.resume {
+        ways.iter().for_each(|w| w.cmd_clear(r));
+        r.barrier("overlap.clear → overlap.used");
+        r.stage("overlap.vertices", |r| {
+            memory.frames.cmd(r, a, b)?;
+            ways.iter().try_for_each(|w| w.cmd_used(r))?;
+            for slice in 0..ways.iter().map(Direction::slices).max().unwrap_or(1) {
+                r.barrier("overlap.used → overlap.places");
+                ways.iter().filter(|w| slice < w.slices()).try_for_each(|w| w.cmd_places(r, slice))?;
+            }
+            Ok(())
+        })?;
+        r.barrier("overlap.places → overlap.collect");
+        r.stage("overlap.collect", |r| ways.iter().try_for_each(|w| w.cmd_collect(r)))?;
+        r.barrier("overlap.collect → overlap.search");
+    }
+    r.stage("overlap.search", |r| {
+        let groups = [ways[0].groups(r)?, ways[1].groups(r)?];
+        for round in 0..rounds.count {
+            if round > 0 {
+                r.barrier("overlap.search → overlap.clear");
+            }
+            ways.iter().for_each(|w| r.fill(w.arrays.status.word(1), 0));
+            r.barrier("overlap.clear → overlap.search");
+            ways.iter().zip(groups).try_for_each(|(w, groups)| w.cmd_search(r, groups))?;
+        }
+        Ok(())
+    })
+}
+
+/// One direction as the kernels see it.
+struct Direction {
+    own: Scene,
+    other: Scene,
+    arrays: Arrays,
+    /// Primitives of its own that hold a vertex of the other mesh: the other direction's answer.
+    held: BufferRef,
+}
+
+impl Direction {
+    fn cmd_clear(&self, r: &mut Recorder<'_>) {
+        for range in [self.arrays.used, self.arrays.around, self.arrays.states, self.arrays.status] {
+            r.fill(range, 0);
+        }
+    }
+
+    fn cmd_used(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let (workgroup, tets) = (r.gpu().target().each, self.own.mesh.input.tets);
+        let arguments = OverlapUsed { bad: self.own.mesh.arrays.bad, cells: self.own.mesh.input.cells, used: self.arrays.used, tets };
+        r.dispatch(&arguments, OverlapUsedSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(workgroup)))
+    }
+
+    fn slices(&self) -> u32 {
+        self.other.longest_leaf.div_ceil(SLICE).max(1)
+    }
+
+    fn cmd_places(&self, r: &mut Recorder<'_>, slice: u32) -> Result<()> {
+        let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
+        let workgroup = r.gpu().target().each;
+        let arguments = OverlapPlaces {
+            grid: tree.grid,
+            masks: tree.masks,
+            co: tree.co,
+            po: tree.po,
+            p: tree.p,
+            flags: tree.flags,
+            cells: mesh.input.cells,
+            vertices: mesh.arrays.vertices,
+            own_positions: own.positions,
+            used: self.arrays.used,
+            places: self.arrays.places,
+            around: self.arrays.around,
+            status: self.arrays.status,
+            points: own.points,
+            stride: own.stride,
+            slice,
+        };
+        let spec = OverlapPlacesSpec { workgroup, slice: SLICE, ..Default::default() };
+        r.dispatch(&arguments, spec, Groups::Count(own.points.div_ceil(workgroup)))
+    }
+
+    fn cmd_collect(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let (workgroup, own) = (r.gpu().target().each, &self.own.mesh.input);
+        let arguments = OverlapCollect {
+            grid: self.other.tree.grid,
+            own_positions: own.positions,
+            own_cells: own.cells,
+            bad: self.own.mesh.arrays.bad,
+            places: self.arrays.places,
+            around: self.held,
+            hits: self.arrays.hits,
+            waiting: self.arrays.waiting,
+            status: self.arrays.status,
+            tets: own.tets,
+            stride: own.stride,
+        };
+        let spec = OverlapCollectSpec { workgroup, ..Default::default() };
+        r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(32).div_ceil(workgroup)))
+    }
+
+    /// Workgroups of the search, as soon as the number of those that wait is visible; no barrier.
+    fn groups(&self, r: &mut Recorder<'_>) -> Result<Groups> {
+        let waiting = Count::device(self.own.mesh.input.tets, self.arrays.status.word(0));
+        waiting.arguments(r, r.gpu().target().each, self.arrays.groups)
+    }
+
+    fn cmd_search(&self, r: &mut Recorder<'_>, groups: Groups) -> Result<()> {
+        let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
+        let workgroup = r.gpu().target().each;
+        let arguments = OverlapSearch {
+            grid: tree.grid,
+            masks: tree.masks,
+            co: tree.co,
+            po: tree.po,
+            p: tree.p,
+            flags: tree.flags,
+            cells: mesh.input.cells,
+            positions: mesh.input.positions,
+            own_cells: own.cells,
+            own_positions: own.positions,
+            frame: self.arrays.frame,
+            waiting: self.arrays.waiting,
+            states: self.arrays.states,
+            hits: self.arrays.hits,
+            status: self.arrays.status,
+            most: own.tets,
+        };
+        let (each_once, stride, own_stride) = (each_once(&self.other), mesh.input.stride, own.stride);
+        let spec = OverlapSearchSpec { workgroup, each_once, budget: BUDGET, own_stride, stride, ..Default::default() };
+        r.dispatch(&arguments, spec, groups)
+    }
+}

@@ -1,0 +1,244 @@
+//! Slices and overlaps recorded behind a build, of a mesh that moves: what the owning forms and the reference find, in one command buffer.
+
+#![allow(clippy::unwrap_used)]
+
+mod host;
+
+use bytemuck::Pod;
+use host::Frame;
+use host::queries::Queries;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
+use olbvh::layout::{OverlapStatus, SliceStatus};
+use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{
+    PairMemory, Party, Rounds, Scene, Searched, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs, cmd_slice, overlap, slice,
+};
+use olbvh::reference::boundary::topology;
+use olbvh::reference::build::build;
+use olbvh::reference::overlap::{Side, overlap as reference};
+use olbvh::reference::slice::Slicer;
+use olbvh::slicing::{Band, Extrapolate, Rows};
+
+/// Pairs that the frames have room for.
+const ROOM: usize = 1300;
+
+/// Frame `i` of a mesh that turns and swells.
+fn moved(mesh: &Mesh, i: u32) -> Mesh {
+    let (sin, cos) = (0.4 * i as f32).sin_cos();
+    let mut moved = mesh.clone();
+    for p in &mut moved.points {
+        let [x, y, z] = *p;
+        *p = [cos * x - sin * y, sin * x + cos * y, z * (1.0 + 0.1 * i as f32)];
+    }
+    moved
+}
+
+fn read<T: Pod>(gpu: &Gpu, queries: &Queries, part: BufferRef, n: usize) -> Vec<T> {
+    gpu.download(&queries.memory, part.part(0, (n * size_of::<T>()) as u64)).unwrap()
+}
+
+fn bits(words: &[u32]) -> Vec<u32> {
+    (0..32 * words.len() as u32).filter(|i| words[(i / 32) as usize] >> (i % 32) & 1 != 0).collect()
+}
+
+fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f32], device: &DeviceMesh, tree: &Tree) -> SliceStatus {
+    let n = (queries.rows.count * 37) as usize;
+    let (answers, found): (Vec<u32>, Vec<f32>) =
+        (read(gpu, queries, queries.slice.answers, n), read(gpu, queries, queries.slice.values, n));
+    let expected = slicer.band(queries.rows);
+    let answer = |i: usize| match expected.kinds[i] {
+        olbvh::slicing::INSIDE => expected.owners[i],
+        olbvh::slicing::TOUCHED => expected.owners[i] | 1 << 31,
+        _ => u32::MAX,
+    };
+    assert_eq!(answers, (0..n).map(answer).collect::<Vec<_>>());
+    let mut owned = Band::default();
+    let mut keep = |band: Band| {
+        owned.values.extend(band.values);
+        owned.owners.extend(band.owners);
+        Ok(())
+    };
+    slice(device, tree, Some((values, On::Points)), &queries.voxels, Extrapolate::Nearest, &|_, _| {}, &mut keep).unwrap();
+    assert_eq!(owned.owners, expected.owners);
+    let to_bits = |values: &[f32]| values.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect::<Vec<_>>();
+    assert_eq!(to_bits(&owned.values), to_bits(&found), "values of the recorded and the owning form");
+    let status: SliceStatus = read(gpu, queries, queries.slice.status, 1)[0];
+    let kinds = |kind: u8| expected.kinds.iter().map(|&k| u32::from(k == kind)).sum::<u32>();
+    assert_eq!((status.locating, status.touching, status.refused), (0, 0, 0));
+    assert_eq!([status.empty, status.touched, status.inside], [kinds(0), kinds(1), kinds(2)]);
+    status
+}
+
+fn frames(binding: Binding) {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    let mesh = kuhn_jittered([5, 4, 6], 0.2, 3).unwrap();
+    let values: Vec<f32> = mesh.points.iter().map(|p| p[0] - 0.5 * p[2]).collect();
+    let mut other = kuhn_jittered([4; 3], 0.3, 9).unwrap();
+    other.points.iter_mut().for_each(|p| *p = p.map(|x| x - 1.3));
+    let frame = Frame::new(&gpu, &mesh);
+    let queries = Queries::new(&gpu, &frame, &values, &other, ROOM as u64);
+    let (other_topology, other_tree) = (topology(&other).unwrap(), queries.other_tree.download().unwrap());
+    let (mut touched, mut met, mut cut) = (0, 0, 0);
+    for i in 0..6 {
+        let shown = moved(&mesh, i);
+        let staging = gpu.upload("olbvh.test.staging", &shown.points).unwrap();
+        gpu.run("olbvh.test.frame", |r| {
+            r.copy(staging.all(), frame.input.positions);
+            r.barrier("frame.positions → frame.mesh");
+            frame.record(r)?;
+            queries.record(r)
+        })
+        .unwrap();
+
+        let topology = topology(&shown).unwrap();
+        let host = build(&shown, &topology, &BuildOptions::default()).unwrap();
+        let device = DeviceMesh::upload(&gpu, &shown, BadCells::Skip).unwrap();
+        let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+        let field = Field { name: "x".into(), on: On::Points, values: values.clone() };
+        let slicer = Slicer::new(&shown, &topology, &host, Some(&field), queries.voxels, Extrapolate::Nearest).unwrap();
+        touched += compare_slice(&gpu, &queries, &slicer, &values, &device, &tree).touched;
+
+        let (a, b) =
+            (Side { mesh: &shown, topology: &topology, tree: &host }, Side { mesh: &other, topology: &other_topology, tree: &other_tree });
+        let (sets, pairs) = (reference(a, b, false), reference(a, b, true).pairs.unwrap());
+        let hits = |k: usize, n: usize| bits(&read(&gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
+        assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
+        let (device, other) = (Party { mesh: &device, tree: &tree }, Party { mesh: &queries.other, tree: &queries.other_tree });
+        assert_eq!(overlap(device, other, false, &|_, _| {}).unwrap().overlap, sets, "frame {i}");
+        let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(&gpu, &queries, part, 1)[0]);
+        assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
+
+        let status: OverlapStatus = read(&gpu, &queries, queries.pairs.status, 1)[0];
+        assert_eq!((status.unfinished, status.unfilled, status.pairs), (0, 0, [pairs.len() as u32, 0]), "frame {i}");
+        let mut found: Vec<[u32; 2]> = read(&gpu, &queries, queries.found, pairs.len().min(ROOM));
+        found.chunk_by_mut(|x, y| x[0] == y[0]).for_each(<[_]>::sort_unstable);
+        let whole = found.len() - found.iter().rev().take_while(|p| p[0] == found[found.len() - 1][0]).count();
+        assert_eq!(found[..whole], pairs[..whole], "frame {i}");
+        assert!(found.iter().all(|p| pairs.binary_search(p).is_ok()), "frame {i}");
+        met += found.len();
+        cut += usize::from(pairs.len() > ROOM);
+    }
+    assert!(touched > 1000 && met > 1000 && cut > 0 && cut < 6, "{touched} {met} {cut}");
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn by_address() {
+    frames(Binding::Address);
+}
+
+#[test]
+fn by_descriptors() {
+    frames(Binding::Descriptors);
+}
+
+/// One round at a time, in submissions of their own, ends where the owning forms end.
+#[test]
+fn rounds_go_on_where_they_ended() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
+    let copies = if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") { 900 } else { 6000 };
+    let mesh = Mesh::new(one.points.clone(), vec![one.tets[0]; copies]);
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
+    let voxels = olbvh::slicing::VoxelGrid {
+        origin: [-0.35, -0.35, 0.3],
+        across: axis(0),
+        down: axis(1),
+        up: axis(2),
+        half: [axis(0), axis(1), axis(2)].map(|a| a.map(|x| x / 2.0)),
+        size: [5, 5],
+        layers: 1,
+    };
+    let rows = Rows { layer: 0, first: 0, count: 5 };
+    let searched = Searched::new(&device, &tree);
+    let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest };
+    let carve = |a: &mut Arena| SliceMemory::carve(a, 5, 5);
+    let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
+    let memory = carve(&mut Arena::new(buffer.all())).unwrap();
+    let (mut rounds, mut submissions) = (Rounds::begin(1), 0);
+    let status = loop {
+        gpu.run("olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();
+        rounds = Rounds::resume(1);
+        submissions += 1;
+        let status = gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0];
+        if status.locating + status.touching == 0 {
+            break status;
+        }
+        assert_eq!(status.inside + status.touched + status.empty, 0, "counted before the end");
+    };
+    assert!(submissions > 1 || copies < 6000);
+    assert_eq!(status.inside + status.touched + status.empty, 25);
+    let answers: Vec<u32> = gpu.download(&buffer, memory.answers.part(0, 100)).unwrap();
+    // All rounds in one recording.
+    gpu.run("olbvh.test.rounds", |r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(40))).unwrap();
+    assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
+    assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
+
+    let scene = Scene::new(&device, &tree);
+    let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
+    let few_tree = Tree::build(&gpu, &few, &BuildOptions::default()).unwrap();
+    let few_scene = Scene::new(&few, &few_tree);
+    let expected = overlap(Party { mesh: &few, tree: &few_tree }, Party { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
+    let expected = expected.overlap.pairs.unwrap();
+    let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
+    let buffer = gpu.buffer("olbvh.test.pairs", Arena::measure(carve).unwrap()).unwrap();
+    let (memory, found) = carve(&mut Arena::new(buffer.all())).unwrap();
+    let status = || gpu.download::<OverlapStatus>(&buffer, memory.status).unwrap()[0];
+    // Too few rounds to count: nothing is written, and it says so.
+    gpu.run("olbvh.test.rounds", |r| {
+        cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::begin(1))?;
+        cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))
+    })
+    .unwrap();
+    assert!(status().unfinished > 0 && status().unfilled > 0);
+    while status().unfinished > 0 {
+        gpu.run("olbvh.test.rounds", |r| cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::resume(2))).unwrap();
+    }
+    gpu.run("olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))).unwrap();
+    while status().unfilled > 0 {
+        gpu.run("olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::resume(2))).unwrap();
+    }
+    assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
+}
+
+/// What a recording cannot know beforehand is told by the status: boxes too large for the mesh, and a mesh of nothing.
+#[test]
+fn what_cannot_be_asked_is_told() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([3; 3], 0.2, 1).unwrap();
+    let frame = Frame::new(&gpu, &mesh);
+    let mut queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 100);
+    for (half, refused) in [([0.0; 3], 1), ([100.0, 0.0, 0.0], 2), ([1e36; 3], 2), ([0.1, 0.0, 0.0], 0)] {
+        queries.voxels.half[0] = half;
+        let plan = queries.voxels.over(DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap().grid());
+        assert_eq!(plan.refused, refused);
+        gpu.run("olbvh.test.frame", |r| {
+            frame.record(r)?;
+            queries.record(r)
+        })
+        .unwrap();
+        let status: SliceStatus = read(&gpu, &queries, queries.slice.status, 1)[0];
+        assert_eq!((status.refused, status.locating, status.touching), (refused, 0, 0), "{half:?}");
+        assert_eq!(status.empty == 37 * 29 * 9, refused != 0, "{half:?}");
+    }
+    let nothing = Mesh::new(mesh.points.clone(), vec![[0; 4]; mesh.tets.len()]);
+    let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &nothing, 100);
+    gpu.run("olbvh.test.frame", |r| {
+        frame.record(r)?;
+        queries.record(r)
+    })
+    .unwrap();
+    let status: OverlapStatus = read(&gpu, &queries, queries.pairs.status, 1)[0];
+    assert_eq!((status.pairs, status.unfinished, status.unfilled, status.narrow, status.empty), ([0; 2], 0, 0, [0; 2], 1));
+    for (status, hits) in queries.sets.status.into_iter().zip(queries.sets.hits) {
+        let status: OverlapStatus = read(&gpu, &queries, status, 1)[0];
+        assert_eq!((status.by_vertex, status.waiting, status.located, status.empty), (0, 0, 0, 1));
+        assert!(bits(&read(&gpu, &queries, hits, mesh.tets.len().div_ceil(32))).is_empty());
+    }
+}

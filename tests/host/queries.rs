@@ -1,0 +1,69 @@
+//! Slicing and overlap with a second mesh, recorded behind a [`Frame`].
+
+use super::Frame;
+use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
+use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
+use olbvh::mesh::{Mesh, On};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{
+    OverlapMemory, PairMemory, Rounds, Scene, Searched, SliceInput, SliceMemory, Structure, cmd_count_pairs, cmd_list_pairs, cmd_overlap,
+    cmd_slice,
+};
+use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
+
+/// Memory of the queries of a frame, and what they ask.
+pub struct Queries {
+    pub voxels: VoxelGrid,
+    pub rows: Rows,
+    pub slice: SliceMemory,
+    pub other: DeviceMesh,
+    pub other_tree: Tree,
+    pub sets: OverlapMemory,
+    pub pairs: PairMemory,
+    pub found: BufferRef,
+    pub memory: Buffer,
+    field: Buffer,
+    scene: Scene,
+}
+
+impl Queries {
+    /// Behind `frame`, whose mesh has the field `values` on its points, with room for so many pairs.
+    pub fn new(gpu: &Gpu, frame: &Frame, values: &[f32], other: &Mesh, room: u64) -> Self {
+        let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
+        let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
+        let other_tree = Tree::build(gpu, &other, &BuildOptions::default()).unwrap();
+        let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
+        let voxels = VoxelGrid {
+            origin: [-1.0; 3],
+            across: axis(0, 0.3),
+            down: axis(1, 0.3),
+            up: axis(2, 0.8),
+            half: [axis(0, 0.15), axis(1, 0.15), axis(2, 0.4)],
+            size: [37, 29],
+            layers: 9,
+        };
+        let rows = Rows { layer: 0, first: 0, count: 29 * 9 };
+        let carve = |a: &mut Arena| {
+            let slice = SliceMemory::carve(a, 37, rows.count)?;
+            let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
+            let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
+            Ok((slice, sets, pairs, a.take(8 * room)?))
+        };
+        let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
+        let (slice, sets, pairs, found) = carve(&mut Arena::new(memory.all())).unwrap();
+        let field = gpu.upload("olbvh.test.field", values).unwrap();
+        Self { voxels, rows, slice, other, other_tree, sets, pairs, found, memory, field, scene }
+    }
+
+    pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        let searched = Searched { mesh: self.scene.mesh, structure: Structure::Octree(self.scene.tree) };
+        let field = Some((self.field.all(), On::Points));
+        let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };
+        cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
+        let other = Scene::new(&self.other, &self.other_tree);
+        cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;
+        cmd_count_pairs(r, &self.scene, &other, &self.pairs, Rounds::begin(8))?;
+        cmd_list_pairs(r, &self.scene, &other, &self.pairs, self.found, Rounds::begin(8))
+    }
+}
