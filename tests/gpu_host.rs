@@ -9,13 +9,12 @@ use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use host::queries::Queries;
 use host::{Frame, Host};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
+use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, locate};
 use std::cell::Cell;
 use std::ffi::c_void;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, OnceLock};
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
@@ -91,19 +90,17 @@ fn one_device_serves_many_threads() {
     });
 }
 
-/// Calls, while [`ARMED`], of device functions that make, allocate, map, submit or wait. Of this process, which other tests share where the runner
-/// starts none per test: only the armed thread counts.
-static CALLS: AtomicU32 = AtomicU32::new(0);
-/// The device's own functions.
+/// The device's own functions; those that make, allocate, map, submit or wait are counted in `CALLS` of a thread that is `ARMED`.
 static TABLE: OnceLock<ash::DeviceFnV1_0> = OnceLock::new();
 thread_local! {
     static ARMED: Cell<bool> = const { Cell::new(false) };
+    static CALLS: Cell<u32> = const { Cell::new(0) };
 }
 
 macro_rules! counted {
     ($($name:ident($first:ty $(, $arg:ident: $kind:ty)*);)*) => {
         $(unsafe extern "system" fn $name(first: $first $(, $arg: $kind)*) -> vk::Result {
-            CALLS.fetch_add(u32::from(ARMED.get()), Relaxed);
+            CALLS.set(CALLS.get() + u32::from(ARMED.get()));
             // SAFETY: the arguments are passed on as they came.
             unsafe { (TABLE.get().unwrap().$name)(first $(, $arg)*) }
         })*
@@ -126,6 +123,7 @@ counted! {
     create_shader_module(vk::Device, info: *const vk::ShaderModuleCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::ShaderModule);
     create_compute_pipelines(vk::Device, cache: vk::PipelineCache, n: u32, info: *const vk::ComputePipelineCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::Pipeline);
     create_pipeline_layout(vk::Device, info: *const vk::PipelineLayoutCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::PipelineLayout);
+    create_descriptor_set_layout(vk::Device, info: *const vk::DescriptorSetLayoutCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::DescriptorSetLayout);
     create_descriptor_pool(vk::Device, info: *const vk::DescriptorPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::DescriptorPool);
     create_command_pool(vk::Device, info: *const vk::CommandPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::CommandPool);
     create_query_pool(vk::Device, info: *const vk::QueryPoolCreateInfo<'_>, callbacks: Callbacks<'_>, out: *mut vk::QueryPool);
@@ -137,15 +135,11 @@ counted! {
     queue_submit(vk::Queue, n: u32, info: *const vk::SubmitInfo<'_>, fence: vk::Fence);
 }
 
-#[test]
-fn recording_neither_makes_nor_submits_nor_waits() {
+fn nothing_is_made(binding: Binding) {
     let host = Host::new();
-    if !host.addresses {
-        println!("NOT RUN: without buffer addresses each recording makes descriptor pools");
-        return;
-    }
+    let options = GpuOptions { binding: Some(binding), ..GpuOptions::default() };
     // SAFETY: as above; the counted functions do what the device's own do.
-    let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &GpuOptions::default()) }.unwrap();
+    let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
     let frame = Frame::new(&gpu, &mesh);
     let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 1000);
@@ -156,21 +150,70 @@ fn recording_neither_makes_nor_submits_nor_waits() {
     let mut rehearsal = Recorder::rehearse(&gpu);
     record(&mut rehearsal).unwrap();
     rehearsal.finish().unwrap();
+    let room = rehearsal.descriptor_room();
+    assert_eq!(room.sets > 0, binding == Binding::Descriptors);
+    let mut pools = DescriptorPools::new(&gpu);
+    pools.reserve(room).unwrap();
 
-    let before = CALLS.load(Relaxed);
-    gpu.run("olbvh.test.frame", |r| {
-        ARMED.set(true);
-        let result = record(r);
-        ARMED.set(false);
-        result
-    })
-    .unwrap();
-    assert_eq!(CALLS.load(Relaxed), before, "calls made while recording");
+    let before = CALLS.get();
+    for _ in 0..3 {
+        gpu.run("olbvh.test.frame", |r| {
+            // SAFETY: the commands of `r`, which records nothing meanwhile; the pools are kept until `run` has waited for them.
+            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
+            ARMED.set(true);
+            let result = record(&mut recorder).and_then(|()| recorder.finish());
+            ARMED.set(false);
+            assert_eq!(recorder.descriptor_room(), room);
+            result
+        })
+        .unwrap();
+        // SAFETY: `run` has waited.
+        unsafe { pools.reset() }.unwrap();
+    }
+    assert_eq!(CALLS.get(), before, "calls made while recording");
     let found: Vec<u32> = gpu.download(&frame.memory, frame.output.owners.part(0, 4 * mesh.points.len() as u64)).unwrap();
     assert_eq!(found, owners(&gpu, &mesh));
     // The count counts.
     ARMED.set(true);
     let buffer = gpu.buffer("olbvh.test.counted", 64 << 20);
     ARMED.set(false);
-    assert!(buffer.is_ok() && CALLS.load(Relaxed) > before);
+    assert!(buffer.is_ok() && CALLS.get() > before);
+}
+
+#[test]
+fn recording_neither_makes_nor_submits_nor_waits_by_address() {
+    if Host::new().addresses {
+        nothing_is_made(Binding::Address);
+    } else {
+        println!("NOT RUN: the device has no buffer addresses");
+    }
+}
+
+#[test]
+fn recording_neither_makes_nor_submits_nor_waits_by_descriptors() {
+    nothing_is_made(Binding::Descriptors);
+}
+
+/// Pools without room, or with too little, grow once, and serve ever after.
+#[test]
+fn pools_grow_as_they_are_used() {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(Binding::Descriptors), ..GpuOptions::default() }).unwrap();
+    let mesh = kuhn_jittered([3; 3], 0.3, 1).unwrap();
+    let frame = Frame::new(&gpu, &mesh);
+    let expected = owners(&gpu, &mesh);
+    let mut pools = DescriptorPools::new(&gpu);
+    pools.reserve(DescriptorRoom { sets: 3, buffers: 20 }).unwrap();
+    for _ in 0..3 {
+        gpu.run("olbvh.test.frame", |r| {
+            // SAFETY: as above.
+            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
+            frame.record(&mut recorder)?;
+            recorder.finish()
+        })
+        .unwrap();
+        // SAFETY: `run` has waited.
+        unsafe { pools.reset() }.unwrap();
+        let found: Vec<u32> = gpu.download(&frame.memory, frame.output.owners.part(0, 4 * mesh.points.len() as u64)).unwrap();
+        assert_eq!(found, expected);
+    }
 }

@@ -4,6 +4,7 @@
 mod acceleration;
 mod context;
 mod debug;
+mod descriptors;
 mod host;
 mod kernel;
 mod memory;
@@ -14,6 +15,7 @@ mod submit;
 
 pub use acceleration::{AccelerationStructure, Triangles};
 pub use context::{Binding, Gpu, GpuOptions};
+pub use descriptors::{DescriptorPools, DescriptorRoom};
 pub use host::{Enabled, HostDevice};
 pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer, BufferRef, USAGE};

@@ -4,7 +4,7 @@
 //! meets an earlier one's writes (or writes what an earlier one reads) without a barrier between them.
 
 use super::context::{Binding, Gpu};
-use super::failed;
+use super::descriptors::{DescriptorPools, DescriptorRoom};
 use super::kernel::{Access, Kernel};
 use super::memory::BufferRef;
 use crate::error::{Error, Result};
@@ -36,6 +36,12 @@ struct Use {
     by: &'static str,
 }
 
+/// Where descriptor sets come from.
+enum Pools<'a> {
+    Own(DescriptorPools),
+    Lent(&'a mut DescriptorPools),
+}
+
 /// Records into one command buffer.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
@@ -46,8 +52,9 @@ pub struct Recorder<'a> {
     /// Names and begin/end slots of the timed stages so far.
     pub(crate) stages: Vec<(String, u32, u32)>,
     next_slot: u32,
-    /// Descriptor pools of this recording; empty where buffers go by address.
-    pools: Vec<vk::DescriptorPool>,
+    /// Used where buffers go by descriptor.
+    pools: Pools<'a>,
+    room: DescriptorRoom,
     barriers: Vec<&'static str>,
     /// Leave out the n-th barrier, to see that its absence is noticed.
     drop_barrier: Option<u32>,
@@ -57,18 +64,32 @@ impl<'a> Recorder<'a> {
     /// A recorder for a command buffer in the recording state. `timestamps`: a reset query pool and its size.
     ///
     /// Recording binds a compute pipeline, compute push constants, and with descriptors set 0 for compute; a host binds its own again after it.
-    /// The recorder must be kept until the commands have been executed where the device binds by descriptors, since it owns their sets.
+    /// Where the device binds by descriptors, the recorder must be kept until the commands have been executed, since it owns their sets, unless it is lent
+    /// pools (see [`Recorder::with_pools`]).
     ///
     /// # Safety
     /// `commands` is in the recording state, outside a render pass, of a family with compute, and belongs to `gpu`'s device.
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
-        let (uses, stages, pools) = (Vec::new(), Vec::new(), Vec::new());
-        Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, barriers: Vec::new(), drop_barrier: None }
+        let (pools, room) = (Pools::Own(DescriptorPools::new(gpu)), DescriptorRoom::default());
+        let (uses, stages, barriers) = (Vec::new(), Vec::new(), Vec::new());
+        Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, room, barriers, drop_barrier: None }
+    }
+
+    /// Takes descriptor sets from pools of the caller's instead of its own. They are kept until the commands have been executed; the recorder need not be.
+    #[must_use]
+    pub fn with_pools(mut self, pools: &'a mut DescriptorPools) -> Self {
+        self.pools = Pools::Lent(pools);
+        self
+    }
+
+    /// The room in descriptor pools that what was recorded takes, rehearsed or not.
+    pub fn descriptor_room(&self) -> DescriptorRoom {
+        self.room
     }
 
     /// A recorder without a command buffer: what is recorded compiles the pipelines it needs and is checked for missing barriers, and that is
-    /// all. A host rehearses once what it will record every frame, so that nothing is created then (but for descriptor pools, where the device
-    /// binds by descriptors).
+    /// all. A host rehearses once what it will record every frame, so that nothing is created then; where the device binds by descriptors it also
+    /// reserves [`Recorder::descriptor_room`] in pools that it lends.
     pub fn rehearse(gpu: &'a Gpu) -> Self {
         // SAFETY: nothing is recorded into a null command buffer, see `is_rehearsal`.
         unsafe { Self::new(gpu, vk::CommandBuffer::null(), None) }
@@ -118,6 +139,10 @@ impl<'a> Recorder<'a> {
             uses.push((words, false));
         }
         self.touch(&uses, info.name);
+        if self.gpu.binding() == Binding::Descriptors && !buffers.is_empty() {
+            self.room.sets += 1;
+            self.room.buffers += buffers.len() as u32;
+        }
         if self.is_rehearsal() {
             return Ok(());
         }
@@ -134,7 +159,11 @@ impl<'a> Recorder<'a> {
                     push[8 * i..8 * i + 8].copy_from_slice(&b.address.to_le_bytes());
                 }
             } else if !buffers.is_empty() {
-                let set = self.descriptor_set(pipeline.set_layout, &buffers, info.name)?;
+                let pools = match &mut self.pools {
+                    Pools::Own(pools) => pools,
+                    Pools::Lent(pools) => pools,
+                };
+                let set = pools.set(pipeline.set_layout, &buffers, info.name)?;
                 device.cmd_bind_descriptor_sets(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &[set], &[]);
             }
             let bytes = &push[..base + info.scalar_bytes];
@@ -269,65 +298,6 @@ impl<'a> Recorder<'a> {
                     Some(format!("{by} {} what {} {} with no barrier between them", verb(writes), earlier.by, verb(earlier.writes)));
             }
             self.uses.push(Use { buffer, begin, end, writes, by });
-        }
-    }
-
-    /// A descriptor set with these buffers.
-    fn descriptor_set(
-        &mut self,
-        layout: vk::DescriptorSetLayout,
-        buffers: &[BufferRef],
-        kernel: &'static str,
-    ) -> Result<vk::DescriptorSet> {
-        let device = self.gpu.device();
-        let limit = u64::from(self.gpu.limits().max_storage_buffer_range);
-        if let Some(large) = buffers.iter().find(|b| b.size > limit) {
-            return Err(Error::TooLarge(format!(
-                "{kernel} needs a storage buffer of {} bytes; the device binds {limit} at most",
-                large.size
-            )));
-        }
-        let alignment = self.gpu.limits().min_storage_buffer_offset_alignment.max(1);
-        if let Some(odd) = buffers.iter().find(|b| b.offset % alignment != 0) {
-            let text = format!("{kernel} is given a buffer at offset {}, the device binds multiples of {alignment}", odd.offset);
-            return Err(Error::Invalid(text));
-        }
-        let layouts = [layout];
-        // SAFETY: pools and sets belong to this device and live until the recorder is dropped.
-        unsafe {
-            let allocate = |pool| {
-                device.allocate_descriptor_sets(&vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts))
-            };
-            let mut sets = self.pools.last().map_or(Err(vk::Result::ERROR_OUT_OF_POOL_MEMORY), |p| allocate(*p));
-            if sets.is_err() {
-                let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: 2048 }];
-                let info = vk::DescriptorPoolCreateInfo::default().max_sets(256).pool_sizes(&sizes);
-                let pool = device.create_descriptor_pool(&info, None).map_err(failed("vkCreateDescriptorPool"))?;
-                self.pools.push(pool);
-                sets = allocate(pool);
-            }
-            let set = sets.map_err(failed("vkAllocateDescriptorSets"))?[0];
-            let infos: Vec<_> =
-                buffers.iter().map(|b| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size.max(16) }]).collect();
-            let writes: Vec<_> = infos
-                .iter()
-                .enumerate()
-                .map(|(i, info)| {
-                    let w = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i as u32);
-                    w.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
-                })
-                .collect();
-            device.update_descriptor_sets(&writes, &[]);
-            Ok(set)
-        }
-    }
-}
-
-impl Drop for Recorder<'_> {
-    fn drop(&mut self) {
-        for pool in self.pools.drain(..) {
-            // SAFETY: the commands have been executed (see `new`), so no set is in use.
-            unsafe { self.gpu.device().destroy_descriptor_pool(pool, None) };
         }
     }
 }
