@@ -35,6 +35,8 @@ mod topology;
 
 pub use failure::Failure;
 pub use lab::{Lab, Outcome, Report};
+#[doc(hidden)]
+pub use overlap::{Both, check_overlap};
 pub use primitives::TargetKind;
 
 use build::BuildCase;

@@ -1,6 +1,6 @@
 //! Mesh overlap against the reference (SPEC 3.5): sets, pairs, and what they took.
 
-use super::failure::{Verdict, compare, compare_one};
+use super::failure::{Stop, Verdict, compare, compare_one};
 use super::meshes::MeshRecipe;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
@@ -40,7 +40,8 @@ impl Other {
 }
 
 /// A mesh on host and device.
-struct Both {
+#[derive(Debug)]
+pub struct Both {
     mesh: Mesh,
     topology: Topology,
     host: TreeArrays,
@@ -49,7 +50,11 @@ struct Both {
 }
 
 impl Both {
-    fn new(gpu: &Gpu, mesh: Mesh, options: &BuildOptions) -> Result<Self> {
+    /// With its tree on either.
+    ///
+    /// # Errors
+    /// Those of the topology and of the build.
+    pub fn new(gpu: &Gpu, mesh: Mesh, options: &BuildOptions) -> Result<Self> {
         let topology = topology(&mesh)?;
         let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
         let tree = Tree::build(gpu, &device, options)?;
@@ -60,7 +65,8 @@ impl Both {
         Side { mesh: &self.mesh, topology: &self.topology, tree: &self.host }
     }
 
-    fn party(&self) -> Party<'_> {
+    /// The mesh and the tree of the device.
+    pub fn party(&self) -> Party<'_> {
         Party { mesh: &self.device, tree: &self.tree }
     }
 }
@@ -83,15 +89,29 @@ fn check_lists(gpu: &Gpu, case: &OverlapCase, lists: Lists) -> Verdict {
     };
     let other = Both::new(gpu, other, &options)?;
     compare_overlaps(&own, &other)?;
-    compare_overlaps(&other, &own)
+    compare_overlaps(&other, &own)?;
+    Ok(())
 }
 
-fn compare_overlaps(a: &Both, b: &Both) -> Verdict {
+/// Holds the overlap of two meshes against the reference's; the number of primitives of the first that intersect the second.
+///
+/// # Errors
+/// What differs, or why there is no answer.
+pub fn check_overlap(a: &Both, b: &Both) -> std::result::Result<usize, String> {
+    compare_overlaps(a, b).map_err(|stop| match stop {
+        Stop::Failed(failure) => failure.to_string(),
+        Stop::Skipped(why) => why,
+    })
+}
+
+fn compare_overlaps(a: &Both, b: &Both) -> Verdict<usize> {
+    let mut hits = 0;
     // Pairs are found by lists.
     let kinds: &[bool] = if a.host.lists == Lists::All { &[false, true] } else { &[false] };
     for &pairs in kinds {
         let expected = reference(a.side(), b.side(), pairs);
         let found = overlap(a.party(), b.party(), pairs, &|_, _| {})?.overlap;
+        hits = expected.a.len();
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
         compare(stage, "a", &expected.a, &found.a)?;
         compare(stage, "b", &expected.b, &found.b)?;
@@ -101,5 +121,5 @@ fn compare_overlaps(a: &Both, b: &Both) -> Verdict {
             compare_one(stage, "effort", &expected.effort, &found.effort)?;
         }
     }
-    Ok(())
+    Ok(hits)
 }
