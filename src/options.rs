@@ -85,11 +85,14 @@ pub struct BuildOptions {
     /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
     /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: as many as 32 bits count.
     pub capacity: Option<u32>,
+    /// Most bytes that the arrays of the tree may have together ([`crate::tree::Memory::total`]), α being the finest that is asked for: the tree gets
+    /// coarser until it fits. What is held to the budget is [`crate::tree::Memory::most`], which is known before anything is built. `None`: no limit.
+    pub budget: Option<u64>,
 }
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::default(), boxes: false, capacity: None }
+        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::default(), boxes: false, capacity: None, budget: None }
     }
 }
 

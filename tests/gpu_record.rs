@@ -11,7 +11,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::{OverlapStatus, SliceStatus};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
-use olbvh::options::BuildOptions;
+use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
     PairMemory, Party, Rounds, Scene, Searched, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs, cmd_slice, overlap, slice,
@@ -140,11 +140,12 @@ fn by_descriptors() {
 #[test]
 fn rounds_go_on_where_they_ended() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     let copies = if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") { 900 } else { 6000 };
     let mesh = Mesh::new(one.points.clone(), vec![one.tets[0]; copies]);
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let tree = Tree::build(&gpu, &device, &options).unwrap();
     let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
     let voxels = olbvh::slicing::VoxelGrid {
         origin: [-0.35, -0.35, 0.3],
@@ -182,7 +183,7 @@ fn rounds_go_on_where_they_ended() {
 
     let scene = Scene::new(&device, &tree);
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
-    let few_tree = Tree::build(&gpu, &few, &BuildOptions::default()).unwrap();
+    let few_tree = Tree::build(&gpu, &few, &options).unwrap();
     let few_scene = Scene::new(&few, &few_tree);
     let expected = overlap(Party { mesh: &few, tree: &few_tree }, Party { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
     let expected = expected.overlap.pairs.unwrap();

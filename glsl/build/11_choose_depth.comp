@@ -2,12 +2,15 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Depth, 2 of 2 (SPEC 2.4): the largest level that the mean estimate allows (Eq. 12, in integers) and whose entries fit.
+// Depth, 2 of 2 (SPEC 2.4): the largest level that the mean estimate allows (Eq. 12, in integers) and whose entries
+// and bytes fit.
 ARGUMENTS(4)
     uint tets;
     uint alpha;    // in units of 1/65536
     uint capacity; // most entries
     uint deepest;  // most levels
+    uint budget[2]; // most words of all arrays, low word first
+    uint box_words; // per node
 END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, mesh)
 BUFFER16(1, READ_WRITE, Grid, grid)
@@ -15,6 +18,30 @@ BUFFER(2, READ_WRITE, BuildStatus, status)
 BUFFER(3, writeonly, uint, candidates) // word for the scans: entries of Aabb at the chosen level
 
 bool less_equal(uvec2 a, uvec2 b) { return a.y < b.y || (a.y == b.y && a.x <= b.x); } // low word first
+
+uvec2 plus(uvec2 a, uint b) {
+    uint low = a.x + b;
+    return uvec2(low, a.y + uint(low < b));
+}
+
+uvec2 total(uint level) { return uvec2(status.at[0].total[2u * level], status.at[0].total[2u * level + 1u]); }
+
+// The most that a tree of that level can take: P, PO, CO, NO, flags, masks, boxes. A level has no more nodes than entries or cells.
+uvec2 most_words(uint level) {
+    uint nodes = 1u, internal = 0u;
+    for (uint k = 1u; k <= level; ++k) {
+        uint cells = 1u << (3u * k);
+        uvec2 entries = total(k);
+        internal = nodes;
+        nodes += entries.y != 0u ? cells : min(entries.x, cells);
+    }
+    uvec2 words = plus(plus(total(level), nodes + 1u), internal + 1u);
+    words = plus(words, level + 1u + (nodes + 31u) / 32u + (internal + 3u) / 4u);
+    for (uint i = 0u; i < box_words; ++i) words = plus(words, nodes);
+    return words;
+}
+
+bool fits(uint level) { return less_equal(total(level), uvec2(capacity, 0u)) && less_equal(most_words(level), uvec2(budget[0], budget[1])); }
 
 void main() {
     if (item_index() > 0u) return;
@@ -32,8 +59,8 @@ void main() {
     }
     status.at[0].heuristic_level = level;
     level = min(level, deepest);
-    while (level > 0u && !less_equal(uvec2(status.at[0].total[2u * level], status.at[0].total[2u * level + 1u]), uvec2(capacity, 0u))) level -= 1u;
-    if (!less_equal(uvec2(status.at[0].total[2u * level], status.at[0].total[2u * level + 1u]), uvec2(capacity, 0u))) status.at[0].overflow = 1u;
+    while (level > 0u && !fits(level)) level -= 1u;
+    if (!fits(level)) status.at[0].overflow = 1u;
     uint n = status.at[0].overflow != 0u ? 0u : status.at[0].total[2u * level];
     status.at[0].level = level;
     status.at[0].candidates = n;

@@ -165,7 +165,7 @@ impl StructureReport {
         let (name, memory, status) = match structure {
             Structure::Octree(tree) => {
                 let memory = plain(tree.sizes().total(), tree.sizes().arrays().to_vec());
-                let memory = MemoryFigures { paper: Some(tree.paper_bytes()), scratch: Some(tree.scratch_bytes()), ..memory };
+                let memory = MemoryFigures { paper: Some(tree.sizes().paper()), scratch: Some(tree.scratch_bytes()), ..memory };
                 ("olbvh", memory, Some(tree.status()))
             }
             Structure::Lbvh(lbvh) => ("lbvh", plain(lbvh.bytes(), vec![("nodes and ids", lbvh.bytes())]), None),

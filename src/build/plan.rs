@@ -1,6 +1,6 @@
 //! Memory of a build: what the tree keeps, and what is scratch.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
@@ -24,6 +24,23 @@ impl Capacity {
     pub fn for_entries(entries: u32, level: u32) -> Self {
         let nodes = (1..=level).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
+    }
+
+    /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, so that whatever is built lies within them.
+    ///
+    /// # Errors
+    /// [`crate::Error::TooLarge`] if not even a tree without entries fits.
+    pub fn for_bytes(bytes: u64, level: u32, options: &BuildOptions) -> Result<Self> {
+        let size = |entries: u32| Arena::measure(|a| TreeMemory::carve(a, &Self::for_entries(entries, level), options));
+        if size(0)? > bytes {
+            return Err(Error::TooLarge(format!("a tree without entries takes {} bytes down to level {level}, not {bytes}", size(0)?)));
+        }
+        let (mut fits, mut beyond) = (0, u32::MAX);
+        while fits + 1 < beyond {
+            let middle = fits + (beyond - fits) / 2;
+            if size(middle)? <= bytes { fits = middle } else { beyond = middle }
+        }
+        Ok(Self::for_entries(fits, level))
     }
 }
 

@@ -40,6 +40,8 @@ pub(crate) fn cmd_depth(
     let workgroup = r.gpu().target().each;
     let alpha = options.alpha_fixed()?;
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
+    let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
+    let (budget, box_words) = ([words as u32, (words >> 32) as u32], if options.boxes { 6 } else { 0 });
     r.stage("build.depth", |r| {
         r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
         r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
@@ -49,7 +51,8 @@ pub(crate) fn cmd_depth(
         r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(groups))?;
         r.barrier("depth.estimate → depth.choose");
         let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
-        let choose = ChooseDepth { mesh: mesh.arrays.status, grid, status, candidates: scratch.candidates, tets, alpha, capacity, deepest };
+        let candidates = scratch.candidates;
+        let choose = ChooseDepth { mesh: mesh.arrays.status, grid, status, candidates, tets, alpha, capacity, deepest, budget, box_words };
         r.dispatch(&choose, once, Groups::Count(1))?;
         r.barrier("depth.choose → codes.count");
         Ok(())

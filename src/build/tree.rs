@@ -3,11 +3,12 @@
 use super::mesh::DeviceMesh;
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
+use crate::reference::depth::too_large;
 use crate::reference::grid::MAX_LEVEL;
 use crate::tree::{Memory, TreeArrays};
 use bytemuck::Pod;
@@ -42,8 +43,8 @@ impl Tree {
     /// exactly what is needed is allocated.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for α outside 0…10, [`Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
-    /// [`Error::Memory`] if it does not fit the device.
+    /// [`crate::Error::Invalid`] for α outside 0…10, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
+    /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
@@ -191,21 +192,8 @@ impl Tree {
 
     /// Bytes of each array.
     pub fn sizes(&self) -> Memory {
-        let (nodes, internal) = (u64::from(self.status.nodes), u64::from(self.status.internal));
-        Memory {
-            p: 4 * u64::from(self.status.entries),
-            po: 4 * (nodes + 1),
-            co: 4 * (internal + 1),
-            no: 4 * (u64::from(self.status.level) + 1),
-            boundary: 4 * nodes.div_ceil(32),
-            mask: 4 * internal.div_ceil(4),
-            boxes: if self.options.boxes { 24 * nodes } else { 0 },
-        }
-    }
-
-    /// Bytes as the paper's Table 2 counts them; see [`TreeArrays::paper_bytes`].
-    pub fn paper_bytes(&self) -> u64 {
-        4 * u64::from(self.status.entries) + 25 * u64::from(self.status.nodes) + 4 * u64::from(self.status.internal)
+        let BuildStatus { entries, nodes, internal, level, .. } = self.status;
+        Memory::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes)
     }
 
     /// Bytes of scratch memory that the build used beside the tree.
@@ -214,19 +202,12 @@ impl Tree {
     }
 }
 
-/// A caller who named a capacity gets the coarser tree; one who did not gets the figures.
+/// A caller who named a limit gets the coarser tree; one who did not gets the figures.
 fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
-    let at = |k: u32| u64::from(status.total[2 * k as usize]) | u64::from(status.total[2 * k as usize + 1]) << 32;
-    let wanted = status.heuristic_level;
-    match options.capacity {
-        None if wanted > status.level || status.overflow != 0 => {
-            let text =
-                format!("{} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity", at(wanted), u32::MAX);
-            Err(Error::TooLarge(text))
-        }
-        Some(capacity) if status.overflow != 0 => {
-            Err(Error::TooLarge(format!("a tree of a single node has {} entries, the capacity is {capacity}", at(0))))
-        }
-        _ => Ok(()),
+    let entries: [u64; 11] = std::array::from_fn(|k| u64::from(status.total[2 * k]) | u64::from(status.total[2 * k + 1]) << 32);
+    let unlimited = options.capacity.is_none() && options.budget.is_none();
+    if status.overflow != 0 || (unlimited && status.heuristic_level > status.level) {
+        return Err(too_large(&entries, status.heuristic_level, options));
     }
+    Ok(())
 }

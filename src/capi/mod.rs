@@ -243,6 +243,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
             lists: Lists::EVERY.into_iter().find(|l| *l as u32 == asked.lists).ok_or_else(|| unknown("lists", asked.lists))?,
             boxes: false,
             capacity: (asked.capacity != 0).then_some(asked.capacity),
+            budget: None,
         };
         let gpu = mesh.gpu();
         let tree = Tree::build(gpu, &mesh, &options)?;

@@ -62,7 +62,7 @@ pub(crate) struct BuildCase {
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase) -> Verdict {
     let mesh = case.mesh.mesh()?;
     let topology = topology(&mesh)?;
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, capacity: None };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, ..BuildOptions::default() };
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
     let expected = Expected::new(&mesh, &topology, &options, u32::MAX, 10)?;
     match case.way {

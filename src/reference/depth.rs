@@ -6,6 +6,7 @@ use super::vertices::Vertices;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::BuildOptions;
+use crate::tree::Memory;
 use rayon::prelude::*;
 
 /// Number of levels, and of values of `α_P`.
@@ -65,24 +66,38 @@ impl Sizes {
         if count == 0 { 0 } else { (1..=MAX_LEVEL).rev().find(reached).unwrap_or(0) }
     }
 
-    /// The level to build: the heuristic's, or the next coarser one whose entries fit the capacity.
+    /// The level to build: the heuristic's, or the next coarser one that keeps to the capacity and the budget.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits the capacity, or, without a capacity, if
-    /// the entries cannot be counted in 32 bits.
+    /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits, or, without a limit, if the entries cannot be
+    /// counted in 32 bits.
     pub fn level(&self, options: &BuildOptions) -> Result<u32> {
         let wanted = self.heuristic(options.alpha_fixed()?);
-        let entries = self.entries[wanted as usize];
-        let Some(capacity) = options.capacity else {
-            if entries > u64::from(u32::MAX) {
-                let text =
-                    format!("{entries} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity", u32::MAX);
-                return Err(Error::TooLarge(text));
-            }
-            return Ok(wanted);
+        let most = u64::from(options.capacity.unwrap_or(u32::MAX));
+        let fits = |&l: &u32| {
+            self.entries[l as usize] <= most
+                && options.budget.is_none_or(|budget| Memory::most(&self.entries, l, options.boxes).total() <= budget)
         };
-        let fits = |l: &u32| self.entries[*l as usize] <= u64::from(capacity);
-        let text = || format!("a tree of a single node has {} entries, the capacity is {capacity}", self.entries[0]);
-        (0..=wanted).rev().find(fits).ok_or_else(|| Error::TooLarge(text()))
+        let limited = options.capacity.is_some() || options.budget.is_some();
+        let coarsest = if limited { 0 } else { wanted };
+        (coarsest..=wanted).rev().find(fits).ok_or_else(|| too_large(&self.entries, wanted, options))
     }
+}
+
+/// Why there is no tree, `entries` being those of every level.
+pub fn too_large(entries: &[u64; LEVELS], wanted: u32, options: &BuildOptions) -> Error {
+    let root = entries[0];
+    Error::TooLarge(match (options.capacity, options.budget) {
+        (Some(capacity), _) if root > u64::from(capacity) => {
+            format!("a tree of a single node has {root} entries, the capacity is {capacity}")
+        }
+        (_, Some(budget)) => {
+            let bytes = Memory::most(entries, 0, options.boxes).total();
+            format!("a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes")
+        }
+        _ => {
+            let n = entries[wanted as usize];
+            format!("{n} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity or a budget", u32::MAX)
+        }
+    })
 }

@@ -49,6 +49,32 @@ pub struct Memory {
 }
 
 impl Memory {
+    /// Of a tree with so many entries, nodes, and nodes that are not leaves, down to `level`.
+    pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool) -> Self {
+        Self {
+            p: 4 * entries,
+            po: 4 * (nodes + 1),
+            co: 4 * (internal + 1),
+            no: 4 * (u64::from(level) + 1),
+            boundary: 4 * nodes.div_ceil(32),
+            mask: 4 * internal.div_ceil(4),
+            boxes: if boxes { 24 * nodes } else { 0 },
+        }
+    }
+
+    /// The most that a tree down to `level` can take, where `entries` counts those of the assignment `Aabb` on every level: a level has no more nodes
+    /// than entries or cells. Twin of `most_words` in `glsl/build/11_choose_depth`.
+    pub fn most(entries: &[u64; 11], level: u32, boxes: bool) -> Self {
+        let nodes = |levels: u32| 1 + (1..=levels).map(|k| entries[k as usize].min(8u64.pow(k))).sum::<u64>();
+        let internal = if level == 0 { 0 } else { nodes(level - 1) };
+        Self::new(entries[level as usize], nodes(level), internal, level, boxes)
+    }
+
+    /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, that is P, boxes, a byte per flag, CO, and no PO.
+    pub fn paper(&self) -> u64 {
+        self.p + 25 * (self.po / 4 - 1) + (self.co - 4)
+    }
+
     /// All arrays, by the names of the paper where it has one.
     pub fn arrays(&self) -> [(&'static str, u64); 7] {
         let Self { p, po, co, no, boundary, mask, boxes } = *self;
@@ -64,21 +90,8 @@ impl Memory {
 impl TreeArrays {
     /// Bytes of each array.
     pub fn memory(&self) -> Memory {
-        let words = |v: &[u32]| 4 * v.len() as u64;
-        Memory {
-            p: words(&self.p),
-            po: words(&self.po),
-            co: words(&self.co),
-            no: words(&self.no),
-            boundary: words(&self.boundary),
-            mask: words(&self.mask),
-            boxes: self.boxes.as_ref().map_or(0, |b| 24 * b.len() as u64),
-        }
-    }
-
-    /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, that is P, boxes, a byte per flag, CO, and no PO.
-    pub fn paper_bytes(&self) -> u64 {
-        4 * self.p.len() as u64 + 25 * u64::from(self.nodes()) + 4 * u64::from(self.internal_nodes())
+        let (nodes, internal) = (u64::from(self.nodes()), u64::from(self.internal_nodes()));
+        Memory::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some())
     }
 
     /// Figures of the tree, which must be a valid one.

@@ -4,7 +4,7 @@ use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
 use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::BuildOptions;
+use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
     OverlapMemory, PairMemory, Rounds, Scene, Searched, SliceInput, SliceMemory, Structure, cmd_count_pairs, cmd_list_pairs, cmd_overlap,
@@ -32,7 +32,8 @@ impl Queries {
     pub fn new(gpu: &Gpu, frame: &Frame, values: &[f32], other: &Mesh, room: u64) -> Self {
         let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
         let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
-        let other_tree = Tree::build(gpu, &other, &BuildOptions::default()).unwrap();
+        // Pairs are found by lists.
+        let other_tree = Tree::build(gpu, &other, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
         let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
         let voxels = VoxelGrid {
             origin: [-1.0; 3],

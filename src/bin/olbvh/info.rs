@@ -16,6 +16,7 @@ use std::path::PathBuf;
 Examples:
   olbvh info bracket.vtu
   olbvh info bracket.vtu --alpha 1 --assign planes
+  olbvh info bracket.vtu --budget 2MiB
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
 Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no
@@ -73,7 +74,7 @@ fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
         "tree": {
-            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
+            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
             "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
         },
@@ -125,10 +126,11 @@ fn page(args: &Args, device: &str, loaded: &Loaded, s: &Summary, verbose: bool) 
         page.row(&f.name, format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
     }
     page.section(&format!(
-        "Tree (alpha {}, {}, lists {}), built in {} on {device}",
+        "Tree (alpha {}, {}, lists {}{}), built in {} on {device}",
         args.tree.alpha,
         args.tree.assign,
         args.tree.lists,
+        args.tree.budget.map(|b| format!(", budget {}", bytes(b))).unwrap_or_default(),
         milliseconds(s.build_ms)
     ));
     page.row("level of the leaves, l", s.level);

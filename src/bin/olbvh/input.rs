@@ -20,12 +20,35 @@ pub struct TreeArgs {
     /// paper. Answers are the same.
     #[arg(long, default_value_t = BuildOptions::default().lists, value_name = "all|boundary")]
     pub lists: Lists,
+    /// Most memory for the arrays of the tree, such as 64MiB (units B, KiB, MiB, GiB; kB, MB, GB): the tree gets coarser than --alpha asks for until
+    /// it fits, by what `--lists all --assign aabb` could take at most. Answers are the same.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub budget: Option<u64>,
+}
+
+/// A number of bytes with a unit.
+fn bytes(text: &str) -> Result<u64, String> {
+    let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = (&text[..digits], text[digits..].trim());
+    let units =
+        [("", 1.0), ("B", 1.0), ("KiB", 1024.0), ("MiB", 1_048_576.0), ("GiB", 1_073_741_824.0), ("kB", 1e3), ("MB", 1e6), ("GB", 1e9)];
+    let factor = units.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|u| u.1);
+    let bytes = number.parse::<f64>().ok().zip(factor).map(|(n, factor)| (n * factor).floor());
+    // Any such number below 2^63 is one of u64 too.
+    bytes.filter(|b| (0.0..9e18).contains(b)).map(|b| b as u64).ok_or_else(|| "a number and a unit, such as 64MiB, 1.5GiB or 500000".into())
 }
 
 impl TreeArgs {
     /// The options of a build, checked.
     pub fn options(&self, boxes: bool) -> Outcome<BuildOptions> {
-        let options = BuildOptions { alpha: self.alpha, assign: self.assign, lists: self.lists, boxes, ..BuildOptions::default() };
+        let options = BuildOptions {
+            alpha: self.alpha,
+            assign: self.assign,
+            lists: self.lists,
+            boxes,
+            budget: self.budget,
+            ..BuildOptions::default()
+        };
         options.alpha_fixed()?;
         Ok(options)
     }

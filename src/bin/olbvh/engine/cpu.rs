@@ -48,7 +48,7 @@ impl Engine for Cpu {
             nodes: u64::from(tree.nodes()),
             leaves: tree.leaves().len() as u64,
             memory: tree.memory(),
-            paper_bytes: tree.paper_bytes(),
+            paper_bytes: tree.memory().paper(),
             topology_ms,
             build_ms,
             stages: Vec::new(),

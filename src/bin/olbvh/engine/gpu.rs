@@ -71,7 +71,7 @@ impl Engine for Device {
             nodes: u64::from(built.nodes),
             leaves: u64::from(built.leaves),
             memory: tree.sizes(),
-            paper_bytes: tree.paper_bytes(),
+            paper_bytes: tree.sizes().paper(),
             topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
