@@ -149,13 +149,14 @@ struct NodeFrame {
     uint pad2;      // Unused.
 };
 
-// Counters of one direction of an overlap; 64 bits as two words, low first.
+// Counters of one direction of an overlap; 64 bits as two words, low first. Those that are zeroed between rounds lie 16 bytes behind the one that
+// dispatches are sized by, since a descriptor of a word covers as much.
 struct OverlapStatus {
     uint waiting;    // Primitives that need a search.
-    uint unfinished; // Primitives that need another dispatch.
     uint by_vertex;  // Primitives with a vertex in the other mesh, or around one of its vertices.
     uint by_node;    // Primitives that touch a non-boundary node of the other tree.
     uint located;    // Vertices that had to be looked up in the list of a leaf.
+    uint unfinished; // Primitives that need another dispatch.
     uint unfilled;   // Primitives whose pairs need another dispatch to be written; at least 1 as long as pairs are being counted.
     uint narrow[2];  // Tests of two tetrahedra by separating axes.
     uint pairs[2];   // Pairs that touch.

@@ -9,6 +9,7 @@ use crate::layout::{NodeFrame, OverlapStatus};
 use crate::primitives::Arena;
 use crate::query::{Overlapped, set_bits};
 use crate::reference::overlap::{joint_grid, node_frame};
+use std::mem::offset_of;
 
 /// Nodes and candidates that a primitive may look at in one dispatch.
 const BUDGET: u32 = 4096;
@@ -89,7 +90,7 @@ impl Lbvh {
                             r.fill(part, 0);
                         }
                     } else {
-                        r.fill(way.status.word(1), 0);
+                        r.fill(way.status.part(offset_of!(OverlapStatus, unfinished) as u64, 4), 0);
                     }
                 }
                 r.barrier("lbvh.clear → lbvh.overlap");

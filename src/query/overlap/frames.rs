@@ -7,6 +7,7 @@ use crate::layout::{NodeFrame, OverlapStatus};
 use crate::options::Assign;
 use crate::primitives::Arena;
 use crate::query::Scene;
+use std::mem::offset_of;
 
 /// Counters of both directions, and [`NodeFrame`] of either tree.
 #[derive(Clone, Copy, Debug)]
@@ -39,6 +40,11 @@ impl Frames {
         };
         r.dispatch(&arguments, OverlapFramesSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
     }
+}
+
+/// The counter that every round begins with at 0.
+pub(super) fn unfinished(status: BufferRef) -> BufferRef {
+    status.part(offset_of!(OverlapStatus, unfinished) as u64, 4)
 }
 
 /// Whether two primitives meet in one leaf only, as far as the kernels are concerned: with filtered lists the cell of the corner may lack one of them.

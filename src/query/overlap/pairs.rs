@@ -1,14 +1,15 @@
 //! Pairs of primitives that intersect, recorded: counted, then written within what memory there is.
 
-use super::frames::{Frames, each_once};
+use super::frames::{Frames, each_once, unfinished};
 use super::sets::BUDGET;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{OverlapPairs, OverlapPairsSpec};
-use crate::layout::SearchState;
+use crate::layout::{OverlapStatus, SearchState};
 use crate::options::Lists;
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{Rounds, Scene};
+use std::mem::offset_of;
 
 /// Counters and scratch memory of pairs: 24 bytes per tetrahedron of A.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +66,7 @@ pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &Pair
             r.barrier("overlap.pairs → overlap.clear");
         }
         if round > 0 || rounds.resume {
-            r.fill(memory.status.word(1), 0);
+            r.fill(unfinished(memory.status), 0);
         }
         r.barrier("overlap.clear → overlap.pairs");
         cmd_pairs(r, a, b, memory, 0, r.gpu().nothing())?;
@@ -89,7 +90,7 @@ pub fn cmd_list_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairM
         if round > 0 {
             r.barrier("overlap.pairs → overlap.clear");
         }
-        r.fill(memory.status.word(5), 0);
+        r.fill(memory.status.part(offset_of!(OverlapStatus, unfilled) as u64, 4), 0);
         r.barrier("overlap.clear → overlap.pairs");
         cmd_pairs(r, a, b, memory, 1, found)?;
     }

@@ -1,6 +1,6 @@
 //! Sets of primitives that intersect the other mesh, recorded: both directions side by side.
 
-use super::frames::{Frames, each_once};
+use super::frames::{Frames, each_once, unfinished};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -110,7 +110,7 @@ pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapM
             if round > 0 {
                 r.barrier("overlap.search → overlap.clear");
             }
-            ways.iter().for_each(|w| r.fill(w.arrays.status.word(1), 0));
+            ways.iter().for_each(|w| r.fill(unfinished(w.arrays.status), 0));
             r.barrier("overlap.clear → overlap.search");
             ways.iter().zip(groups).try_for_each(|(w, groups)| w.cmd_search(r, groups))?;
         }
