@@ -19,7 +19,7 @@
 //! ```
 //!
 //! # Layers
-//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`], [`baseline`] ← conformance, `bench`, `formats` ← program.
+//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`], [`baseline`] ← conformance, `bench`, `formats` ← `tune` ← program.
 //! [`mesh`], [`tree`], [`options`], [`layout`], [`render`] and [`mod@reference`] know no Vulkan.
 //!
 //! - **Record**: functions named `cmd_*` append to a [`gpu::Recorder`]: the caller's command buffer, the caller's memory, nothing submitted,
@@ -56,5 +56,7 @@ pub mod reference;
 pub mod render;
 pub mod slicing;
 pub mod tree;
+#[cfg(feature = "cli")]
+pub mod tune;
 
 pub use error::{Error, Result};

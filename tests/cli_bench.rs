@@ -19,6 +19,56 @@ fn milliseconds(figure: &Value) -> f64 {
     figure["device_ms"].get("median").unwrap_or(&figure["wall_ms"]["median"]).as_f64().unwrap()
 }
 
+/// Stages fit the build's figure, the sizes of the tree, and the copy rate.
+fn check_stages(report: &Value, structure: &Value) {
+    let timed = structure["figures"][0]["stages_ms"].as_object().unwrap();
+    let stages = structure["stages"].as_array().unwrap();
+    let copied = report["copy"]["gb_per_s"].as_f64().unwrap();
+    assert!(copied > 0.0);
+    for stage in stages {
+        let [ms, bytes, rate, part] = ["ms", "bytes", "gb_per_s", "of_copy_rate"].map(|key| stage[key].as_f64().unwrap());
+        assert!((rate * ms * 1e6 / bytes - 1.0).abs() < 1e-9 && (part * copied / rate - 1.0).abs() < 1e-9, "{stage}");
+        let name = stage["stage"].as_str().unwrap();
+        assert!(name.starts_with("mesh.") || timed[name].as_f64() == Some(ms), "{stage}");
+        let entries = structure["entries"].as_f64().unwrap();
+        if name == "build.emit" || name == "build.sort" {
+            assert!(bytes >= 8.0 * entries, "{stage} for {entries} entries");
+        }
+    }
+    let missing: Vec<_> =
+        timed.iter().filter(|(name, ms)| ms.as_f64() > Some(0.0) && stages.iter().all(|s| s["stage"] != **name)).collect();
+    // A tree that is its root alone has nothing to sort and no levels.
+    assert!(
+        missing.iter().all(|(name, _)| structure["level"] == 0 && ["build.sort", "build.levels"].contains(&name.as_str())),
+        "{missing:?}"
+    );
+}
+
+#[test]
+fn time_per_item_is_told_over_sizes() {
+    let folder = tempfile::tempdir().unwrap();
+    let sizes = ["--suite", "scaling", "--points", "300", "--repeat", "3", "--seconds", "0.02", "--quiet"];
+    let out = bench(folder.path(), &[&["kuhn:2,2,2", "kuhn:7,6,5", "-o", "out", "--json"], &sizes[..]].concat());
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let report: Value = serde_json::from_slice(&out.stdout).unwrap();
+    let scaling = report["scaling"].as_array().unwrap();
+    assert_eq!(scaling.len(), 3 * 2 * 3, "measurements × meshes × structures");
+    for scale in scaling {
+        let mesh = report["meshes"].as_array().unwrap().iter().find(|m| m["name"] == scale["mesh"]).unwrap();
+        let structure = mesh["structures"].as_array().unwrap().iter().find(|s| s["name"] == scale["structure"]).unwrap();
+        let figure = structure["figures"].as_array().unwrap().iter().find(|f| f["quantity"] == scale["quantity"]).unwrap();
+        let per_item = scale["ns_per_item"].as_f64().unwrap();
+        assert!((per_item * figure["per_second"].as_f64().unwrap() / 1e9 - 1.0).abs() < 1e-9, "{scale}");
+        // The larger mesh is nearer to 200,000.
+        assert!(scale["mesh"] != "kuhn:7,6,5" || scale["ratio"] == 1.0, "{scale}");
+    }
+    assert!(std::fs::read_to_string(folder.path().join("out/bench.md")).unwrap().contains("## Scaling: Construction"));
+    for plot in ["fig06_construction", "location_random", "location_coherent"] {
+        let svg = std::fs::read_to_string(folder.path().join(format!("out/scaling_{plot}.svg"))).unwrap();
+        assert!(svg.matches("<circle").count() == 6 && svg.matches("<polyline").count() == 3 && !svg.contains("NaN"), "{svg}");
+    }
+}
+
 #[test]
 fn a_tiny_mesh_is_measured() {
     let folder = tempfile::tempdir().unwrap();
@@ -29,7 +79,7 @@ fn a_tiny_mesh_is_measured() {
     assert_eq!(out.status.code(), Some(0), "{messages}");
     assert!(messages.contains("kuhn:4,5,3: OLBVH α=0 aabb"), "{messages}");
     let report: Value = serde_json::from_slice(&out.stdout).unwrap();
-    for key in ["version", "commit", "suite", "settings", "device", "meshes"] {
+    for key in ["version", "commit", "suite", "settings", "device", "copy", "meshes"] {
         assert!(report.get(key).is_some(), "no {key} in {report:#}");
     }
     assert_eq!(report["settings"]["budget"]["repetitions"], 3);
@@ -54,6 +104,7 @@ fn a_tiny_mesh_is_measured() {
             }
             if structure["kind"] == "olbvh" {
                 assert!(memory["paper"].as_u64().is_some() && structure["nodes"].as_u64().is_some());
+                check_stages(&report, structure);
             }
             for figure in structure["figures"].as_array().unwrap() {
                 let time = milliseconds(figure);
@@ -81,13 +132,52 @@ fn a_tiny_mesh_is_measured() {
     let stored: Value = serde_json::from_slice(&std::fs::read(out.join("bench.json")).unwrap()).unwrap();
     assert_eq!(stored, report);
     let tables = std::fs::read_to_string(out.join("bench.md")).unwrap();
-    for title in ["## Meshes (Table 1)", "## Construction (Fig. 6)", "## Memory (Table 2)", "## Every measurement, shell:8"] {
+    for title in [
+        "## Bytes that each stage moves at least, shell:8",
+        "## Meshes (Table 1)",
+        "## Construction (Fig. 6)",
+        "## Memory (Table 2)",
+        "## Every measurement, shell:8",
+    ] {
         assert!(tables.contains(title), "no {title} in {tables}");
     }
     for plot in ["fig06_construction", "table2_memory", "fig07_samples", "fig08_slicing", "fig10_overlap", "location_random"] {
         let svg = std::fs::read_to_string(out.join(plot).with_extension("svg")).unwrap();
         assert!(svg.starts_with("<svg") && svg.ends_with("</svg>\n") && svg.contains("LBVH") && !svg.contains("NaN"), "{plot}");
     }
+}
+
+#[test]
+fn two_results_are_compared() {
+    let folder = tempfile::tempdir().unwrap();
+    let measured = |mesh: &str, file: &str, pixels: &str| {
+        let sizes = ["--points", "500", "--pixels", pixels, "--repeat", "3", "--seconds", "0.02", "--quiet"];
+        let out = bench(folder.path(), &[&[mesh, "-o", file], &sizes[..]].concat());
+        assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    };
+    measured("kuhn:3,2,2", "a.json", "16");
+    measured("kuhn:3,2,2", "b.json", "24");
+    let out = bench(folder.path(), &["--compare", "a.json", "b.json", "-o", "changes.md", "--json"]);
+    assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
+    let json: Value = serde_json::from_slice(&out.stdout).unwrap();
+    assert_eq!(json["different"]["settings.picture"], serde_json::json!([16, 24]));
+    assert_eq!(json["same"]["settings.points"], 500);
+    let compared = json["compared"].as_array().unwrap();
+    let of = |name: &str| compared.iter().filter(|c| c["measurement"] == name).count();
+    assert!(of("copy") == 2 && of("build") >= 13 && of("locate_random") == of("build") && of("intervals") == 0, "{json:#}");
+    let report: Value = serde_json::from_slice(&std::fs::read(folder.path().join("a.json")).unwrap()).unwrap();
+    let first = &report["meshes"][0]["structures"][0]["figures"][0];
+    assert_eq!(
+        compared.iter().find(|c| c["measurement"] == "build").unwrap()["ms"][0],
+        first[if first["device_ms"].is_null() { "wall_ms" } else { "device_ms" }]
+    );
+    let tables = std::fs::read_to_string(folder.path().join("changes.md")).unwrap();
+    assert!(tables.contains("## Summary") && tables.contains("## Times, kuhn:3,2,2") && tables.contains("WHAT DIFFERS"), "{tables}");
+    let missing = bench(folder.path(), &["--compare", "a.json", "nothing.json"]);
+    assert_eq!(missing.status.code(), Some(3));
+    assert_eq!(bench(folder.path(), &["--compare", "a.json"]).status.code(), Some(2));
+    assert_eq!(bench(folder.path(), &["--compare", "a.json", "changes.md"]).status.code(), Some(3));
+    assert_eq!(bench(folder.path(), &["kuhn:2,2,2", "--compare", "a.json", "b.json"]).status.code(), Some(2));
 }
 
 #[test]

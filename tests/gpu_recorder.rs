@@ -11,7 +11,7 @@ use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh,
 };
 use olbvh::gpu::{Buffer, BufferRef, Gpu, GpuOptions, Recorder};
-use olbvh::kernels::{SortTarget, Target};
+use olbvh::kernels::{Row, SortTarget, Target};
 use olbvh::mesh::kuhn_jittered;
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{
@@ -52,11 +52,9 @@ fn every_barrier_counts(gpu: &Gpu, what: &str, work: impl Fn(&mut Recorder<'_>) 
 }
 
 fn targets(gpu: &Gpu) -> Vec<Gpu> {
-    let subgroup = gpu.subgroup_size();
-    let serial = Target::select(subgroup, true);
-    let few_bits = Target { sort: SortTarget { digit_bits: 4, ..serial.sort }, ..serial };
-    let open = |target| Gpu::new(&GpuOptions { target: Some(target), ..Default::default() }).unwrap();
-    vec![open(serial), open(Target::select(subgroup, false)), open(few_bits)]
+    let [serial, ballot] = [Row::Cpu, Row::Portable].map(|row| row.target(&gpu.report().room));
+    let few_bits = Target { sort: SortTarget { digit_bits: 4, ..serial.sort }, ..serial.clone() };
+    [serial, ballot, few_bits].map(|target| gpu.with_target(target).unwrap()).to_vec()
 }
 
 #[test]

@@ -25,7 +25,29 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),
-    ("bench", &["baseline", "build", "error", "gpu", "layout", "mesh", "options", "query", "reference", "render", "slicing", "tree"]),
+    (
+        "bench",
+        &[
+            "baseline",
+            "build",
+            "error",
+            "gpu",
+            "kernels",
+            "layout",
+            "mesh",
+            "options",
+            "primitives",
+            "query",
+            "reference",
+            "render",
+            "slicing",
+            "tree",
+        ],
+    ),
+    (
+        "tune",
+        &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "tree"],
+    ),
     (
         "conformance",
         &[

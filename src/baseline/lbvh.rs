@@ -66,7 +66,7 @@ impl Lbvh {
             r.barrier("lbvh.sort → lbvh.merge");
             r.stage("lbvh.merge", |r| {
                 // One subgroup on processors: see the kernel.
-                let workgroup = gpu.target().scan.workgroup;
+                let workgroup = if gpu.report().kind == "cpu" { gpu.subgroup_size() } else { gpu.target().each };
                 let spec = LbvhMergeSpec { workgroup, ..Default::default() };
                 let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, tets: valid };
                 r.dispatch(&arguments, spec, Groups::Count(valid.div_ceil(workgroup)))
@@ -110,7 +110,7 @@ impl Lbvh {
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
         let memory = gpu.buffer("olbvh.lbvh.located", Arena::measure(carve)?)?;
         let (owners, barycentrics, unfinished) = carve(&mut Arena::new(memory.all()))?;
-        let workgroup = gpu.target().each;
+        let workgroup = gpu.target().query;
         let count = points.len() as u32;
         let mut located = Located::default();
         let mut fresh = 1;

@@ -46,7 +46,7 @@ impl Way<'_> {
             tets: own.tets,
             budget: BUDGET,
         };
-        let workgroup = r.gpu().target().each;
+        let workgroup = r.gpu().target().query;
         let spec = LbvhOverlapSpec { workgroup, own_stride: own.stride, stride: other.stride, ..Default::default() };
         r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(workgroup)))
     }

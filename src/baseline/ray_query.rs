@@ -94,7 +94,7 @@ impl RayQuery {
     /// # Errors
     /// [`crate::Error::Vulkan`] if the pipeline cannot be made.
     pub fn cmd_locate(&self, r: &mut Recorder<'_>, mesh: &DeviceMesh, input: &PointInput, output: &LocateOutput) -> Result<()> {
-        let workgroup = r.gpu().target().each;
+        let workgroup = r.gpu().target().query;
         let arguments = LocateByRay {
             grid: mesh.arrays().grid,
             sides: self.sides.all(),

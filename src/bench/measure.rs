@@ -2,7 +2,7 @@
 
 use crate::error::Result;
 use crate::gpu::StageTime;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
@@ -16,7 +16,7 @@ pub struct Budget {
 }
 
 /// The smallest, median and largest of some times, in milliseconds.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Spread {
     /// Smallest.
     pub min: f64,
@@ -28,7 +28,7 @@ pub struct Spread {
 
 impl Spread {
     /// Of at least one time.
-    fn of(mut times: Vec<f64>) -> Option<Self> {
+    pub(crate) fn of(mut times: Vec<f64>) -> Option<Self> {
         times.sort_by(f64::total_cmp);
         let middle = times.len() / 2;
         let (min, max, upper) = (*times.first()?, *times.last()?, *times.get(middle)?);

@@ -7,20 +7,31 @@
 //! verify     its answers against those of the first structure, and of the reference
 //! measure    repetitions within a budget
 //! report     every figure, and the ratios to the LBVH     → table (text, Markdown), plot (SVG)
+//!
+//! copy       how fast the device copies     traffic    what each stage must move at least, to compare with that
+//! scaling    time per item over the size of the mesh
+//! compare    two files of reports: ratios, and which of them are more than noise
 //! ```
 
+mod compare;
+mod copy;
 mod measure;
 mod plot;
 mod report;
+mod scaling;
 mod structure;
 mod subject;
 mod suite;
 mod table;
+mod traffic;
 mod verify;
 
+pub use compare::{Compared, Comparison, Verdict, compare};
+pub use copy::CopyRate;
 pub use measure::{Budget, Spread, Timing};
 pub use plot::plots;
-pub use report::{DeviceFacts, Figure, Lost, MemoryFigures, MeshReport, Quality, Quantity, Report, StructureReport};
+pub use report::{DeviceFacts, Figure, Lost, MemoryFigures, MeshReport, Quality, Quantity, Report, StageFigure, StructureReport};
+pub use scaling::Scale;
 pub use structure::Kind;
 pub use suite::{Settings, Suite};
 pub use table::{markdown, text};
@@ -34,17 +45,18 @@ use structure::{Built, Structure};
 use subject::Subject;
 use verify::{Answers, check, check_tree};
 
-/// Measures all structures over a mesh; `progress` is told what is being done.
+/// Measures the structures of a report's suite over a mesh; `progress` is told what is being done.
 ///
 /// # Errors
 /// [`crate::Error::Mismatch`] if two structures give different answers, [`crate::Error::Memory`] and the like if the device cannot hold the mesh.
-pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &dyn Fn(&str)) -> Result<MeshReport> {
+pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn(&str)) -> Result<MeshReport> {
+    let settings = &whole.settings;
     progress(&format!("{name}: {} tetrahedra", mesh.tets.len()));
     let subject = Subject::new(gpu, mesh, settings)?;
     let mut report = MeshReport::new(name, &subject);
     let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
     let mut expected: Option<Answers> = None;
-    for kind in Kind::all() {
+    for kind in whole.suite.kinds() {
         let structure = match Structure::build(gpu, &subject.device, kind) {
             Ok(Some(structure)) => structure,
             Ok(None) => {
@@ -59,7 +71,8 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &d
             Err(error) => return Err(error),
         };
         progress(&format!("{name}: {kind}"));
-        let moved = if kind.overlaps() { Structure::build(gpu, &subject.moved, kind)? } else { None };
+        let moved = subject.moved.as_ref().filter(|_| kind.overlaps());
+        let moved = moved.map(|moved| Structure::build(gpu, moved, kind)).transpose()?.flatten();
         let answers = Answers::of(&subject, &structure, moved.as_ref())?;
         if let (Structure::Octree(tree), Some(topology)) = (&structure, &topology) {
             check_tree(&subject, topology, tree, &answers)?;
@@ -68,7 +81,9 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, settings: &Settings, progress: &d
             Some(first) => check(&subject, kind, first, &answers)?,
             None => None,
         };
-        report.structures.push(measure(&subject, kind, (&structure, moved.as_ref()), &answers, lost, settings)?);
+        let mut measured = measure(&subject, kind, (&structure, moved.as_ref()), &answers, lost, settings)?;
+        measured.set_stages(&subject, &structure, &whole.copy);
+        report.structures.push(measured);
         expected.get_or_insert(answers);
     }
     report.set_ratios();
@@ -113,8 +128,8 @@ fn measure(
         };
         add(Quantity::Slice, Some(repeat(budget, sliced)?), None, Some(kinds.len() as u64));
     }
-    if let Some(moved) = moved {
-        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh: &subject.moved, structure: moved }];
+    if let (Some(moved), Some(mesh)) = (moved, &subject.moved) {
+        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh, structure: moved }];
         let runs = repeat(budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
         add(Quantity::Overlap, Some(runs), None, None);
     }

@@ -12,7 +12,7 @@ const GRID: &str = "#e3e3e8";
 const INK: &str = "#22252b";
 
 /// The colour of a structure: a hue per α, lighter for stronger assignments, darkest for lists at the boundary; grey and violet for the baselines.
-fn color(s: &StructureReport) -> &'static str {
+pub(super) fn color(s: &StructureReport) -> &'static str {
     let octrees = [
         ["#2d65ad", "#6a9ad3", "#acc9ea", "#123663"],
         ["#258a64", "#5fb592", "#a6d8c2", "#0d4732"],
@@ -35,15 +35,16 @@ pub fn plots(report: &Report) -> Vec<(String, String)> {
     let memory = |s: &StructureReport| Some(s.memory.total as f64 / f64::from(1 << 20));
     let memory = ("table2_memory", "Memory (Table 2): MiB, less is better".to_owned(), chart(report, &memory));
     let all = Quantity::ALL.into_iter().map(figure).chain([memory]);
-    all.filter_map(|(stem, title, chart)| Some((format!("{stem}.svg"), frame(report, &title, &chart?)))).collect()
+    let bars = all.filter_map(|(stem, title, chart)| Some((format!("{stem}.svg"), frame(report, &title, &chart?))));
+    bars.chain(super::scaling::plots(report)).collect()
 }
 
-fn escaped(text: &str) -> String {
+pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
 /// The picture around a chart: title, device, legend.
-fn frame(report: &Report, title: &str, chart: &str) -> String {
+pub(super) fn frame(report: &Report, title: &str, chart: &str) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\" fill=\"{INK}\">\n\
          <rect width=\"{WIDTH}\" height=\"{HEIGHT}\" fill=\"#fff\"/>\n<text x=\"16\" y=\"24\" font-size=\"15\" font-weight=\"bold\">{}</text>\n\

@@ -1,9 +1,13 @@
 //! Every figure of a run.
 
+use super::scaling::scales;
 use super::structure::Structure;
 use super::subject::{Subject, corners, volume};
-use super::{Kind, Settings, Suite, Timing};
+use super::traffic::traffic;
+use super::{CopyRate, Kind, Scale, Settings, Suite, Timing};
+use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::kernels::Target;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -153,9 +157,38 @@ pub struct StructureReport {
     pub lost: Option<Lost>,
     /// Measurements.
     pub figures: Vec<Figure>,
+    /// Stages of the construction against the device's copy rate; of octrees only.
+    pub stages: Vec<StageFigure>,
+}
+
+/// A stage of a construction, and how far it is from what the device can move.
+#[derive(Clone, Debug, Serialize)]
+pub struct StageFigure {
+    /// Its name.
+    pub stage: String,
+    /// Milliseconds on the device, median; those of `mesh.` once, as it was uploaded.
+    pub ms: f64,
+    /// Bytes that it must read and write at least.
+    pub bytes: u64,
+    /// Gigabytes (10^9) per second that these bytes are.
+    pub gb_per_s: f64,
+    /// Part of the device's copy rate.
+    pub of_copy_rate: f64,
 }
 
 impl StructureReport {
+    /// Relates the stages of an octree's construction to the copy rate, where stages are timed.
+    pub(super) fn set_stages(&mut self, subject: &Subject<'_>, structure: &Structure, copy: &CopyRate) {
+        let Structure::Octree(tree) = structure else { return };
+        let build = self.figure(Quantity::Build).map(|f| f.timing.stages_ms.clone()).unwrap_or_default();
+        let stage = |(name, bytes): (&'static str, u64)| {
+            let ms = build.get(name).copied().unwrap_or_else(|| subject.device.time().milliseconds(name));
+            let gb_per_s = bytes as f64 / ms * 1e-6;
+            (ms > 0.0).then(|| StageFigure { stage: name.into(), ms, bytes, gb_per_s, of_copy_rate: gb_per_s / copy.gb_per_s })
+        };
+        self.stages = traffic(&subject.device, tree, subject.gpu.target()).into_iter().filter_map(stage).collect();
+    }
+
     pub(super) fn new(kind: Kind, structure: &Structure, lost: Option<Lost>) -> Self {
         let (alpha, assign, lists) = match kind {
             Kind::Octree { alpha, assign, lists } => (Some(alpha), Some(assign.name()), Some(lists.name())),
@@ -178,7 +211,20 @@ impl StructureReport {
             }
         };
         let (level, entries, nodes) = (status.map(|s| s.level), status.map(|s| s.entries), status.map(|s| s.nodes));
-        Self { name: kind.to_string(), kind: name, alpha, assign, lists, level, entries, nodes, memory, lost, figures: Vec::new() }
+        Self {
+            name: kind.to_string(),
+            kind: name,
+            alpha,
+            assign,
+            lists,
+            level,
+            entries,
+            nodes,
+            memory,
+            lost,
+            figures: Vec::new(),
+            stages: Vec::new(),
+        }
     }
 
     /// The measurement of a quantity.
@@ -289,8 +335,10 @@ pub struct DeviceFacts {
     pub subgroup: u32,
     /// Whether it has ray queries.
     pub ray_query: bool,
-    /// Shapes of the kernels.
-    pub target: &'static str,
+    /// Name of the shapes of the kernels.
+    pub target: String,
+    /// The shapes themselves.
+    pub tunables: Target,
     /// How kernels get their buffers.
     pub binding: String,
 }
@@ -308,13 +356,20 @@ pub struct Report {
     pub settings: Settings,
     /// The device.
     pub device: DeviceFacts,
+    /// How fast it copies.
+    pub copy: CopyRate,
+    /// Time per item over the size of the mesh; of the suite `scaling` only.
+    pub scaling: Vec<Scale>,
     /// The meshes.
     pub meshes: Vec<MeshReport>,
 }
 
 impl Report {
-    /// A report without meshes.
-    pub fn new(gpu: &Gpu, suite: Suite, settings: Settings, commit: Option<String>) -> Self {
+    /// A report without meshes; measures how fast the device copies.
+    ///
+    /// # Errors
+    /// As [`CopyRate::measure`].
+    pub fn new(gpu: &Gpu, suite: Suite, settings: Settings, commit: Option<String>) -> Result<Self> {
         let report = gpu.report();
         let device = DeviceFacts {
             name: report.name.clone(),
@@ -323,9 +378,19 @@ impl Report {
             kind: report.kind,
             subgroup: report.subgroup,
             ray_query: report.requirements.ray_query(),
-            target: gpu.target().name,
+            target: gpu.target().name.to_string(),
+            tunables: gpu.target().clone(),
             binding: format!("{:?}", gpu.binding()).to_lowercase(),
         };
-        Self { version: env!("CARGO_PKG_VERSION"), commit, suite, settings, device, meshes: Vec::new() }
+        let (copy, scaling, meshes) = (CopyRate::measure(gpu)?, Vec::new(), Vec::new());
+        Ok(Self { version: env!("CARGO_PKG_VERSION"), commit, suite, settings, device, copy, scaling, meshes })
+    }
+
+    /// Adds a mesh.
+    pub fn push(&mut self, mesh: MeshReport) {
+        self.meshes.push(mesh);
+        if self.suite == Suite::Scaling {
+            self.scaling = scales(self);
+        }
     }
 }

@@ -22,13 +22,13 @@ pub(super) struct Subject<'a> {
     pub gpu: &'a Gpu,
     pub mesh: &'a Mesh,
     pub device: DeviceMesh,
-    /// The same mesh, moved.
-    pub moved: DeviceMesh,
+    /// The same mesh, moved, where the overlap is asked for.
+    pub moved: Option<DeviceMesh>,
     /// Points to locate, and as what.
     pub points: Vec<(Quantity, Vec<[f32; 3]>)>,
     field: Field,
-    plan: Plan,
-    voxels: VoxelGrid,
+    plan: Option<Plan>,
+    voxels: Option<VoxelGrid>,
 }
 
 impl<'a> Subject<'a> {
@@ -38,9 +38,12 @@ impl<'a> Subject<'a> {
         let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
         let bounds = Bounds { lo: corner(grid.lo), hi: corner(grid.hi) };
         let extent = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
-        let mut moved = mesh.clone();
-        moved.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + MOVED * extent[c]));
-        let moved = DeviceMesh::upload(gpu, &moved, BadCells::Skip)?;
+        let move_it = || {
+            let mut moved = mesh.clone();
+            moved.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + MOVED * extent[c]));
+            DeviceMesh::upload(gpu, &moved, BadCells::Skip)
+        };
+        let moved = settings.overlap.then(move_it).transpose()?;
 
         let random = random_points(mesh, settings.points);
         let mut coherent = random.clone();
@@ -51,33 +54,34 @@ impl<'a> Subject<'a> {
         let field = of_points.unwrap_or_else(along_x);
         // Every sample is taken: nothing is opaque, and no ray ends early.
         let picture = RenderSettings { size: [settings.picture; 2], shading: false, termination: 1.0, ..RenderSettings::default() };
-        let plan = Plan::new(&picture, &bounds, mesh.origin, field.range())?;
+        let plan = (settings.picture > 0).then(|| Plan::new(&picture, &bounds, mesh.origin, field.range())).transpose()?;
         let thickness = extent.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
         let slice =
             SliceSettings { size: [settings.slice, 0], thickness: Some(f64::from(thickness) * THICKNESS), ..SliceSettings::default() };
-        let voxels = slice.voxels(bounds.lo, bounds.hi, [0.0; 3])?;
-        let samples = samples(&plan, &bounds, settings.points as usize);
-        let points = vec![(Quantity::LocateRandom, random), (Quantity::LocateCoherent, coherent), (Quantity::LocateSamples, samples)];
+        let voxels = (settings.slice > 0).then(|| slice.voxels(bounds.lo, bounds.hi, [0.0; 3])).transpose()?;
+        let samples = plan.as_ref().map(|plan| (Quantity::LocateSamples, samples(plan, &bounds, settings.points as usize)));
+        let points = [(Quantity::LocateRandom, random), (Quantity::LocateCoherent, coherent)].into_iter().chain(samples).collect();
         Ok(Self { gpu, mesh, device, moved, points, field, plan, voxels })
     }
 
     /// Centre of a voxel of the slice, by its number.
     pub(super) fn centre(&self, voxel: usize) -> [f32; 3] {
-        let (row, at) = (self.voxels.size[0].max(1), voxel as u32);
-        self.voxels.centre([at % row, at / row, 0])
+        let Some(voxels) = &self.voxels else { return [f32::NAN; 3] };
+        let (row, at) = (voxels.size[0].max(1), voxel as u32);
+        voxels.centre([at % row, at / row, 0])
     }
 
     /// Draws the field; `None` where the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
-        let Some(searched) = structure.searched() else { return Ok(None) };
-        query::render(&self.device, searched, &self.plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
+        let (Some(searched), Some(plan)) = (structure.searched(), &self.plan) else { return Ok(None) };
+        query::render(&self.device, searched, plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
     }
 
     /// Slices the mesh through its middle; `None` where the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
-        let Some(searched) = structure.searched() else { return Ok(None) };
+        let (Some(searched), Some(voxels)) = (structure.searched(), &self.voxels) else { return Ok(None) };
         let field = Some((self.field.values.as_slice(), On::Points));
-        query::slice(&self.device, searched, field, &self.voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
+        query::slice(&self.device, searched, field, voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
     }
 }
 

@@ -1,7 +1,8 @@
 //! What is measured: which meshes, how large the questions are, how long.
 
-use super::Budget;
+use super::{Budget, Kind};
 use crate::error::{Error, Result};
+use crate::options::Assign;
 use serde::Serialize;
 
 /// A choice of meshes and sizes.
@@ -15,11 +16,24 @@ pub enum Suite {
     Paper,
     /// The same, and Kuhn grids from a thousand to 12.3 million tetrahedra.
     Full,
+    /// Construction and location only, over Kuhn grids from a thousand to 12.3 million tetrahedra.
+    Scaling,
 }
 
 impl Suite {
     /// Every suite, smallest first.
-    pub const ALL: [Self; 3] = [Self::Quick, Self::Paper, Self::Full];
+    pub const ALL: [Self; 4] = [Self::Quick, Self::Paper, Self::Full, Self::Scaling];
+
+    /// The structures that are measured.
+    pub(super) fn kinds(self) -> Vec<Kind> {
+        let plain = |kind: &Kind| match kind {
+            Kind::Octree { alpha, assign, .. } => *alpha == 0 && *assign == Assign::Aabb,
+            Kind::Lbvh => true,
+            Kind::RayQuery => false,
+        };
+        let all = Kind::all();
+        if self == Self::Scaling { all.into_iter().filter(plain).collect() } else { all }
+    }
 
     /// The name used on the command line and in reports.
     pub fn name(self) -> &'static str {
@@ -27,6 +41,7 @@ impl Suite {
             Self::Quick => "quick",
             Self::Paper => "paper",
             Self::Full => "full",
+            Self::Scaling => "scaling",
         }
     }
 
@@ -45,6 +60,11 @@ impl Suite {
         match self {
             Self::Quick => vec![("", "kuhn:31,31,31"), ("", "graded:16")],
             Self::Paper => paper.to_vec(),
+            Self::Scaling => {
+                let [k1, k10, k100, k200] = ["kuhn:6,6,5", "kuhn:12,12,12", "kuhn:26,26,25", "kuhn:32,32,32"];
+                let [m1, m4, m12] = ["kuhn:55,55,55", "kuhn:87,88,87", "kuhn:127,127,127"];
+                vec![("1k", k1), ("10k", k10), ("100k", k100), ("200k", k200), ("1M", m1), ("4M", m4), ("12.3M", m12)]
+            }
             Self::Full => sizes.map(|mesh| ("", mesh)).into_iter().chain(paper).collect(),
         }
     }
@@ -55,7 +75,7 @@ impl std::str::FromStr for Suite {
 
     fn from_str(name: &str) -> Result<Self> {
         let found = Self::ALL.into_iter().find(|s| s.name().eq_ignore_ascii_case(name));
-        found.ok_or_else(|| Error::Invalid(format!("unknown suite `{name}`; known are quick, paper, full")))
+        found.ok_or_else(|| Error::Invalid(format!("unknown suite `{name}`; known are quick, paper, full, scaling")))
     }
 }
 
@@ -64,10 +84,12 @@ impl std::str::FromStr for Suite {
 pub struct Settings {
     /// Points to locate.
     pub points: u32,
-    /// Width and height of the picture.
+    /// Width and height of the picture; 0: none is drawn, and none of its samples are located.
     pub picture: u32,
-    /// Voxels of a row of the slice.
+    /// Voxels of a row of the slice; 0: none.
     pub slice: u32,
+    /// Whether the overlap with the moved mesh is asked for.
+    pub overlap: bool,
     /// Trees over meshes up to this size are compared with the reference, array by array.
     pub reference_tets: usize,
     /// Per measurement.
@@ -79,9 +101,13 @@ impl Settings {
     pub fn of(suite: Suite) -> Self {
         if suite == Suite::Quick {
             let budget = Budget { repetitions: 50, seconds: 0.05 };
-            return Self { points: 1 << 14, picture: 96, slice: 256, reference_tets: 300_000, budget };
+            return Self { points: 1 << 14, picture: 96, slice: 256, overlap: true, reference_tets: 300_000, budget };
+        }
+        if suite == Suite::Scaling {
+            let budget = Budget { repetitions: 15, seconds: 5.0 };
+            return Self { points: 1 << 18, picture: 0, slice: 0, overlap: false, reference_tets: 300_000, budget };
         }
         let budget = Budget { repetitions: 50, seconds: 5.0 };
-        Self { points: 1 << 20, picture: 1024, slice: 999, reference_tets: 300_000, budget }
+        Self { points: 1 << 20, picture: 1024, slice: 999, overlap: true, reference_tets: 300_000, budget }
     }
 }

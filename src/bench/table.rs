@@ -4,10 +4,37 @@ use super::report::{MeshReport, Quantity, Report, StructureReport};
 use std::fmt::Write as _;
 
 /// A table: the first column is text, the others are right-aligned.
-struct Table {
-    title: String,
-    header: Vec<String>,
-    rows: Vec<Vec<String>>,
+pub(super) struct Table {
+    pub title: String,
+    pub header: Vec<String>,
+    pub rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// With columns for a terminal.
+    pub fn text(&self, out: &mut String) {
+        let Self { title, header, rows } = self;
+        let width = |c: usize| rows.iter().chain([header]).filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..header.len()).map(width).collect();
+        let _ = writeln!(out, "\n{title}");
+        for row in std::iter::once(header).chain(rows) {
+            let room = |cell: &str, width: usize| " ".repeat(width.saturating_sub(cell.chars().count()));
+            let mut line = format!("  {}{}", row[0], room(&row[0], widths[0]));
+            for (cell, &w) in row.iter().zip(&widths).skip(1) {
+                let _ = write!(line, "  {}{cell}", room(cell, w));
+            }
+            let _ = writeln!(out, "{}", line.trim_end());
+        }
+    }
+
+    /// As a section of Markdown.
+    pub fn markdown(&self, out: &mut String) {
+        let Self { title, header, rows } = self;
+        let _ = writeln!(out, "\n## {title}\n\n| {} |\n|---|{}", header.join(" | "), "---:|".repeat(header.len() - 1));
+        for row in rows {
+            let _ = writeln!(out, "| {} |", row.join(" | "));
+        }
+    }
 }
 
 /// A number with three significant digits, at least.
@@ -22,11 +49,11 @@ pub(super) fn number(x: f64) -> String {
     }
 }
 
-fn mebibytes(bytes: u64) -> String {
+pub(super) fn mebibytes(bytes: u64) -> String {
     number(bytes as f64 / f64::from(1 << 20))
 }
 
-fn text_of(cells: &[&str]) -> Vec<String> {
+pub(super) fn text_of(cells: &[&str]) -> Vec<String> {
     cells.iter().map(|&c| c.to_owned()).collect()
 }
 
@@ -81,11 +108,29 @@ fn main_tables(report: &Report) -> Vec<Table> {
         s.lost.map(|l| format!("{} of {} ({:.4} %)", l.points, l.of, 100.0 * l.points as f64 / l.of.max(1) as f64))
     });
     let mut tables = vec![meshes(report)];
+    tables.extend(super::scaling::tables(report));
     tables.extend(figures(report, Quantity::Build));
     tables.extend(total.into_iter().chain(paper));
     tables.extend(Quantity::ALL[1..].iter().filter_map(|&q| figures(report, q)));
     tables.extend(lost);
+    tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", |s| s.alpha == Some(0) && s.assign == Some("aabb"))));
     tables
+}
+
+/// The stages of the constructions chosen, against the copy rate; `None` where stages are not timed.
+fn stages(mesh: &MeshReport, which: &str, chosen: impl Fn(&StructureReport) -> bool) -> Option<Table> {
+    let header = ["", "stage", "ms", "MiB at least", "GB/s", "of copy rate"];
+    let of = |s: &StructureReport| {
+        let name = s.name.clone();
+        let row = move |f: &super::StageFigure| {
+            let part = format!("{:.0} %", 100.0 * f.of_copy_rate);
+            vec![name.clone(), f.stage.clone(), number(f.ms), mebibytes(f.bytes), number(f.gb_per_s), part]
+        };
+        s.stages.iter().map(row).collect::<Vec<_>>()
+    };
+    let rows: Vec<Vec<String>> = mesh.structures.iter().filter(|s| chosen(s)).flat_map(of).collect();
+    let title = format!("Bytes that each stage moves at least, {which}{}", mesh.name);
+    (!rows.is_empty()).then(|| Table { title, header: text_of(&header), rows })
 }
 
 /// What is in the main tables, taken apart.
@@ -100,6 +145,7 @@ fn detail_tables(report: &Report) -> Vec<Table> {
         let header = text_of(&["", "l", "entries", "device ms per stage"]);
         Table { title: format!("Construction by stage, {}", m.name), header, rows: m.structures.iter().map(row).collect() }
     });
+    let traffic = report.meshes.iter().filter_map(|m| self::stages(m, "other trees, ", |s| s.alpha != Some(0) || s.assign != Some("aabb")));
     let arrays = report.meshes.iter().map(|m| {
         let row = |s: &StructureReport| {
             let arrays = s.memory.arrays.iter().filter(|a| a.1 > 0).map(|(name, n)| format!("{name} {n}"));
@@ -127,14 +173,15 @@ fn detail_tables(report: &Report) -> Vec<Table> {
         let rows = m.structures.iter().flat_map(row).collect();
         Table { title: format!("Every measurement, {}", m.name), header: text_of(&header), rows }
     });
-    stages.chain(arrays).chain(every).collect()
+    stages.chain(traffic).chain(arrays).chain(every).collect()
 }
 
 fn heading(report: &Report) -> String {
-    let Report { version, commit, suite, settings, device, .. } = report;
+    let Report { version, commit, suite, settings, device, copy, .. } = report;
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
-         medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n",
+         medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
+         copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
         suite.name(),
         device.name,
@@ -146,7 +193,8 @@ fn heading(report: &Report) -> String {
         settings.picture,
         settings.slice,
         settings.budget.repetitions,
-        settings.budget.seconds
+        settings.budget.seconds,
+        number(copy.gb_per_s)
     )
 }
 
@@ -162,31 +210,14 @@ fn notes(report: &Report) -> String {
 /// The main tables for a terminal.
 pub fn text(report: &Report) -> String {
     let mut text = heading(report);
-    for Table { title, header, rows } in main_tables(report) {
-        let width = |c: usize| rows.iter().chain([&header]).filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
-        let _ = writeln!(text, "\n{title}");
-        for row in std::iter::once(&header).chain(&rows) {
-            let room = |cell: &str, width: usize| " ".repeat(width.saturating_sub(cell.chars().count()));
-            let mut line = format!("  {}{}", row[0], room(&row[0], widths[0]));
-            for (cell, &w) in row.iter().zip(&widths).skip(1) {
-                let _ = write!(line, "  {}{cell}", room(cell, w));
-            }
-            let _ = writeln!(text, "{}", line.trim_end());
-        }
-    }
+    main_tables(report).iter().for_each(|table| table.text(&mut text));
     text + &notes(report)
 }
 
 /// All tables as Markdown.
 pub fn markdown(report: &Report) -> String {
     let mut text = format!("# Measurements\n\n{}", heading(report).replace('\n', "  \n"));
-    for Table { title, header, rows } in main_tables(report).into_iter().chain(detail_tables(report)) {
-        let _ = writeln!(text, "\n## {title}\n\n| {} |\n|---|{}", header.join(" | "), "---:|".repeat(header.len() - 1));
-        for row in rows {
-            let _ = writeln!(text, "| {} |", row.join(" | "));
-        }
-    }
+    main_tables(report).iter().chain(&detail_tables(report)).for_each(|table| table.markdown(&mut text));
     text + &notes(report)
 }
 

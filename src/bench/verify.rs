@@ -41,7 +41,10 @@ impl Answers {
         })?;
         let voxels = sliced.map(|_| (kinds, cells));
         let built = |mesh, structure| Built { mesh, structure };
-        let overlap = moved.map(|moved| overlap(built(&subject.device, structure), built(&subject.moved, moved))).transpose()?.flatten();
+        let overlap = match (moved, &subject.moved) {
+            (Some(moved), Some(mesh)) => overlap(built(&subject.device, structure), built(mesh, moved))?,
+            _ => None,
+        };
         let overlap = overlap.map(|found| [found.overlap.a, found.overlap.b]);
         Ok(Self { owners, picture, voxels, overlap })
     }

@@ -135,7 +135,7 @@ pub(crate) fn cmd_codes(
     let MeshInput { cells, tets, .. } = mesh.input;
     let (grid, quantized, bad) = (tree.grid, mesh.arrays.vertices, mesh.arrays.bad);
     let (offsets, candidates, codes, ids) = (counts.offsets, counts.candidates, scratch.codes, tree.p);
-    let target = *r.gpu().target();
+    let target = r.gpu().target();
     r.stage("build.emit", |r| {
         if let Some(filter) = filter {
             let shares = Count::device(filter.most, counts.total);
@@ -187,7 +187,7 @@ pub(crate) fn cmd_count_splits(
     entries: Count,
     scratch: &SortedScratch,
 ) -> Result<()> {
-    let target = *r.gpu().target();
+    let target = r.gpu().target();
     let (live, codes, splits, table_length) = (entries.word(r.gpu()), scratch.codes, scratch.splits, scratch.table_length);
     let once = r.gpu().subgroup_size();
     let run = target.run.rows;
@@ -262,7 +262,7 @@ pub(crate) fn cmd_leaves(
     entries: Count,
     scratch: &SortedScratch,
 ) -> Result<()> {
-    let target = *r.gpu().target();
+    let target = r.gpu().target();
     let TreeMemory { status, grid, p, po, flags, .. } = *tree;
     r.stage("build.leaves", |r| {
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));

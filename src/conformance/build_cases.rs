@@ -4,6 +4,7 @@ use super::build::{BuildCase, Way};
 use super::meshes::{MeshRecipe, recipes};
 use super::primitive_cases::push;
 use super::{Case, Group, TargetKind, Work};
+use crate::kernels::Row;
 use crate::options::{Assign, Lists};
 
 /// α of the quick group, one per assignment so that all of them are seen, and the rest.
@@ -17,6 +18,9 @@ pub(super) fn add(cases: &mut Vec<Case>) {
     }
     for mesh in recipes() {
         add_builds(cases, mesh);
+        if ["jitter-12x13x11", "slivers"].contains(&mesh.name) {
+            add_rows(cases, mesh);
+        }
     }
 }
 
@@ -55,6 +59,15 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
                 build(cases, mesh.group, BuildCase { target, boxes: true, ..case });
                 build(cases, Group::Full, BuildCase { target, way: Way::Tight, ..case });
             }
+        }
+    }
+}
+
+/// Trees under every row of the table of targets.
+fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
+    for target in Row::ALL.map(TargetKind::Row) {
+        for (assign, lists) in [(Assign::Aabb, Lists::All), (Assign::Exact, Lists::Boundary)] {
+            build(cases, mesh.group, BuildCase { mesh, alpha: 0.0, assign, lists, boxes: true, way: Way::Recorded, target });
         }
     }
 }

@@ -4,7 +4,6 @@ use super::failure::Stop;
 use super::{Case, Failure, TargetKind, Work, build, locate, overlap, picture, primitives, slice, topology};
 use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions};
-use std::collections::HashMap;
 use std::time::{Duration, Instant};
 
 /// How a case ended.
@@ -29,12 +28,10 @@ pub struct Report {
     pub time: Duration,
 }
 
-/// A device to run cases on, opened once per shape of the kernels.
+/// A device to run cases on.
 #[derive(Debug)]
 pub struct Lab {
-    options: GpuOptions,
     device: Gpu,
-    gpus: HashMap<TargetKind, Gpu>,
     messages: usize,
 }
 
@@ -45,9 +42,8 @@ impl Lab {
     /// # Errors
     /// As [`Gpu::new`].
     pub fn new(options: &GpuOptions) -> Result<Self> {
-        let options = GpuOptions { trust: true, ..options.clone() };
-        let device = Gpu::new(&options)?;
-        Ok(Self { options, device, gpus: HashMap::new(), messages: 0 })
+        let device = Gpu::new(&GpuOptions { trust: true, ..options.clone() })?;
+        Ok(Self { device, messages: 0 })
     }
 
     /// The device as it chose its shapes itself.
@@ -56,14 +52,11 @@ impl Lab {
     }
 
     /// The device under a shape.
-    fn gpu(&mut self, kind: TargetKind) -> Result<Gpu> {
-        let Some(target) = kind.target(self.device.subgroup_size()) else { return Ok(self.device.clone()) };
-        if let Some(gpu) = self.gpus.get(&kind) {
-            return Ok(gpu.clone());
+    fn gpu(&self, kind: TargetKind) -> Result<Gpu> {
+        match kind.target(&self.device.report().room) {
+            Some(target) => self.device.with_target(target),
+            None => Ok(self.device.clone()),
         }
-        let gpu = Gpu::new(&GpuOptions { target: Some(target), ..self.options.clone() })?;
-        self.gpus.insert(kind, gpu.clone());
-        Ok(gpu)
     }
 
     /// Runs a case. A message of a validation layer fails it.
@@ -74,7 +67,7 @@ impl Lab {
             Err(Stop::Failed(failure)) => Outcome::Failed(failure),
             Err(Stop::Skipped(why)) => Outcome::Skipped(why),
         };
-        let messages: Vec<String> = std::iter::once(&self.device).chain(self.gpus.values()).flat_map(Gpu::validation_messages).collect();
+        let messages = self.device.validation_messages();
         let fresh = messages.len().saturating_sub(self.messages);
         self.messages = messages.len();
         let outcome = match (outcome, messages.last()) {
@@ -90,7 +83,7 @@ impl Lab {
         Report { name: case.name.clone(), outcome, time: begin.elapsed() }
     }
 
-    fn work(&mut self, work: &Work) -> std::result::Result<(), Stop> {
+    fn work(&self, work: &Work) -> std::result::Result<(), Stop> {
         match work {
             Work::SelfTest => Ok(crate::primitives::self_test(&self.device)?),
             Work::Reduce(case) => primitives::reduce(&self.gpu(case.target)?, *case),

@@ -9,6 +9,7 @@
 //! scan/100003/indirect-below/narrow        length, count [, target]
 //! sort/21-bits/100000/indirect/reversed    bits of the keys, length, count [, keys] [, target]
 //! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
+//! scan/100003/host/in-place/row-amd        … under the shapes of a kind of device
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
 //! render/one-tet/iso/points/shaded         mesh, camera, field [, light]

@@ -3,6 +3,7 @@
 use super::data::Keys;
 use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
 use super::{Case, Group, Work};
+use crate::kernels::Row;
 use crate::primitives::Reduction;
 
 /// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
@@ -72,6 +73,13 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         for keys in [Keys::Sorted, Keys::Reversed, Keys::Equal, Keys::Few, Keys::Ones, Keys::Dirty] {
             sort(cases, Group::Quick, SortCase { bits: 12, n: 33_333, live: Live::All, keys, target });
             sort(cases, Group::Full, SortCase { bits: 32, n: 100_000, live: Live::Host, keys, target });
+        }
+    }
+    for target in Row::ALL.map(TargetKind::Row) {
+        for (n, live) in [(100_003, Live::Host), (10_007, Live::Below)] {
+            scan(cases, Group::Quick, ScanCase { n, live, in_place: true, target });
+            sort(cases, Group::Quick, SortCase { bits: 21, n, live, keys: Keys::Random, target });
+            sort(cases, Group::Quick, SortCase { bits: 30, n, live, keys: Keys::Few, target });
         }
     }
     sort(cases, Group::Large, SortCase { bits: 21, n: LARGE, live: Live::Host, keys: Keys::Random, target: TargetKind::Device });

@@ -4,7 +4,7 @@ use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::Gpu;
-use crate::kernels::{SortTarget, Target, TileTarget};
+use crate::kernels::{Room, Row, SortTarget, Target, TileTarget};
 use crate::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
@@ -20,6 +20,8 @@ pub enum TargetKind {
     Ballot,
     /// Ballots with tiny tiles and digits: many tiles, many passes.
     Narrow,
+    /// A row of the table, whatever the device is.
+    Row(Row),
 }
 
 impl TargetKind {
@@ -30,22 +32,34 @@ impl TargetKind {
             Self::Serial => "/serial",
             Self::Ballot => "/ballot",
             Self::Narrow => "/narrow",
+            Self::Row(Row::Portable) => "/row-portable",
+            Self::Row(Row::Cpu) => "/row-cpu",
+            Self::Row(Row::Nvidia) => "/row-nvidia",
+            Self::Row(Row::Amd) => "/row-amd",
+            Self::Row(Row::Intel) => "/row-intel",
+            Self::Row(Row::Apple) => "/row-apple",
+            Self::Row(Row::Arm) => "/row-arm",
+            Self::Row(Row::Qualcomm) => "/row-qualcomm",
         }
     }
 
-    /// The target for a subgroup size; `None`: the device's own.
-    pub(crate) fn target(self, subgroup: u32) -> Option<Target> {
+    /// The target on a device with this room; `None`: the device's own.
+    pub(crate) fn target(self, room: &Room) -> Option<Target> {
+        let subgroup = room.subgroup;
         match self {
             Self::Device => None,
-            Self::Serial => Some(Target::select(subgroup, true)),
-            Self::Ballot => Some(Target::select(subgroup, false)),
+            Self::Serial => Some(Row::Cpu.target(room)),
+            Self::Ballot => Some(Row::Portable.target(room)),
             Self::Narrow => Some(Target {
-                name: "narrow",
+                name: "narrow".into(),
                 scan: TileTarget { workgroup: 2 * subgroup, rows: 3 },
                 sort: SortTarget { serial: false, workgroup: 2 * subgroup, rows: 5, digit_bits: 3 },
+                spine: 64u32.next_multiple_of(subgroup),
                 each: 2 * subgroup,
+                query: subgroup,
                 run: TileTarget { workgroup: subgroup, rows: 3 },
             }),
+            Self::Row(row) => Some(row.target(room)),
         }
     }
 }

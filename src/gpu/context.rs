@@ -7,7 +7,7 @@ use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
 use super::memory::{Buffer, BufferRef};
 use super::requirements::DeviceReport;
 use crate::error::{Error, Result};
-use crate::kernels::Target;
+use crate::kernels::{Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::HashMap;
@@ -30,7 +30,7 @@ pub struct GpuOptions {
     pub device: Option<String>,
     /// How kernels get their buffers; `None`: by address where the device can.
     pub binding: Option<Binding>,
-    /// Shapes of the kernels; `None`: by the kind of device.
+    /// Shapes of the kernels; `None`: by the kind of device, see [`Row`].
     pub target: Option<Target>,
     /// File of the pipeline cache; `None`: no cache on disk.
     pub pipeline_cache: Option<PathBuf>,
@@ -43,7 +43,10 @@ type PipelineKey = (&'static str, Vec<(u32, u32)>);
 
 /// An opened device. Cheap to clone; everything made from it keeps it alive.
 #[derive(Clone)]
-pub struct Gpu(Arc<Inner>);
+pub struct Gpu {
+    inner: Arc<Inner>,
+    target: Arc<Target>,
+}
 
 /// What a [`Gpu`] stands on.
 pub(super) struct Foundation {
@@ -80,7 +83,6 @@ struct Inner {
     cache_file: Option<PathBuf>,
     binding: Binding,
     limits: vk::PhysicalDeviceLimits,
-    target: Target,
     debug_device: Option<ash::ext::debug_utils::Device>,
     acceleration: Option<Acceleration>,
     /// A word of ones: the device count of whoever knows the count on the host.
@@ -126,21 +128,23 @@ impl Gpu {
         };
         // SAFETY: the handle is one of this instance.
         let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
-        let gpu = Self(Arc::new(Inner {
+        let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
+        target.check(&report.room)?;
+        let inner = Inner {
             allocator: Some(allocator),
             pipelines: RwLock::default(),
             cache,
             cache_file: options.pipeline_cache.clone(),
             binding,
             limits,
-            target: options.target.unwrap_or_else(|| Target::select(report.subgroup, report.kind == "cpu")),
             debug_device: foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device)),
             acceleration: requirements.ray_query().then(|| Acceleration::new(instance, *physical, device)),
             unbounded: OnceLock::new(),
             foundation,
-        }));
+        };
+        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target) };
         gpu.make_unbounded()?;
-        if !options.trust && gpu.0.foundation.queue.is_some() {
+        if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
         }
         Ok(gpu)
@@ -160,7 +164,7 @@ impl Gpu {
             let buffer =
                 device.create_buffer(&vk::BufferCreateInfo::default().size(512).usage(usage), None).map_err(failed("vkCreateBuffer"))?;
             let needs = device.get_buffer_memory_requirements(buffer);
-            let memory = self.0.foundation.instance.get_physical_device_memory_properties(self.0.foundation.physical);
+            let memory = self.inner.foundation.instance.get_physical_device_memory_properties(self.inner.foundation.physical);
             let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
             let kind = (0..memory.memory_type_count)
                 .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted));
@@ -177,7 +181,7 @@ impl Gpu {
             } else {
                 0
             };
-            let _ = self.0.unbounded.set((buffer, block, BufferRef { buffer, offset: 0, size: 512, address }));
+            let _ = self.inner.unbounded.set((buffer, block, BufferRef { buffer, offset: 0, size: 512, address }));
         }
         Ok(())
     }
@@ -185,11 +189,11 @@ impl Gpu {
     /// The pipeline of a kernel with these constants, compiled at first use.
     pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
         let key = (K::INFO.name, spec.values());
-        if let Some(found) = self.0.pipelines.read().ok().and_then(|p| p.get(&key).copied()) {
+        if let Some(found) = self.inner.pipelines.read().ok().and_then(|p| p.get(&key).copied()) {
             return Ok(found);
         }
         let made = create_pipeline(self, K::INFO, &key.1)?;
-        if let Ok(mut pipelines) = self.0.pipelines.write() {
+        if let Ok(mut pipelines) = self.inner.pipelines.write() {
             pipelines.insert(key, made);
         }
         Ok(made)
@@ -197,42 +201,60 @@ impl Gpu {
 
     /// What the device is.
     pub fn report(&self) -> &DeviceReport {
-        &self.0.foundation.report
+        &self.inner.foundation.report
     }
 
     /// How kernels get their buffers.
     pub fn binding(&self) -> Binding {
-        self.0.binding
+        self.inner.binding
     }
 
     /// Shapes of the kernels.
     pub fn target(&self) -> &Target {
-        &self.0.target
+        &self.target
+    }
+
+    /// The same device with other shapes of the kernels. What is made from either can be used with both, but scratch memory is carved and used
+    /// with the same shapes.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if they do not fit the device.
+    pub fn with_target(&self, target: Target) -> Result<Self> {
+        target.check(&self.report().room)?;
+        Ok(Self { inner: self.inner.clone(), target: Arc::new(target) })
+    }
+
+    /// Tests that the device can be trusted with these shapes of the kernels, as opening it does.
+    ///
+    /// # Errors
+    /// [`Error::SelfTest`].
+    pub fn self_test(&self) -> Result<()> {
+        crate::primitives::self_test(self)
     }
 
     /// Limits of the device.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
-        &self.0.limits
+        &self.inner.limits
     }
 
     /// The device's memory allocator.
     pub fn allocator(&self) -> &Arc<Mutex<Allocator>> {
-        self.0.allocator.as_ref().unwrap_or_else(|| unreachable!("the allocator is taken in drop only"))
+        self.inner.allocator.as_ref().unwrap_or_else(|| unreachable!("the allocator is taken in drop only"))
     }
 
     /// The logical device.
     pub fn device(&self) -> &ash::Device {
-        &self.0.foundation.device
+        &self.inner.foundation.device
     }
 
     /// Subgroup size that pipelines are compiled for.
     pub fn subgroup_size(&self) -> u32 {
-        self.0.foundation.report.subgroup
+        self.inner.foundation.report.subgroup
     }
 
     /// Messages of validation layers so far; always empty without a layer.
     pub fn validation_messages(&self) -> Vec<String> {
-        self.0
+        self.inner
             .foundation
             .ours
             .as_ref()
@@ -242,37 +264,37 @@ impl Gpu {
     }
 
     pub(crate) fn requires_subgroup_size(&self) -> bool {
-        let [least, _, most] = self.0.foundation.report.requirements.subgroup_sizes;
-        self.0.foundation.report.requirements.subgroup_size_control && least != most
+        let [least, _, most] = self.inner.foundation.report.requirements.subgroup_sizes;
+        self.inner.foundation.report.requirements.subgroup_size_control && least != most
     }
 
     pub(crate) fn has_addresses(&self) -> bool {
-        self.0.foundation.report.requirements.buffer_addresses
+        self.inner.foundation.report.requirements.buffer_addresses
     }
 
     /// Functions for acceleration structures, where the device has ray queries.
     pub(super) fn acceleration(&self) -> Option<&Acceleration> {
-        self.0.acceleration.as_ref()
+        self.inner.acceleration.as_ref()
     }
 
     pub(crate) fn pipeline_cache(&self) -> vk::PipelineCache {
-        self.0.cache
+        self.inner.cache
     }
 
     pub(crate) fn debug_device(&self) -> Option<&ash::ext::debug_utils::Device> {
-        self.0.debug_device.as_ref()
+        self.inner.debug_device.as_ref()
     }
 
     pub(crate) fn family(&self) -> u32 {
-        self.0.foundation.family
+        self.inner.foundation.family
     }
 
     pub(crate) fn timestamp_bits(&self) -> u32 {
-        self.0.foundation.report.requirements.queue_family.map_or(0, |(_, bits)| bits)
+        self.inner.foundation.report.requirements.queue_family.map_or(0, |(_, bits)| bits)
     }
 
     pub(crate) fn queue(&self) -> Result<MutexGuard<'_, vk::Queue>> {
-        let Some(queue) = &self.0.foundation.queue else {
+        let Some(queue) = &self.inner.foundation.queue else {
             return Err(Error::Invalid("the host lent no queue: only the cmd_* functions can be used".into()));
         };
         queue.lock().map_err(|_| Error::Invalid("the queue's lock is poisoned by an earlier panic".into()))
@@ -289,7 +311,7 @@ impl Gpu {
     }
 
     fn constant_buffer(&self) -> BufferRef {
-        self.0.unbounded.get().map_or(BufferRef { buffer: vk::Buffer::null(), offset: 0, size: 512, address: 0 }, |u| u.2)
+        self.inner.unbounded.get().map_or(BufferRef { buffer: vk::Buffer::null(), offset: 0, size: 512, address: 0 }, |u| u.2)
     }
 
     /// A device-local buffer; see [`Buffer::new`].
@@ -355,6 +377,6 @@ impl Drop for Inner {
 
 impl std::fmt::Debug for Gpu {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "Gpu({}, {:?})", self.0.foundation.report.name, self.0.binding)
+        write!(f, "Gpu({}, {:?})", self.report().name, self.binding())
     }
 }

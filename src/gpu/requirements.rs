@@ -1,5 +1,6 @@
 //! What a device must offer, told before a device exists.
 
+use crate::kernels::Room;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
@@ -29,6 +30,8 @@ pub struct Requirements {
     pub ray_tracing: RayTracing,
     /// Smallest, usual and largest subgroup size.
     pub subgroup_sizes: [u32; 3],
+    /// Most subgroups of a workgroup where sizes are required.
+    pub(crate) workgroup_subgroups: u32,
     /// A queue family with compute, and the number of valid bits of its timestamps.
     pub queue_family: Option<(u32, u32)>,
 }
@@ -46,6 +49,12 @@ pub struct DeviceReport {
     pub(crate) version: [u32; 2],
     /// Subgroup size.
     pub subgroup: u32,
+    /// What a workgroup may have.
+    pub room: Room,
+    /// The vendor by its number: a PCI one, or one that Khronos gave.
+    pub vendor: u32,
+    /// The driver by its number, `VkDriverId`.
+    pub driver_id: i32,
     /// Kind: discrete, integrated, virtual, cpu, other.
     pub kind: &'static str,
     /// Bytes of the largest device-local heap.
@@ -166,6 +175,11 @@ impl Requirements {
                 false => RayTracing::None,
             },
             subgroup_sizes: sizes,
+            workgroup_subgroups: if subgroup_size_control && sizes[0] != sizes[2] {
+                control.max_compute_workgroup_subgroups
+            } else {
+                u32::MAX
+            },
             queue_family,
         }
     }
@@ -192,14 +206,22 @@ impl DeviceReport {
             instance.get_physical_device_properties2(device, &mut properties);
             (properties.properties, instance.get_physical_device_memory_properties(device))
         };
-        let version = properties.api_version;
+        let (version, limits) = (properties.api_version, properties.limits);
+        let subgroup = requirements.subgroup_sizes[1].max(1);
+        // Kernels have room for the sums of 128 subgroups.
+        let subgroups = requirements.workgroup_subgroups.min(128);
+        let of_subgroups = subgroup.saturating_mul(subgroups);
+        let invocations = limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]).min(of_subgroups);
         let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
         Self {
             name: text(&properties.device_name),
             driver: format!("{} {}", text(&driver.driver_name), text(&driver.driver_info)).trim().to_string(),
             api: format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
             version: [version, properties.driver_version],
-            subgroup: requirements.subgroup_sizes[1],
+            subgroup,
+            room: Room { subgroup, invocations: invocations / subgroup * subgroup, shared_bytes: limits.max_compute_shared_memory_size },
+            vendor: properties.vendor_id,
+            driver_id: driver.driver_id.as_raw(),
             kind: match properties.device_type {
                 vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
                 vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",

@@ -2,8 +2,10 @@
 
 use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
 
+mod rows;
 mod target;
-pub use target::{SortTarget, Target, TileTarget};
+pub use rows::Row;
+pub use target::{Room, SortTarget, Target, TileTarget};
 
 fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
     out[at..at + bytes.len()].copy_from_slice(bytes);

@@ -1,7 +1,34 @@
-//! Tuning per kind of device: data, not code.
+//! How kernels are shaped: what can be chosen per device, and within which limits. The choices are data, see [`super::Row`].
+
+use crate::error::{Error, Result};
+use std::borrow::Cow;
+
+/// Most iterations of a loop in a kernel: some drivers silently end longer ones.
+const LONGEST_LOOP: u32 = 32_768;
+/// Shared memory of the portable floor, of which rows of the table leave an eighth to the driver.
+const SHARED_BYTES: u32 = 16 << 10;
+
+/// What a workgroup may have on a device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Room {
+    /// Subgroup size that pipelines are compiled for.
+    pub subgroup: u32,
+    /// Most invocations of a workgroup.
+    pub invocations: u32,
+    /// Bytes of shared memory.
+    pub shared_bytes: u32,
+}
+
+impl Room {
+    /// What every device has that qualifies.
+    pub fn least(subgroup: u32) -> Self {
+        Self { subgroup, invocations: 256, shared_bytes: SHARED_BYTES }
+    }
+}
 
 /// Workgroup size and items per invocation of a kernel that works on tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct TileTarget {
     /// Invocations per workgroup; a multiple of the subgroup size.
     pub workgroup: u32,
@@ -18,6 +45,7 @@ impl TileTarget {
 
 /// Which radix sort, and its tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct SortTarget {
     /// `true`: every invocation owns a serial tile of `rows` pairs. `false`: a tile is a workgroup's, ranked by ballots.
     pub serial: bool,
@@ -39,46 +67,120 @@ impl SortTarget {
     pub fn tiles_per_group(self) -> u32 {
         if self.serial { self.workgroup } else { 1 }
     }
+
+    /// Number of passes and bits per digit for keys of `bits` bits.
+    pub fn passes(self, bits: u32) -> (u32, u32) {
+        let passes = bits.div_ceil(self.digit_bits).max(1);
+        (passes, bits.div_ceil(passes).max(1))
+    }
+
+    /// Shared memory: a table of digits per subgroup, and one for the workgroup.
+    fn shared_bytes(self, subgroup: u32) -> u32 {
+        let tables = if self.serial { 0 } else { self.workgroup / subgroup.max(1) + 1 };
+        (4 * tables) << self.digit_bits
+    }
+
+    /// Iterations of its longest invocation: digits and pairs, or per row the bits of a digit and the digits of all subgroups.
+    fn iterations(self, subgroup: u32) -> u32 {
+        let digits = 1u32 << self.digit_bits;
+        if self.serial {
+            return self.rows + digits;
+        }
+        let tables = self.workgroup / subgroup.max(1);
+        self.rows * (self.digit_bits + (tables * digits).div_ceil(self.workgroup) + tables * digits.div_ceil(self.workgroup))
+    }
 }
 
-/// How the kernels are shaped for a device.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+/// How the kernels are shaped for a device: every specialization constant that changes the time and not the result.
+#[derive(Clone, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Target {
     /// Name in reports.
-    pub name: &'static str,
-    /// Reduce and scan.
+    pub name: Cow<'static, str>,
+    /// Scans: tiles.
     pub scan: TileTarget,
+    /// Scans: invocations of the one workgroup that scans the sums of the tiles.
+    pub spine: u32,
     /// Radix sort.
     pub sort: SortTarget,
-    /// Kernels with one item per invocation.
+    /// Invocations per workgroup of construction kernels with one item per invocation.
     pub each: u32,
-    /// Kernels in which an invocation passes a run of consecutive entries.
+    /// Construction kernels in which an invocation passes a run of consecutive entries.
     pub run: TileTarget,
+    /// Invocations per workgroup of queries: location, ray intervals, march, slices, overlap.
+    pub query: u32,
 }
 
 impl Target {
-    /// The target for a device by its subgroup size and whether its "GPU" is a processor.
-    pub fn select(subgroup: u32, cpu: bool) -> Self {
-        if cpu {
-            // A workgroup is one loop over a wide vector: few, long tiles and no barriers.
-            return Self {
-                name: "cpu",
-                scan: TileTarget { workgroup: subgroup, rows: 512 },
-                sort: SortTarget { serial: true, workgroup: subgroup, rows: 8192, digit_bits: 11 },
-                each: 64.max(subgroup),
-                run: TileTarget { workgroup: subgroup, rows: 256 },
-            };
+    /// The nearest that a workgroup has room for: workgroups of whole subgroups, digits that fit shared memory.
+    pub(super) fn fit(mut self, room: &Room) -> Self {
+        let subgroup = room.subgroup.max(1);
+        let most = (room.invocations / subgroup * subgroup).max(subgroup);
+        for size in
+            [&mut self.scan.workgroup, &mut self.sort.workgroup, &mut self.run.workgroup, &mut self.spine, &mut self.each, &mut self.query]
+        {
+            *size = size.next_multiple_of(subgroup).min(most);
         }
-        let workgroup = 256u32.next_multiple_of(subgroup.max(1));
-        // The ballot sort keeps a table of digits per subgroup in shared memory, 16 KiB at most.
-        let subgroups = (workgroup / subgroup.max(1)).max(1);
-        let digit_bits = (3584 / (subgroups + 1)).max(2).ilog2().min(8);
-        Self {
-            name: "simt",
-            scan: TileTarget { workgroup, rows: 16 },
-            sort: SortTarget { serial: false, workgroup, rows: 16, digit_bits },
-            each: workgroup,
-            run: TileTarget { workgroup, rows: 16 },
+        while self.sort.digit_bits > 1 && self.sort.shared_bytes(subgroup) > SHARED_BYTES / 8 * 7 {
+            self.sort.digit_bits -= 1;
         }
+        self
+    }
+
+    /// Whether kernels of these shapes run on a device.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] that names the first choice that does not fit, and what would.
+    pub fn check(&self, room: &Room) -> Result<()> {
+        let Room { subgroup, invocations, shared_bytes } = *room;
+        let wrong = |what: &str| Err(Error::Invalid(format!("target `{}`: {what}", self.name)));
+        let workgroups = [
+            ("scan.workgroup", self.scan.workgroup),
+            ("spine", self.spine),
+            ("sort.workgroup", self.sort.workgroup),
+            ("each", self.each),
+            ("run.workgroup", self.run.workgroup),
+            ("query", self.query),
+        ];
+        for (name, size) in workgroups {
+            if size == 0 || size % subgroup.max(1) != 0 || size > invocations {
+                return wrong(&format!("{name} is {size}; it must be a multiple of {subgroup}, the subgroup size, up to {invocations}"));
+            }
+        }
+        for (name, rows) in [("scan.rows", self.scan.rows), ("sort.rows", self.sort.rows), ("run.rows", self.run.rows)] {
+            if !(1..LONGEST_LOOP).contains(&rows) {
+                return wrong(&format!("{name} is {rows}; it must be from 1 to {}", LONGEST_LOOP - 1));
+            }
+        }
+        if !(1..=12).contains(&self.sort.digit_bits) {
+            return wrong(&format!("sort.digit_bits is {}; it must be from 1 to 12", self.sort.digit_bits));
+        }
+        let bytes = self.sort.shared_bytes(subgroup);
+        if bytes > shared_bytes {
+            return wrong(&format!("the sort takes {bytes} bytes of shared memory of {shared_bytes}; sort.digit_bits must be smaller"));
+        }
+        let iterations = self.sort.iterations(subgroup);
+        if iterations > LONGEST_LOOP {
+            return wrong(&format!("the sort loops {iterations} times, {LONGEST_LOOP} are allowed; sort.rows must be smaller"));
+        }
+        Ok(())
+    }
+
+    /// Whether problems of every size can be solved with these shapes: tables of counts are indexed by 32 bits, and the sums of all tiles are
+    /// scanned by one workgroup.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] that names the first choice that is too small.
+    pub fn check_scale(&self) -> Result<()> {
+        let digits = 1u32 << self.sort.digit_bits.min(31);
+        let least = [
+            ("scan.workgroup × scan.rows × spine", self.scan.tile().saturating_mul(self.spine), 1 << 17),
+            ("sort.rows (× sort.workgroup, where it is not serial)", self.sort.tile(), digits),
+            ("run.rows", self.run.rows, 12),
+        ];
+        let small = least.into_iter().find(|(_, value, least)| value < least);
+        small.map_or(Ok(()), |(name, value, least)| {
+            Err(Error::Invalid(format!("target `{}`: {name} is {value}; for large meshes it must be {least} at least", self.name)))
+        })
     }
 }

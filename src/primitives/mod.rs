@@ -1,10 +1,14 @@
 //! Reduce, exclusive scan and stable radix sort on the device, as functions that append to a recorder.
 
+#[cfg(feature = "cli")]
+mod copy;
 mod reduce;
 mod scan;
 mod selftest;
 mod sort;
 
+#[cfg(feature = "cli")]
+pub(crate) use copy::cmd_copy;
 pub use reduce::{REDUCE_SCRATCH, Reduction, cmd_reduce};
 pub use scan::{ScanScratch, cmd_exclusive_scan};
 pub(crate) use selftest::self_test;

@@ -37,15 +37,15 @@ pub fn cmd_exclusive_scan(
     count: Count,
     scratch: &ScanScratch,
 ) -> Result<()> {
-    let (live, target) = (count.word(r.gpu()), r.gpu().target().scan);
+    let (live, target, spine) = (count.word(r.gpu()), r.gpu().target().scan, r.gpu().target().spine);
     let (workgroup, rows, sums) = (target.workgroup, target.rows, scratch.sums);
     let groups = count.groups(r, target.tile(), scratch.arguments, "values → scan.tiles")?;
     // 1 — tiles: sum of each · 2 — spine: one workgroup scans the sums · 3 — apply: each tile again, from its sum.
     r.dispatch(&ScanTiles { live, values, sums, count: count.max }, ScanTilesSpec { workgroup, rows }, groups)?;
     r.barrier("scan.tiles → scan.spine");
-    let spine = ScanSpine { live, sums, total, count: count.max, tile: target.tile() };
-    // One workgroup for all tiles, as wide as any device's, so that no invocation loops for long.
-    r.dispatch(&spine, ScanSpineSpec { workgroup: 256, rows }, Groups::Count(1))?;
+    let all = ScanSpine { live, sums, total, count: count.max, tile: target.tile() };
+    // One workgroup for all tiles: wide, so that no invocation loops for long.
+    r.dispatch(&all, ScanSpineSpec { workgroup: spine, rows }, Groups::Count(1))?;
     r.barrier("scan.spine → scan.apply");
     r.dispatch(&ScanApply { live, sums, values, scanned, count: count.max }, ScanApplySpec { workgroup, rows }, groups)
 }

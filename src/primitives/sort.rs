@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{
     SortHistogramBallot, SortHistogramBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
-    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortTarget,
+    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec,
 };
 
 /// Scratch memory of a sort.
@@ -20,12 +20,6 @@ pub struct SortScratch {
     scan: ScanScratch,
 }
 
-/// Number of passes and bits per digit for keys of `bits` bits.
-fn passes(target: &SortTarget, bits: u32) -> (u32, u32) {
-    let passes = bits.div_ceil(target.digit_bits).max(1);
-    (passes, bits.div_ceil(passes).max(1))
-}
-
 impl SortScratch {
     /// For up to `max` pairs with keys of up to `bits` bits: a copy of the pairs, and the tables of counts.
     ///
@@ -34,7 +28,7 @@ impl SortScratch {
     pub fn carve(gpu: &Gpu, arena: &mut Arena, max: u32, bits: u32) -> Result<Self> {
         let target = gpu.target().sort;
         // Fewer bits may mean wider digits, so every width up to `bits` counts.
-        let widest = (1..=bits.max(1)).map(|b| passes(&target, b).1).max().unwrap_or(1);
+        let widest = (1..=bits.max(1)).map(|b| target.passes(b).1).max().unwrap_or(1);
         let table = (u64::from(max.div_ceil(target.tile())) | 1) << widest;
         Ok(Self {
             keys: arena.words(u64::from(max))?,
@@ -67,7 +61,7 @@ pub fn cmd_sort_pairs(
         return Ok(());
     }
     let (gpu, target) = (r.gpu(), r.gpu().target().sort);
-    let (live, (passes, digit_bits)) = (count.word(gpu), passes(&target, bits));
+    let (live, (passes, digit_bits)) = (count.word(gpu), target.passes(bits));
     let groups = if count.live.is_some() {
         // Plan: how many tiles there are, hence how long the table of counts is.
         let plan = SortPlan {

@@ -76,7 +76,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     }
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
-    let (workgroup, lists) = (r.gpu().target().each, scene.tree.lists as u32);
+    let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
     let groups = Groups::Count(count.div_ceil(workgroup));
     r.stage("query.locate", |r| {
         if let Path::Traversal(stack) = options.path {
@@ -146,7 +146,7 @@ pub fn cmd_interpolate(
     values: BufferRef,
     count: u32,
 ) -> Result<()> {
-    let workgroup = r.gpu().target().each;
+    let workgroup = r.gpu().target().query;
     let LocateOutput { owners, barycentrics } = *located;
     let spec = InterpolateSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };
     let arguments = Interpolate { cells: scene.mesh.input.cells, field, owners, barycentrics, values, count };
@@ -235,7 +235,7 @@ pub fn locate_all(
     let scene = Scene::new(mesh, tree);
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
-    let (workgroup, lists) = (gpu.target().each, scene.tree.lists as u32);
+    let (workgroup, lists) = (gpu.target().query, scene.tree.lists as u32);
     let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {

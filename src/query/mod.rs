@@ -46,7 +46,7 @@ macro_rules! dispatch {
     ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
      { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
         let $crate::query::Searched { mesh, structure } = $searched;
-        let workgroup = $r.gpu().target().each;
+        let workgroup = $r.gpu().target().query;
         let groups = $crate::gpu::Groups::Count($items.div_ceil(workgroup));
         match *structure {
             $crate::query::Structure::Octree($crate::build::TreeMemory { grid, masks, co, po, p, flags, .. }) => {

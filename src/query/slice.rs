@@ -173,7 +173,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
 }
 
 fn cmd_values(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
-    let workgroup = r.gpu().target().each;
+    let workgroup = r.gpu().target().query;
     let (field, on) = part.field.unwrap_or((r.gpu().nothing(), On::Points));
     let arguments = SliceValues {
         grid: searched.mesh.arrays.grid,

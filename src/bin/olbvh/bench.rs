@@ -2,7 +2,7 @@
 
 use crate::common::{Common, Failure, Outcome};
 use crate::{engine, input, output};
-use olbvh::bench::{Report, Settings, Suite, markdown, plots, run as measure, text};
+use olbvh::bench::{Report, Settings, Suite, compare, markdown, plots, run as measure, text};
 use olbvh::error::Error;
 use olbvh::formats::{OutputFile, OutputFormat};
 use std::io::Write as _;
@@ -15,17 +15,23 @@ use std::process::Command;
 Examples:
   olbvh bench                               two small meshes, within a minute on two cores
   olbvh bench --suite paper -o results      the paper's sizes; results/ gets bench.json, bench.md and a plot per figure
+  olbvh bench --suite scaling -o scaling    construction and location from 1k to 12.3M tetrahedra
   olbvh bench bracket.vtu -o bracket.md     this mesh, with the sizes of the quick suite
   olbvh bench graded:40 shell:200 --suite paper --repeat 9 --seconds 1 --json
+  olbvh bench --compare before.json after.json -o changes.md   which times differ by more than their spread
 
 Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different size), shell:N (thin walls), slivers:N (flat cells). The suite gives
 the sizes of points, picture and slice; MESH... stands in place of its meshes. Answers are verified before anything is timed; a wrong one ends the
-run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios.")]
+run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios. Stages of the construction are
+related to the rate at which the device copies, by the bytes that they must read and write at least.
+
+--compare runs nothing. It tells every ratio of times that both files have, the range that the repetitions allow, what only one of them has, and
+whatever differs in device, driver, target, program and settings.")]
 pub struct Args {
     /// Meshes instead of those of the suite.
     mesh: Vec<PathBuf>,
     /// How much is measured.
-    #[arg(long, default_value = "quick", value_name = "quick|paper|full")]
+    #[arg(long, default_value = "quick", value_name = "quick|paper|full|scaling")]
     suite: Suite,
     /// Where the results go: a .json or .md file, or a folder for both and the plots.
     #[arg(short, long, value_name = "OUT")]
@@ -42,6 +48,9 @@ pub struct Args {
     /// Seconds after which a measurement is not repeated again.
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
+    /// Compare two files of results (.json) instead of measuring.
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds"])]
+    compare: Option<Vec<PathBuf>>,
 }
 
 /// What OUT is.
@@ -52,6 +61,9 @@ enum Target {
 
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
+    if let Some([a, b]) = args.compare.as_deref() {
+        return run_compare([a, b], args.output.as_deref(), common);
+    }
     let target = args.output.as_deref().map(target).transpose()?;
     let mut settings = Settings::of(args.suite);
     settings.points = args.points.unwrap_or(settings.points);
@@ -65,8 +77,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         }
         settings.budget.seconds = seconds;
     }
-    let gpu = engine::device(common.device.as_deref())?;
-    let mut report = Report::new(&gpu, args.suite, settings, commit());
+    let gpu = engine::device(common)?;
+    let mut report = Report::new(&gpu, args.suite, settings, commit())?;
     let named =
         |(role, mesh): (&str, &str)| (if role.is_empty() { mesh.to_owned() } else { format!("{role} {mesh}") }, PathBuf::from(mesh));
     let meshes: Vec<(String, PathBuf)> = if args.mesh.is_empty() {
@@ -76,7 +88,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     };
     for (name, path) in meshes {
         let mesh = input::mesh(&path, common)?.mesh;
-        report.meshes.push(measure(&gpu, &name, &mesh, &report.settings, &|line| common.remark(line))?);
+        let measured = measure(&gpu, &name, &mesh, &report, &|line| common.remark(line))?;
+        report.push(measured);
         // So that a long run that is stopped has told something.
         if let (Some(path), Some(target)) = (&args.output, &target) {
             write(path, target, &report)?;
@@ -84,6 +97,18 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let json = serde_json::to_value(&report).map_err(|e| Failure::Failed(e.to_string()))?;
     output::summary(common, &json, &text(&report))
+}
+
+/// Compares two files; the result goes to a file as well, if one is named.
+fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outcome {
+    let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md])).transpose()?;
+    let comparison = compare([a, b]).map_err(Failure::input)?;
+    let json = serde_json::to_value(&comparison).map_err(|e| Failure::Failed(e.to_string()))?;
+    if let (Some(path), Some(format)) = (out, format) {
+        let content = if format == OutputFormat::Md { comparison.markdown() } else { format!("{json:#}\n") };
+        write_file(path, &content)?;
+    }
+    output::summary(common, &json, &comparison.text())
 }
 
 /// Announces the result before long work.
@@ -106,12 +131,13 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
             plots.chain(tables).map(|(name, content)| (path.join(name), content)).collect()
         }
     };
-    for (path, content) in files {
-        let mut file = OutputFile::create(&path)?;
-        file.write_all(content.as_bytes()).map_err(|source| Error::Io { path, source })?;
-        file.commit()?;
-    }
-    Ok(())
+    files.iter().try_for_each(|(path, content)| write_file(path, content))
+}
+
+fn write_file(path: &Path, content: &str) -> Outcome {
+    let mut file = OutputFile::create(path)?;
+    file.write_all(content.as_bytes()).map_err(|source| Error::Io { path: path.into(), source })?;
+    Ok(file.commit()?)
 }
 
 /// The commit that the sources of this program are at now, if they are still there and under Git; `-dirty` with changes that are not committed.

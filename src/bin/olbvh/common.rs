@@ -5,6 +5,7 @@ use std::process::ExitCode;
 
 /// Arguments that every subcommand has.
 #[derive(clap::Args)]
+#[allow(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub struct Common {
     /// Print one JSON object on standard output instead of text.
     #[arg(long, global = true)]
@@ -13,6 +14,13 @@ pub struct Common {
     /// Vulkan and is slower.
     #[arg(long, global = true, value_name = "NAME|INDEX|cpu")]
     pub device: Option<String>,
+    /// Shapes of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh tune` saved. By default those of the
+    /// device's own profile, or of its kind; results are the same with all.
+    #[arg(long, global = true, value_name = "NAME|FILE", env = "OLBVH_TARGET", hide_env_values = true)]
+    pub target: Option<String>,
+    /// Do not look for a profile of the device that `olbvh tune` has saved.
+    #[arg(long, global = true, env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = clap::builder::FalseyValueParser::new())]
+    pub no_profile: bool,
     /// No progress and no remarks, errors only.
     #[arg(long, short, global = true, conflicts_with = "verbose")]
     pub quiet: bool,
@@ -30,6 +38,11 @@ impl Common {
             _ => log::LevelFilter::Warn,
         };
         env_logger::Builder::new().filter_level(level).format_timestamp(None).init();
+    }
+
+    /// Whether `--device` means the reference implementation.
+    pub fn means_cpu(&self) -> bool {
+        self.device.as_deref().is_some_and(|device| device.eq_ignore_ascii_case("cpu"))
     }
 
     /// A remark on standard error, unless `--quiet`.

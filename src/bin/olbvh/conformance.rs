@@ -1,8 +1,8 @@
 //! `olbvh conformance`.
 
 use crate::common::{Common, Failure, Outcome};
-use crate::input;
 use crate::output::{self, Progress};
+use crate::{engine, input};
 use olbvh::conformance::{Case, Lab, Outcome as Ending, Report, cases, cases_of};
 use olbvh::gpu::{Binding, GpuOptions};
 use serde_json::{Value, json};
@@ -96,13 +96,16 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
         Bindings::Address => vec![Binding::Address],
         Bindings::Descriptors => vec![Binding::Descriptors],
     };
-    let lab = |binding| Lab::new(&GpuOptions { device: common.device.clone(), binding: Some(binding), ..GpuOptions::default() });
+    // The shapes that other subcommands would use; cases that name a row have its own.
+    let target = engine::shapes(common)?.target;
+    let options = GpuOptions { device: common.device.clone(), target: Some(target), ..GpuOptions::default() };
+    let lab = |binding| Lab::new(&GpuOptions { binding: Some(binding), ..options.clone() });
     let mut runs = Vec::new();
     let mut device = Value::Null;
     let progress = Progress::new(common, "cases");
     if args.binding == Bindings::Both {
         // The device's own choice tells whether it has addresses.
-        let any = Lab::new(&GpuOptions { device: common.device.clone(), ..GpuOptions::default() })?;
+        let any = Lab::new(&options)?;
         if any.device().binding() == Binding::Descriptors {
             common.remark("The device has no buffer addresses: cases run by descriptors only.");
             bindings.remove(0);

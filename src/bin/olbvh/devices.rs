@@ -1,6 +1,7 @@
 //! `olbvh devices`.
 
 use crate::common::{Common, Failure, Outcome};
+use crate::engine::{Origin, Shapes};
 use crate::{output, text};
 use olbvh::error::Error;
 use olbvh::gpu::{RayTracing, list_devices};
@@ -10,7 +11,7 @@ use std::fmt::Write as _;
 /// List every Vulkan device, whether it can be used, and if not, what it lacks.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Example:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1"
+    after_help = "Examples:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1\n  olbvh devices -v         with the shapes of the kernels, and the profile they come from"
 )]
 pub struct Args {}
 
@@ -44,6 +45,11 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
             text::bytes(d.memory),
             d.kind
         );
+        if common.verbose
+            && let Ok(shapes) = Shapes::of(common, d)
+        {
+            let _ = writeln!(lines, "     kernels {shapes}");
+        }
     }
     lines.push_str("cpu  the reference implementation on the processor, always there\n");
     let entry = |(i, d): (usize, &olbvh::gpu::DeviceReport)| {
@@ -51,6 +57,10 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
             "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
             "qualifies": d.requirements.missing.is_empty(), "missing": d.requirements.missing,
             "ray_query": d.requirements.ray_query(),
+            "target": Shapes::of(common, d).map_or(serde_json::Value::Null, |shapes| json!({
+                "name": shapes.target.name,
+                "profile": if let Origin::Profile(path) | Origin::File(path) = shapes.origin { Some(path.display().to_string()) } else { None },
+            })),
         })
     };
     let json = json!({ "devices": devices.iter().enumerate().map(entry).collect::<Vec<_>>() });

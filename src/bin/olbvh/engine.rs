@@ -2,10 +2,13 @@
 
 mod cpu;
 mod gpu;
+mod shapes;
 
-use crate::common::{Failure, Outcome};
+pub use shapes::{Origin, Shapes};
+
+use crate::common::{Common, Failure, Outcome};
 use olbvh::error::Result;
-use olbvh::gpu::Gpu;
+use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::{Counts, Fault};
@@ -35,6 +38,8 @@ pub struct Overlapped {
 pub trait Engine {
     /// What it is called in results.
     fn name(&self) -> String;
+    /// The shapes of its kernels, and where they come from; nothing without kernels.
+    fn target(&self) -> Option<&Shapes>;
     /// Marks the boundary and builds the tree.
     fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>>;
     /// Builds a tree over each of two meshes and finds out where they overlap.
@@ -105,18 +110,21 @@ pub struct Summary {
     pub stages: Vec<(String, f64)>,
 }
 
-/// The Vulkan device that `--device` names.
-pub fn device(name: Option<&str>) -> Outcome<Gpu> {
-    if name.is_some_and(|name| name.eq_ignore_ascii_case("cpu")) {
+/// The Vulkan device that `--device` names, for measurements.
+pub fn device(common: &Common) -> Outcome<Gpu> {
+    if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
     }
-    Ok(gpu::Device::open(name)?.gpu().clone())
+    Ok(gpu::Device::open(common)?.gpu().clone())
+}
+
+/// The shapes that kernels have on the device that `--device` names.
+pub fn shapes(common: &Common) -> Outcome<Shapes> {
+    let gpu = Gpu::new(&GpuOptions { device: common.device.clone(), trust: true, ..GpuOptions::default() })?;
+    Shapes::of(common, gpu.report())
 }
 
 /// The engine that `--device` names: the best Vulkan device without one.
-pub fn open(device: Option<&str>) -> Outcome<Box<dyn Engine>> {
-    match device {
-        Some(name) if name.eq_ignore_ascii_case("cpu") => Ok(Box::new(cpu::Cpu)),
-        name => Ok(Box::new(gpu::Device::open(name)?)),
-    }
+pub fn open(common: &Common) -> Outcome<Box<dyn Engine>> {
+    if common.means_cpu() { Ok(Box::new(cpu::Cpu)) } else { Ok(Box::new(gpu::Device::open(common)?)) }
 }

@@ -1,7 +1,7 @@
 //! `olbvh info`.
 
 use crate::common::{Common, Outcome};
-use crate::engine::{self, Summary};
+use crate::engine::{self, Engine, Shapes, Summary};
 use crate::input::{self, TreeArgs};
 use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
@@ -34,12 +34,12 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(true)?;
-    let engine = engine::open(common.device.as_deref())?;
+    let engine = engine::open(common)?;
     let loaded = input::mesh(&args.mesh, common)?;
     let built = engine.build(&loaded.mesh, &options)?;
     let summary = built.summary();
-    let json = json(args, &engine.name(), &loaded, summary);
-    output::result(common, &json, &page(args, &engine.name(), &loaded, summary, common.verbose).to_string())
+    let json = json(args, engine.as_ref(), &loaded, summary);
+    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, summary, common.verbose).to_string())
 }
 
 /// Lower and upper corner in the coordinates of the source.
@@ -47,7 +47,7 @@ fn bounds(mesh: &Mesh, summary: &Summary) -> [[f64; 3]; 2] {
     [summary.bounds.lo, summary.bounds.hi].map(|corner| [0, 1, 2].map(|c| mesh.origin[c] + f64::from(corner[c])))
 }
 
-fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
+fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value {
     let mesh = &loaded.mesh;
     let [lo, hi] = bounds(mesh, s);
     let field = |f: &olbvh::mesh::Field| {
@@ -70,7 +70,8 @@ fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
         "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
         "bounds": { "min": lo, "max": hi },
         "warnings": loaded.report.warnings,
-        "device": device,
+        "device": engine.name(),
+        "target": engine.target().map(|shapes| shapes.target.name.clone()),
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
         "tree": {
@@ -87,7 +88,7 @@ fn json(args: &Args, device: &str, loaded: &Loaded, s: &Summary) -> Value {
     all
 }
 
-fn page(args: &Args, device: &str, loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
+fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
     let (mesh, report) = (&loaded.mesh, &loaded.report);
     let mut page = Page::default();
     page.section(&format!("Mesh {}", args.mesh.display()));
@@ -154,6 +155,9 @@ fn page(args: &Args, device: &str, loaded: &Loaded, s: &Summary, verbose: bool) 
     page.row("as the paper counts", format_args!("{} (4 n_m + 25 n_n + 4 n_ni, without PO)", bytes(s.paper_bytes)));
     page.row("neighbours, boundary", format_args!("found in {}", milliseconds(s.topology_ms)));
     if verbose {
+        if let Some(shapes) = shapes {
+            page.row("kernels", shapes);
+        }
         for (name, ms) in &s.stages {
             page.row(format_args!("  {name}"), milliseconds(*ms));
         }

@@ -59,7 +59,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let format = output::announce(&args.output, formats)?;
     let options = args.tree.options(false)?;
-    let engine = engine::open(common.device.as_deref())?;
+    let engine = engine::open(common)?;
     let loaded = input::mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };

@@ -14,6 +14,7 @@ mod render;
 mod slice;
 mod slice_output;
 mod text;
+mod tune;
 
 use clap::{Parser, Subcommand};
 use common::{Common, Failure};
@@ -30,6 +31,7 @@ Examples:
   olbvh slice bracket.vtu -o bracket.npy --layers 100   voxels, none of them empty that the mesh touches
   olbvh overlap a.vtu b.vtu -o cells.json       which cells of two meshes intersect
   olbvh bench                                   how fast all that is here
+  olbvh tune                                    make it faster on this device
   olbvh render kuhn:32,32,32 -o jet.png --device cpu
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device.";
@@ -54,6 +56,7 @@ enum Command {
     Render(Box<render::Args>),
     Slice(Box<slice::Args>),
     Overlap(overlap::Args),
+    Tune(tune::Args),
 }
 
 fn main() -> ExitCode {
@@ -69,6 +72,7 @@ fn main() -> ExitCode {
         Command::Render(args) => render::run(&args, &common),
         Command::Slice(args) => slice::run(&args, &common),
         Command::Overlap(args) => overlap::run(&args, &common),
+        Command::Tune(args) => tune::run(&args, &common),
     };
     done.map_or_else(Failure::report, |()| ExitCode::SUCCESS)
 }

@@ -54,7 +54,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     if args.pairs {
         options.lists = Lists::All; // pairs are found by lists
     }
-    let engine = engine::open(common.device.as_deref())?;
+    let engine = engine::open(common)?;
     let a = input::mesh(&args.a, common)?.mesh;
     let mut b = input::mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;

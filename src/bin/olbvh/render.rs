@@ -89,7 +89,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(false)?;
     let settings = args.settings()?;
     settings.check()?;
-    let engine = engine::open(common.device.as_deref())?;
+    let engine = engine::open(common)?;
     let loaded = input::mesh(&args.mesh, common)?;
     let field = args.field(&loaded.mesh, common)?;
     let built = engine.build(&loaded.mesh, &options)?;

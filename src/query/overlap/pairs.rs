@@ -99,7 +99,7 @@ pub fn cmd_list_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairM
 
 fn cmd_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, fill: u32, found: BufferRef) -> Result<()> {
     let (tree, mesh, own) = (&b.tree, &b.mesh.input, &a.mesh.input);
-    let workgroup = r.gpu().target().each;
+    let workgroup = r.gpu().target().query;
     let arguments = OverlapPairs {
         grid: tree.grid,
         masks: tree.masks,

@@ -135,7 +135,7 @@ impl Direction {
     }
 
     fn cmd_used(&self, r: &mut Recorder<'_>) -> Result<()> {
-        let (workgroup, tets) = (r.gpu().target().each, self.own.mesh.input.tets);
+        let (workgroup, tets) = (r.gpu().target().query, self.own.mesh.input.tets);
         let arguments = OverlapUsed { bad: self.own.mesh.arrays.bad, cells: self.own.mesh.input.cells, used: self.arrays.used, tets };
         r.dispatch(&arguments, OverlapUsedSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(workgroup)))
     }
@@ -146,7 +146,7 @@ impl Direction {
 
     fn cmd_places(&self, r: &mut Recorder<'_>, slice: u32) -> Result<()> {
         let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
-        let workgroup = r.gpu().target().each;
+        let workgroup = r.gpu().target().query;
         let arguments = OverlapPlaces {
             grid: tree.grid,
             masks: tree.masks,
@@ -170,7 +170,7 @@ impl Direction {
     }
 
     fn cmd_collect(&self, r: &mut Recorder<'_>) -> Result<()> {
-        let (workgroup, own) = (r.gpu().target().each, &self.own.mesh.input);
+        let (workgroup, own) = (r.gpu().target().query, &self.own.mesh.input);
         let arguments = OverlapCollect {
             grid: self.other.tree.grid,
             own_positions: own.positions,
@@ -191,12 +191,12 @@ impl Direction {
     /// Workgroups of the search, as soon as the number of those that wait is visible; no barrier.
     fn groups(&self, r: &mut Recorder<'_>) -> Result<Groups> {
         let waiting = Count::device(self.own.mesh.input.tets, self.arrays.status.word(0));
-        waiting.arguments(r, r.gpu().target().each, self.arrays.groups)
+        waiting.arguments(r, r.gpu().target().query, self.arrays.groups)
     }
 
     fn cmd_search(&self, r: &mut Recorder<'_>, groups: Groups) -> Result<()> {
         let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
-        let workgroup = r.gpu().target().each;
+        let workgroup = r.gpu().target().query;
         let arguments = OverlapSearch {
             grid: tree.grid,
             masks: tree.masks,

@@ -31,6 +31,10 @@ impl Engine for Cpu {
         "cpu".into()
     }
 
+    fn target(&self) -> Option<&super::Shapes> {
+        None
+    }
+
     fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
         let start = Instant::now();
         let topology = topology(mesh)?;

@@ -1,6 +1,7 @@
 //! A Vulkan device as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Report, Sink, Summary};
+use super::{Built, Drawn, Engine, Located, Overlapped, Report, Shapes, Sink, Summary};
+use crate::common::{Common, Outcome};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
@@ -14,14 +15,19 @@ use olbvh::slicing::{Extrapolate, VoxelGrid};
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// An opened device.
-pub struct Device(Gpu);
+/// An opened device, and where the shapes of its kernels come from.
+pub struct Device(Gpu, Shapes);
 
 impl Device {
-    /// Opens the device that `name` (part of a name, or an index) means, or the best one. Pipelines are kept in the user's cache folder.
-    pub fn open(name: Option<&str>) -> Result<Self> {
-        let options = GpuOptions { device: name.map(Into::into), pipeline_cache: cache_file(), ..GpuOptions::default() };
-        Ok(Self(Gpu::new(&options)?))
+    /// Opens the device that `--device` means, or the best one, with the shapes that were asked for. Pipelines are kept in the user's cache folder.
+    pub fn open(common: &Common) -> Outcome<Self> {
+        // Tested with the shapes that it will have.
+        let options = GpuOptions { device: common.device.clone(), pipeline_cache: cache_file(), trust: true, ..GpuOptions::default() };
+        let gpu = Gpu::new(&options)?;
+        let shapes = Shapes::of(common, gpu.report())?;
+        let gpu = gpu.with_target(shapes.target.clone())?;
+        gpu.self_test()?;
+        Ok(Self(gpu, shapes))
     }
 
     /// The device itself.
@@ -48,6 +54,10 @@ struct DeviceTree<'a> {
 impl Engine for Device {
     fn name(&self) -> String {
         self.0.report().name.clone()
+    }
+
+    fn target(&self) -> Option<&Shapes> {
+        Some(&self.1)
     }
 
     fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {

@@ -1,0 +1,70 @@
+//! How fast the device copies: the limit that the stages of a construction are compared with.
+
+use super::measure::Spread;
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::primitives::cmd_copy;
+use serde::Serialize;
+use std::time::Instant;
+
+/// Words of a copy: far more than caches hold.
+const WORDS: u32 = 1 << 24;
+/// Repetitions of each way.
+const REPETITIONS: u32 = 9;
+
+/// What copying takes, by the copy command and by a kernel.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct CopyRate {
+    /// Bytes read and bytes written, together.
+    pub bytes: u64,
+    /// Repetitions.
+    pub repetitions: u32,
+    /// Milliseconds of `vkCmdCopyBuffer`.
+    pub command_ms: Spread,
+    /// Milliseconds of a kernel that copies 16 bytes at a time.
+    pub kernel_ms: Spread,
+    /// Gigabytes (10^9) per second, read and written, of the faster one's median.
+    pub gb_per_s: f64,
+}
+
+impl CopyRate {
+    /// Measures it; the copies are compared with the original first.
+    ///
+    /// # Errors
+    /// [`Error::Memory`], or [`Error::Mismatch`] if a copy is not like the original.
+    pub fn measure(gpu: &Gpu) -> Result<Self> {
+        let data: Vec<u32> = (0..WORDS).map(|i| i.wrapping_mul(2_654_435_761)).collect();
+        let from = gpu.upload("olbvh.bench.original", &data)?;
+        let to = gpu.buffer("olbvh.bench.copy", 4 * u64::from(WORDS))?;
+        let run = |by_kernel: bool| {
+            let begin = Instant::now();
+            let ((), time) = gpu.run("olbvh.bench.copy", |r| {
+                r.stage("bench.copy", |r| {
+                    if by_kernel {
+                        return cmd_copy(r, from.all(), to.all());
+                    }
+                    r.copy(from.all(), to.all());
+                    Ok(())
+                })
+            })?;
+            let wall = begin.elapsed().as_secs_f64() * 1e3;
+            Ok::<_, Error>(Some(time.milliseconds("bench.copy")).filter(|ms| *ms > 0.0).unwrap_or(wall))
+        };
+        let times = |by_kernel: bool| {
+            gpu.run("olbvh.bench.clear", |r| {
+                r.fill(to.all(), 0);
+                Ok(())
+            })?;
+            run(by_kernel)?;
+            if gpu.download::<u32>(&to, to.all())? != data {
+                return Err(Error::Mismatch("a copy in device memory is not like the original".into()));
+            }
+            let times = (0..REPETITIONS).map(|_| run(by_kernel)).collect::<Result<Vec<f64>>>()?;
+            Spread::of(times).ok_or_else(|| Error::Invalid("no copy was timed".into()))
+        };
+        let (command_ms, kernel_ms) = (times(false)?, times(true)?);
+        let bytes = 8 * u64::from(WORDS);
+        let gb_per_s = bytes as f64 / command_ms.median.min(kernel_ms.median) * 1e-6;
+        Ok(Self { bytes, repetitions: REPETITIONS, command_ms, kernel_ms, gb_per_s })
+    }
+}

@@ -1,0 +1,67 @@
+//! The bytes that each stage of a construction must read and write at least, from the sizes of what it builds.
+//!
+//! Every array that a dispatch uses is counted once for it, as if caches were perfect and no access were wasted: gathered vertices count once, and
+//! what one dispatch writes and the next one reads counts twice. So a stage at 100 % of the copy rate could not be faster without other passes, and
+//! what is missing to 100 % is arithmetic, scattered access, idle lanes, or barriers.
+//!
+//! With t tetrahedra, p points, n entries, N nodes, I of them internal, L leaves, l levels, s shares of candidates (at least one per tetrahedron, and one per
+//! 32 candidates), bytes are:
+//!
+//! | stage | reads and writes |
+//! |---|---|
+//! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p, the fills of the tables 36 t |
+//! | `mesh.boundary` | cells 16 t and vertices 16 p twice, faces 16 t and mates 16 t to and fro, neighbours 16 t |
+//! | `build.depth` | cells 16 t, points 12 p |
+//! | `build.count` | the same, counts 4 t, their scan |
+//! | `build.filter` | cells 16 t, points 28 p, offsets 4 t, hits and counts 8 s, their scan; with marks twice, and 8^l / 8 bytes of marks three times |
+//! | `build.emit` | cells 16 t, points 12 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
+//! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
+//! | `build.count_splits` | codes 4 n, the table of runs, its scan |
+//! | `build.splits` | codes 4 n, the table of runs, PO 4 N, CO 4 I, cleared flags and masks |
+//! | `build.leaves` | P 4 n, PO and codes 8 L, boxes 24 L |
+//! | `build.levels` | CO 4 I, masks I, boxes 24 N |
+//!
+//! A scan reads its values twice and writes them once: 12 bytes per value.
+
+use crate::build::{DeviceMesh, Tree};
+use crate::kernels::Target;
+use crate::options::{Assign, Lists};
+
+/// Candidates per share, as the filter has it.
+const SHARE: u64 = 32;
+/// Bytes that a scan moves per value.
+const SCAN: u64 = 12;
+
+/// Least bytes of each stage of a tree's construction, in order, and of stage 0 before it.
+pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&'static str, u64)> {
+    let (input, status, options) = (mesh.input(), tree.status(), tree.options());
+    let (t, p, n) = (u64::from(input.tets), u64::from(input.points), u64::from(status.entries));
+    let (nodes, internal, leaves) = (u64::from(status.nodes), u64::from(status.internal), u64::from(status.leaves));
+    let level = status.level;
+    let cells_and_points = 16 * t + 4 * u64::from(input.stride) * p;
+    let filtered = options.assign != Assign::Aabb || options.lists != Lists::All;
+    let shares = t.max(u64::from(status.candidates) / SHARE);
+    let marks = if options.lists == Lists::Boundary { 8u64.pow(level).div_ceil(8) } else { 0 };
+    let dispatches = if options.lists == Lists::Boundary { 2 } else { 1 };
+    let filter = dispatches * (cells_and_points + 16 * p + 4 * t) + 8 * shares + SCAN * shares + 3 * marks;
+    let (passes, digit_bits) = target.sort.passes(3 * level);
+    let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
+    let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
+    let sort = if level == 0 || n < 2 { 0 } else { u64::from(passes) * pass + if passes % 2 == 1 { 16 * n } else { 0 } };
+    let runs = n.div_ceil(u64::from(target.run.rows)) * u64::from(level + 1);
+    let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
+    let stages = [
+        ("mesh.bounds", 16 * t + 24 * p + 16 * p + 36 * t),
+        ("mesh.boundary", 2 * (16 * t + 16 * p) + 4 * 16 * t + 16 * t),
+        ("build.depth", cells_and_points),
+        ("build.count", cells_and_points + 4 * t + SCAN * t),
+        ("build.filter", if filtered { filter } else { 0 }),
+        ("build.emit", cells_and_points + 4 * t + if filtered { 8 * shares } else { 0 } + 8 * n),
+        ("build.sort", sort),
+        ("build.count_splits", 4 * n + (4 + SCAN) * runs),
+        ("build.splits", 4 * n + 4 * runs + 4 * nodes + 4 * internal + nodes / 8 + internal),
+        ("build.leaves", 4 * n + 8 * leaves + boxes(leaves)),
+        ("build.levels", 4 * internal + internal + boxes(nodes)),
+    ];
+    stages.into_iter().filter(|(_, bytes)| *bytes > 0).collect()
+}

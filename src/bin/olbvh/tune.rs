@@ -1,0 +1,131 @@
+//! `olbvh tune`.
+
+use crate::common::{Common, Failure, Outcome};
+use crate::engine::{self, Origin};
+use crate::input;
+use crate::output::{self, Progress};
+use crate::text::{Page, milliseconds};
+use olbvh::formats::OutputFormat;
+use olbvh::gpu::Gpu;
+use olbvh::tune::{Event, Gain, Limits, Profile, TUNABLES, Tuned, Workload, folder, tune};
+use serde_json::json;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+/// Find the shapes of the kernels (workgroup sizes, items per invocation, sort) that are fastest on this device, and keep them.
+#[derive(clap::Args)]
+#[command(after_help = "\
+Examples:
+  olbvh tune                             a minute; later runs on this device find what was saved
+  olbvh tune --seconds 600 bracket.vtu   longer, on a mesh of yours
+  olbvh tune --no-profile -o mine.json   from the table's values, into a file:
+  olbvh render m.vtu -o m.png --target mine.json
+
+Every candidate must give the same trees, owners, pictures and voxels, byte for byte, before it is timed; then it runs in turns with the best so far,
+and is kept only if it is faster by more than the times vary. What was gained is measured again at the end. The profile lies in the user's
+configuration folder (olbvh/DEVICE.DRIVER.json in $XDG_CONFIG_HOME or ~/.config); `olbvh devices -v` names it, --no-profile (or OLBVH_NO_PROFILE=1)
+passes it over, and removing the file undoes it. A profile that is broken or was made for something else is passed over with a remark.")]
+pub struct Args {
+    /// Mesh to tune with: a file or a procedural mesh.
+    #[arg(default_value = "kuhn:32,32,32,jitter=0.3")]
+    mesh: PathBuf,
+    /// Seconds after which no further candidate is tried.
+    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    seconds: f64,
+    /// Where the profile goes (.json) instead of the configuration folder.
+    #[arg(short, long, value_name = "FILE")]
+    output: Option<PathBuf>,
+}
+
+/// Runs it.
+pub fn run(args: &Args, common: &Common) -> Outcome {
+    if !(args.seconds.is_finite() && (0.0..=1e6).contains(&args.seconds)) {
+        return Err(Failure::Usage(format!("--seconds {}; it is a time, up to a million seconds", args.seconds)));
+    }
+    if let Some(path) = &args.output {
+        output::announce(path, &[OutputFormat::Json])?;
+    }
+    let gpu = engine::device(common)?;
+    let file = args.output.clone().or_else(|| Some(folder()?.join(Profile::file_name(gpu.report()))));
+    let Some(file) = file else {
+        return Err(Failure::Usage("there is no home for a configuration folder; -o FILE says where the profile goes".into()));
+    };
+    let mesh = input::mesh(&args.mesh, common)?.mesh;
+    if mesh.tets.is_empty() {
+        return Err(Failure::Usage(format!("{}: no tetrahedra to tune with", args.mesh.display())));
+    }
+    let origin = engine::shapes(common)?;
+    common.remark(format_args!("{}: {} tetrahedra, from kernels {origin}", args.mesh.display(), mesh.tets.len()));
+    let work = Workload::new(&gpu, &mesh)?;
+    let progress = Progress::new(common, "tuning");
+    let report = |event: &Event, part: f64| {
+        tell(event, common);
+        progress.set((part.min(1.0) * 1000.0) as u64, 1000);
+    };
+    let limits = Limits { time: Duration::from_secs_f64(args.seconds) };
+    let tuned = tune(&work, &gpu.report().room, gpu.target(), limits, &report)?;
+    drop(progress);
+    // Without a gain there is nothing to keep, unless a file was asked for.
+    let saved = (tuned.kept > 0 || args.output.is_some()).then(|| save(&gpu, args, &tuned, &file)).transpose()?;
+    finish(common, &gpu, &tuned, (&file, saved.is_some()), matches!(origin.origin, Origin::Profile(_)))
+}
+
+/// Every candidate with `--verbose`; what is kept or refused in any case.
+fn tell(event: &Event, common: &Common) {
+    match event {
+        Event::Tried { change, ratio, kept: true } => common.remark(format_args!("{change}: {:.0} % of the time, kept", 100.0 * ratio)),
+        Event::Tried { change, ratio, .. } => log::info!("{change}: {:.0} % of the time", 100.0 * ratio),
+        Event::Refused { change, why } => common.remark(format_args!("{change}: refused: {why}")),
+    }
+}
+
+fn save(gpu: &Gpu, args: &Args, tuned: &Tuned, file: &Path) -> Outcome {
+    let device = gpu.report();
+    let mut target = tuned.target.clone();
+    if tuned.kept > 0 {
+        target.name = "tuned".into();
+    }
+    let profile = Profile {
+        device: device.name.clone(),
+        driver: device.driver.clone(),
+        subgroup: device.subgroup,
+        version: env!("CARGO_PKG_VERSION").into(),
+        mesh: args.mesh.display().to_string(),
+        target,
+        gains: tuned.gains.clone(),
+    };
+    Ok(profile.write(file)?)
+}
+
+/// What was gained, stage by stage, and where it is kept.
+fn finish(common: &Common, gpu: &Gpu, tuned: &Tuned, (file, saved): (&Path, bool), had_profile: bool) -> Outcome {
+    let Tuned { target, kept, tried, refused, complete, gains } = tuned;
+    let start = gpu.target();
+    let mut page = Page::default();
+    let end = if *complete { "nothing left to try" } else { "time over" };
+    page.section(&format!("{}: {tried} candidates timed, {refused} refused, {kept} kept; {end}", gpu.report().name));
+    if start.sort.serial != target.sort.serial {
+        page.row("sort.serial", format_args!("{} → {}", start.sort.serial, target.sort.serial));
+    }
+    for tunable in TUNABLES.iter().filter(|t| t.of(start) != t.of(target)) {
+        page.row(tunable.name, format_args!("{} → {}  ({})", tunable.of(start), tunable.of(target), tunable.about));
+    }
+    if !gains.is_empty() {
+        page.section("Median times before and after");
+    }
+    for Gain { stage, before_ms, after_ms } in gains {
+        let shown = [milliseconds(*before_ms), milliseconds(*after_ms)];
+        page.row(stage, format_args!("{} → {}  ({:.2}×)", shown[0], shown[1], before_ms / after_ms));
+    }
+    let verdict = match () {
+        () if saved => format!("Saved: {}", file.display()),
+        () if had_profile => "Nothing gained; the profile stays as it is".into(),
+        () => format!("Nothing gained over the target `{}`; nothing saved", start.name),
+    };
+    page.section(&verdict);
+    let json = json!({
+        "device": gpu.report().name, "driver": gpu.report().driver, "tried": tried, "refused": refused, "kept": kept, "complete": complete,
+        "before": start, "after": target, "gains": gains, "file": file.display().to_string(), "profile": saved.then(|| file.display().to_string()),
+    });
+    output::summary(common, &json, &page.to_string())
+}

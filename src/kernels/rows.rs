@@ -1,0 +1,180 @@
+//! The table of targets: one row per kind of device.
+//!
+//! Only `cpu` has been measured here. The sorts of the vendors' rows are those of published sorts of the same kind (subgroup ballots, tiles of a
+//! workgroup): Fuchsia's `radix_sort`, which Mesa uses in its AMD driver to build acceleration structures, for NVIDIA, AMD, Intel and Arm; `GPUSorting` and
+//! the WebGPU sorts, which found 256 × 15 good on Apple as well. Workgroups of the other kernels follow from what a core holds: small ones where
+//! registers are few or subgroups narrow. `olbvh tune` finds out what is better on the device at hand.
+
+use super::target::{Room, SortTarget, Target, TileTarget};
+use crate::error::{Error, Result};
+use crate::gpu::DeviceReport;
+use ash::vk::DriverId;
+use std::borrow::Cow;
+
+/// A kind of device.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Row {
+    /// Anything else with narrow cores.
+    Portable,
+    /// A processor: a workgroup is one loop over a wide vector.
+    Cpu,
+    /// NVIDIA.
+    Nvidia,
+    /// AMD.
+    Amd,
+    /// Intel.
+    Intel,
+    /// Apple.
+    Apple,
+    /// Arm: Mali and Immortalis.
+    Arm,
+    /// Qualcomm: Adreno.
+    Qualcomm,
+}
+
+/// One row as numbers; workgroups are rounded up to whole subgroups.
+struct Numbers {
+    /// Workgroup and items per invocation of scans.
+    scan: (u32, u32),
+    spine: u32,
+    /// Serial, workgroup, pairs per invocation, bits per digit.
+    sort: (bool, u32, u32, u32),
+    each: u32,
+    /// Workgroup and entries per invocation of runs.
+    run: (u32, u32),
+    query: u32,
+}
+
+impl Row {
+    /// Every row.
+    pub const ALL: [Self; 8] = [Self::Portable, Self::Cpu, Self::Nvidia, Self::Amd, Self::Intel, Self::Apple, Self::Arm, Self::Qualcomm];
+
+    /// The name used on the command line and in reports.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Cpu => "cpu",
+            Self::Nvidia => "nvidia",
+            Self::Amd => "amd",
+            Self::Intel => "intel",
+            Self::Apple => "apple",
+            Self::Arm => "arm",
+            Self::Qualcomm => "qualcomm",
+        }
+    }
+
+    #[rustfmt::skip]
+    fn numbers(self) -> Numbers {
+        let (cpu, simt) = (true, false);
+        match self {
+            // Few, long tiles and no barriers.
+            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 256),   query: 64 },
+            Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256 },
+            Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128 },
+            Self::Amd      => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64 },
+            Self::Intel    => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 8, 8),    each: 128, run: (128, 16),  query: 64 },
+            Self::Apple    => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 64 },
+            Self::Arm      => Numbers { scan: (64, 16),   spine: 128, sort: (simt, 64, 9, 8),     each: 64,  run: (64, 16),   query: 64 },
+            Self::Qualcomm => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 16, 8),   each: 128, run: (128, 16),  query: 64 },
+        }
+    }
+
+    /// The row's target on a device with this room.
+    pub fn target(self, room: &Room) -> Target {
+        let Numbers { scan, spine, sort, each, run, query } = self.numbers();
+        let tiles = |(workgroup, rows)| TileTarget { workgroup, rows };
+        let (serial, workgroup, rows, digit_bits) = sort;
+        let sort = SortTarget { serial, workgroup, rows, digit_bits };
+        Target { name: Cow::Borrowed(self.name()), scan: tiles(scan), spine, sort, each, run: tiles(run), query }.fit(room)
+    }
+
+    /// The row for a device: by its driver where that says more than the vendor, or else by the vendor.
+    pub fn of(device: &DeviceReport) -> Self {
+        Self::choose(device.kind == "cpu", DriverId::from_raw(device.driver_id), device.vendor)
+    }
+
+    fn choose(processor: bool, driver: DriverId, vendor: u32) -> Self {
+        // Mesa's driver for Apple's GPUs, newer than the names that `ash` has.
+        const HONEYKRISP: DriverId = DriverId::from_raw(26);
+        match (driver, vendor) {
+            _ if processor => Self::Cpu,
+            (DriverId::MESA_LLVMPIPE | DriverId::GOOGLE_SWIFTSHADER, _) => Self::Cpu,
+            (HONEYKRISP, _) | (_, 0x106b) => Self::Apple,
+            (_, 0x10de) => Self::Nvidia,
+            (_, 0x1002 | 0x1022) => Self::Amd,
+            (_, 0x8086) => Self::Intel,
+            (_, 0x13b5) => Self::Arm,
+            (_, 0x5143) => Self::Qualcomm,
+            _ => Self::Portable,
+        }
+    }
+}
+
+impl std::str::FromStr for Row {
+    type Err = Error;
+
+    fn from_str(name: &str) -> Result<Self> {
+        let found = Self::ALL.into_iter().find(|row| row.name().eq_ignore_ascii_case(name));
+        found.ok_or_else(|| Error::Invalid(format!("unknown target `{name}`; known are {}", Self::ALL.map(Self::name).join(", "))))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn devices_find_their_rows() {
+        let proprietary = DriverId::NVIDIA_PROPRIETARY;
+        assert_eq!(Row::choose(false, proprietary, 0x10de), Row::Nvidia);
+        assert_eq!(Row::choose(false, DriverId::MESA_RADV, 0x1002), Row::Amd);
+        assert_eq!(Row::choose(false, DriverId::from_raw(26), 0x1_0005), Row::Apple);
+        assert_eq!(Row::choose(false, DriverId::MOLTENVK, 0x106b), Row::Apple);
+        assert_eq!(Row::choose(false, DriverId::MOLTENVK, 0x1002), Row::Amd);
+        assert_eq!(Row::choose(false, DriverId::ARM_PROPRIETARY, 0x13b5), Row::Arm);
+        assert_eq!(Row::choose(false, DriverId::QUALCOMM_PROPRIETARY, 0x5143), Row::Qualcomm);
+        assert_eq!(Row::choose(true, DriverId::MESA_LLVMPIPE, 0x1_0005), Row::Cpu);
+        assert_eq!(Row::choose(false, DriverId::from_raw(0), 0x1010), Row::Portable);
+    }
+
+    #[test]
+    fn every_row_fits_the_least_device() {
+        for row in Row::ALL {
+            assert_eq!(row.name().parse::<Row>().unwrap(), row);
+            for subgroup in [4, 8, 16, 32, 64, 128] {
+                let room = Room::least(subgroup);
+                let target = row.target(&room);
+                target.check(&room).unwrap();
+                target.check_scale().unwrap();
+            }
+        }
+        assert!("gpu".parse::<Row>().is_err_and(|e| e.to_string().contains("portable, cpu, nvidia")));
+    }
+
+    #[test]
+    fn rows_keep_their_digits_where_subgroups_are_the_vendors() {
+        for (row, subgroup) in [(Row::Nvidia, 32), (Row::Amd, 64), (Row::Amd, 32), (Row::Intel, 16), (Row::Apple, 32), (Row::Arm, 16)] {
+            assert_eq!(row.target(&Room::least(subgroup)).sort.digit_bits, 8, "{row:?}");
+        }
+        assert_eq!(Row::Cpu.target(&Room::least(8)).sort, SortTarget { serial: true, workgroup: 8, rows: 8192, digit_bits: 11 });
+    }
+
+    #[test]
+    fn what_does_not_fit_is_named() {
+        let room = Room::least(32);
+        let target = Row::Portable.target(&room);
+        let refused = |change: fn(&mut Target)| {
+            let mut target = target.clone();
+            change(&mut target);
+            target.check(&room).and_then(|()| target.check_scale()).unwrap_err().to_string()
+        };
+        assert!(refused(|t| t.each = 48).contains("each is 48; it must be a multiple of 32, the subgroup size, up to 256"));
+        assert!(refused(|t| t.query = 512).contains("query is 512"));
+        assert!(refused(|t| t.scan.rows = 0).contains("scan.rows is 0"));
+        assert!(refused(|t| t.sort.digit_bits = 13).contains("sort.digit_bits is 13"));
+        assert!(refused(|t| t.sort.digit_bits = 10).contains("36864 bytes of shared memory of 16384"));
+        assert!(refused(|t| t.sort.rows = 8192).contains("sort.rows must be smaller"));
+        assert!(refused(|t| t.run.rows = 4).contains("run.rows is 4; for large meshes it must be 12"));
+        assert!(refused(|t| t.scan.rows = 1).contains("scan.workgroup × scan.rows × spine is 65536"));
+    }
+}

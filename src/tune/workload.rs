@@ -1,0 +1,194 @@
+//! What is timed, and what it must answer.
+
+use super::search::Work;
+use crate::build::{BadCells, DeviceMesh, Tree};
+use crate::error::{Error, Result};
+use crate::gpu::{Gpu, StageTime};
+use crate::kernels::Target;
+use crate::mesh::{Field, Mesh, On};
+use crate::options::{BuildOptions, Lists};
+use crate::query::{self, LocateOptions};
+use crate::reference::boundary::topology;
+use crate::reference::build::build;
+use crate::reference::locate::Locator;
+use crate::render::{Bounds, Plan, RenderSettings};
+use crate::slicing::{Extrapolate, SliceSettings, VoxelGrid};
+use crate::tree::TreeArrays;
+use std::cell::RefCell;
+use std::rc::Rc;
+use std::time::Instant;
+
+/// Points to locate.
+const POINTS: u32 = 1 << 16;
+/// Width and height of the picture, and voxels of a row of the slice.
+const PIXELS: u32 = 192;
+/// Meshes up to this size are compared with the reference as well.
+const REFERENCE_TETS: usize = 300_000;
+
+/// A mesh, and the questions about it.
+pub struct Workload<'a> {
+    gpu: Gpu,
+    mesh: &'a Mesh,
+    points: Vec<[f32; 3]>,
+    field: Field,
+    plan: Plan,
+    voxels: VoxelGrid,
+    expected: Answers,
+    /// Mesh and trees under the last two targets.
+    prepared: RefCell<Vec<Rc<Prepared>>>,
+}
+
+/// A mesh and its trees, built under a target.
+struct Prepared {
+    target: Target,
+    mesh: DeviceMesh,
+    whole: Tree,
+    boundary: Tree,
+}
+
+/// What must not depend on a target.
+#[derive(Default, PartialEq)]
+struct Answers {
+    neighbours: Vec<[u32; 4]>,
+    trees: Vec<TreeArrays>,
+    owners: Vec<Vec<u32>>,
+    barycentrics: Vec<[f32; 4]>,
+    colors: Vec<[f32; 4]>,
+    kinds: Vec<u8>,
+    voxels: Vec<u32>,
+}
+
+impl<'a> Workload<'a> {
+    /// The answers under the target of `gpu`, which for meshes that are not too large are compared with the reference first.
+    ///
+    /// # Errors
+    /// [`Error::Mismatch`] if the device gives other answers than the reference, [`Error::Memory`] and the like if it cannot hold the mesh.
+    pub fn new(gpu: &Gpu, mesh: &'a Mesh) -> Result<Self> {
+        let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
+        let grid = *device.grid();
+        let [lo, hi] = [grid.lo, grid.hi].map(|c| [c[0], c[1], c[2]]);
+        // Fractions of multiples of the golden ratio and its kin: in no order, and spread evenly.
+        let at = |i: u32, share: f64, c: usize| lo[c] + (hi[c] - lo[c]) * (f64::from(i) * share).fract() as f32;
+        let points = (0..POINTS).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();
+        let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
+        let field = mesh.fields.iter().find(|f| f.on == On::Points).cloned().unwrap_or_else(along_x);
+        let picture = RenderSettings { size: [PIXELS; 2], shading: false, ..RenderSettings::default() };
+        let plan = Plan::new(&picture, &Bounds { lo, hi }, mesh.origin, field.range())?;
+        let voxels = SliceSettings { size: [PIXELS, 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3])?;
+        let gpu = gpu.clone();
+        let (expected, prepared) = (Answers::default(), RefCell::default());
+        let mut workload = Self { gpu, mesh, points, field, plan, voxels, expected, prepared };
+        let target = workload.gpu.target().clone();
+        workload.expected = workload.answers(&target)?;
+        if mesh.tets.len() <= REFERENCE_TETS {
+            workload.check_reference()?;
+        }
+        Ok(workload)
+    }
+
+    fn check_reference(&self) -> Result<()> {
+        let topology = topology(self.mesh)?;
+        let tree = build(self.mesh, &topology, &BuildOptions { lists: Lists::All, ..BuildOptions::default() })?;
+        if self.expected.trees.first() != Some(&tree) {
+            return Err(Error::Mismatch("the tree is not the reference's; `olbvh conformance` tells where".into()));
+        }
+        let owners: Vec<u32> = Locator::new(self.mesh, &topology, &tree).locate_all(&self.points).iter().map(|l| l.owner).collect();
+        if self.expected.owners.first() != Some(&owners) {
+            return Err(Error::Mismatch("owners are not the reference's; `olbvh conformance` tells where".into()));
+        }
+        Ok(())
+    }
+
+    /// Stage 0 and both constructions under a target, with their stages.
+    fn construct(&self, target: &Target) -> Result<(Prepared, Vec<StageTime>)> {
+        let gpu = self.gpu.with_target(target.clone())?;
+        let mesh = DeviceMesh::upload(&gpu, self.mesh, BadCells::Skip)?;
+        let tree = |lists| Tree::build(&gpu, &mesh, &BuildOptions { lists, ..BuildOptions::default() });
+        let (whole, boundary) = (tree(Lists::All)?, tree(Lists::Boundary)?);
+        let stages = mesh.time().stages.iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
+        Ok((Prepared { target: target.clone(), mesh, whole, boundary }, stages))
+    }
+
+    /// Mesh and trees of a target, from before if they are still there.
+    fn prepared(&self, target: &Target) -> Result<Rc<Prepared>> {
+        if let Some(found) = self.prepared.borrow().iter().find(|p| p.target == *target) {
+            return Ok(found.clone());
+        }
+        let made = Rc::new(self.construct(target)?.0);
+        let mut prepared = self.prepared.borrow_mut();
+        prepared.insert(0, made.clone());
+        prepared.truncate(2);
+        Ok(made)
+    }
+
+    /// Every query; its answers go to `answers`.
+    fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<Vec<StageTime>> {
+        let silent = &|_, _| {};
+        let mut stages = Vec::new();
+        for tree in [&on.whole, &on.boundary] {
+            let located = query::locate(&on.mesh, tree, &self.points, None, &LocateOptions::default(), silent)?;
+            stages.extend(located.stages);
+            answers.owners.push(located.owners);
+            answers.barycentrics.extend(located.barycentrics);
+        }
+        let drawn = query::render(&on.mesh, &on.whole, &self.plan, (&self.field.values, On::Points), None, silent)?;
+        answers.colors = drawn.colors;
+        let sliced = query::slice(&on.mesh, &on.whole, None, &self.voxels, Extrapolate::Nearest, silent, &mut |band| {
+            answers.kinds.extend(band.kinds);
+            answers.voxels.extend(band.owners);
+            Ok(())
+        })?;
+        let parts = [
+            ("query.intervals", drawn.interval_ms),
+            ("query.march", drawn.march_ms),
+            ("query.slice_locate", sliced.locate_ms),
+            ("query.slice_touch", sliced.touch_ms),
+        ];
+        stages.extend(parts.map(|(name, milliseconds)| StageTime { name: name.into(), milliseconds }));
+        Ok(stages)
+    }
+
+    fn answers(&self, target: &Target) -> Result<Answers> {
+        let on = self.prepared(target)?;
+        let mut answers =
+            Answers { neighbours: on.mesh.neighbours()?, trees: vec![on.whole.download()?, on.boundary.download()?], ..Answers::default() };
+        self.ask(&on, &mut answers)?;
+        Ok(answers)
+    }
+}
+
+impl Work for Workload<'_> {
+    fn verify(&self, target: &Target) -> Result<()> {
+        let found = self.answers(target)?;
+        let e = &self.expected;
+        let same = [
+            ("neighbours", e.neighbours == found.neighbours),
+            ("trees", e.trees == found.trees),
+            ("owners", e.owners == found.owners && e.barycentrics == found.barycentrics),
+            ("pictures", e.colors == found.colors),
+            ("voxels", e.kinds == found.kinds && e.voxels == found.voxels),
+        ];
+        let wrong = same.into_iter().find(|(_, same)| !same);
+        wrong.map_or(Ok(()), |(what, _)| Err(Error::Mismatch(format!("{what} differ from those of target `{}`", self.gpu.target().name))))
+    }
+
+    fn run(&self, target: &Target, stages: &[&str]) -> Result<Vec<StageTime>> {
+        let any = |kinds: &[&str]| stages.iter().any(|s| kinds.iter().any(|k| s.starts_with(k)));
+        let mut times = Vec::new();
+        let begin;
+        if any(&["query."]) {
+            let on = self.prepared(target)?;
+            begin = Instant::now();
+            times = self.ask(&on, &mut Answers::default())?;
+        } else {
+            begin = Instant::now();
+        }
+        if any(&["mesh.", "build."]) {
+            times.extend(self.construct(target)?.1);
+        }
+        // Without timestamps the clock of the host has to do, for all stages together.
+        let wall =
+            StageTime { name: stages.first().copied().unwrap_or_default().into(), milliseconds: begin.elapsed().as_secs_f64() * 1e3 };
+        Ok(if times.iter().any(|s| s.milliseconds > 0.0) { times } else { vec![wall] })
+    }
+}

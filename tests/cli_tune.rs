@@ -1,0 +1,133 @@
+//! `olbvh tune`, and how later runs find what it saved.
+#![cfg(feature = "cli")]
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
+
+/// A folder with a configuration of its own.
+struct Home(tempfile::TempDir);
+
+impl Home {
+    fn new() -> Self {
+        Self(tempfile::tempdir().unwrap())
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn olbvh(&self, arguments: &[&str], variables: &[(&str, &str)]) -> Output {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_olbvh"));
+        command.args(arguments).current_dir(self.0.path()).env_remove("OLBVH_TARGET").env_remove("OLBVH_NO_PROFILE");
+        command.env("XDG_CONFIG_HOME", self.path("config")).envs(variables.iter().copied()).output().unwrap()
+    }
+
+    fn json(&self, arguments: &[&str]) -> Value {
+        let out = self.olbvh(&[arguments, &["--json"]].concat(), &[]);
+        assert_eq!(out.status.code(), Some(0), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
+        serde_json::from_slice(&out.stdout).unwrap()
+    }
+
+    /// What `info -v` says of the kernels, and what it remarks.
+    fn kernels(&self, arguments: &[&str], variables: &[(&str, &str)]) -> (String, String) {
+        let out = self.olbvh(&[&["info", "kuhn:2,2,2", "-v"], arguments].concat(), variables);
+        let [stdout, stderr] = [out.stdout, out.stderr].map(|text| String::from_utf8(text).unwrap());
+        assert_eq!(out.status.code(), Some(0), "{stderr}");
+        let line = stdout.lines().find(|line| line.trim_start().starts_with("kernels ")).unwrap().to_owned();
+        (line, stderr)
+    }
+}
+
+fn write(path: &Path, profile: &Value) {
+    std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+    std::fs::write(path, profile.to_string()).unwrap();
+}
+
+#[test]
+fn a_search_saves_what_it_gained() {
+    let home = Home::new();
+    let told = home.json(&["tune", "kuhn:5,5,5,jitter=0.3", "--seconds", "2", "--no-profile"]);
+    let [tried, refused, kept] = ["tried", "refused", "kept"].map(|key| told[key].as_u64().unwrap());
+    assert!(tried > 0 && refused == 0, "{told:#}");
+    let file = PathBuf::from(told["file"].as_str().unwrap());
+    assert!(file.starts_with(home.path("config")), "{}", file.display());
+    if kept == 0 {
+        assert!(!file.exists() && told["profile"].is_null() && told["before"] == told["after"], "{told:#}");
+        return;
+    }
+    assert_eq!(told["profile"], told["file"]);
+    let saved: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
+    assert_eq!((&saved["gains"], &saved["device"]), (&told["gains"], &told["device"]));
+    assert_eq!(told["gains"].as_array().unwrap().last().unwrap()["stage"], "all");
+    assert!(told["before"] != told["after"]);
+    assert!(home.kernels(&[], &[]).0.contains(file.to_str().unwrap()));
+}
+
+#[test]
+fn profiles_are_found_and_passed_over() {
+    let home = Home::new();
+    let tune = ["tune", "kuhn:3,3,3", "--seconds", "0"];
+    let told = home.json(&[&tune[..], &["-o", "mine.json"]].concat());
+    assert_eq!((&told["tried"], &told["kept"]), (&0.into(), &0.into()));
+    assert!(home.json(&tune)["profile"].is_null());
+    let file = PathBuf::from(home.json(&tune)["file"].as_str().unwrap());
+    assert!(!file.exists());
+    assert!(home.kernels(&[], &[]).0.contains("for devices of this kind"));
+
+    // The device's own.
+    let mut profile: Value = serde_json::from_slice(&std::fs::read(home.path("mine.json")).unwrap()).unwrap();
+    let named = |profile: &mut Value, key: &str, value: Value| profile["target"][key] = value;
+    named(&mut profile, "name", "mine".into());
+    write(&file, &profile);
+    let path = file.to_str().unwrap();
+    let (line, remarks) = home.kernels(&[], &[]);
+    assert!(line.contains("`mine`, from") && line.contains(path) && !remarks.contains("ignored"), "{line} {remarks}");
+    let devices = home.olbvh(&["devices", "-v"], &[]);
+    assert!(String::from_utf8_lossy(&devices.stdout).contains(path));
+    for (arguments, variables) in [(&["--no-profile"][..], &[][..]), (&[], &[("OLBVH_NO_PROFILE", "1")])] {
+        assert!(home.kernels(arguments, variables).0.contains("for devices of this kind"));
+    }
+    assert!(home.kernels(&[], &[("OLBVH_NO_PROFILE", "0")]).0.contains("`mine`"));
+
+    // Another device's, and broken ones, cost speed only: a remark names file and remedy.
+    let mut foreign = profile.clone();
+    foreign["driver"] = "Another 1.0".into();
+    let mut narrow = profile.clone();
+    named(&mut narrow, "each", 3.into());
+    let mut unknown = profile.clone();
+    named(&mut unknown, "colour", 3.into());
+    let wrong = [(foreign, "made for the driver `Another 1.0`"), (narrow.clone(), "each is 3"), (unknown, "colour"), (Value::Null, "null")];
+    for (wrong, what) in wrong {
+        write(&file, &wrong);
+        let (line, remarks) = home.kernels(&[], &[]);
+        assert!(line.contains("for devices of this kind"), "{line}");
+        assert!(remarks.contains("profile ignored") && remarks.contains(path) && remarks.contains(what), "{remarks}");
+        assert!(remarks.contains("remove it, or"), "{remarks}");
+    }
+
+    // What is asked for must be there, and stands before the profile.
+    write(&file, &profile);
+    assert!(home.kernels(&["--target", "mine.json"], &[]).0.contains("from mine.json"));
+    assert!(home.kernels(&[], &[("OLBVH_TARGET", "amd")]).0.contains("`amd`, as asked for"));
+    write(&home.path("narrow.json"), &narrow);
+    write(&home.path("broken.json"), &Value::Null);
+    for (target, code) in [("nvida", 2), ("narrow.json", 2), ("broken.json", 3), ("nothing.json", 3)] {
+        let out = home.olbvh(&["info", "kuhn:2,2,2", "--target", target], &[]);
+        let message = String::from_utf8_lossy(&out.stderr);
+        assert_eq!(out.status.code(), Some(code), "{target}: {message}");
+        assert!(message.contains(target), "{message}");
+    }
+}
+
+#[test]
+fn wrong_arguments_are_refused() {
+    let home = Home::new();
+    let wrong: [&[&str]; 4] = [&["--seconds=-1"], &["-o", "a.txt"], &["--device", "cpu"], &["kuhn:0,1,1"]];
+    for arguments in wrong {
+        let out = home.olbvh(&[&["tune"], arguments].concat(), &[]);
+        assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
+    }
+    assert!(std::fs::read_dir(home.0.path()).unwrap().next().is_none(), "a refused run leaves nothing");
+}
