@@ -5,7 +5,7 @@ use olbvh::build::{BadCells, DeviceMesh};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::Mesh;
 use olbvh::reference::boundary::topology;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 
 /// Balls cut into tetrahedra round their centres, which are the first points: the faces of few vertices crowd in the table of faces.
 fn stars(n: u32) -> Mesh {
@@ -20,13 +20,7 @@ fn stars(n: u32) -> Mesh {
         let mut ids = BTreeMap::new();
         for (x, y) in (-SIDE..=SIDE).flat_map(|x| (-SIDE..=SIDE).map(move |y| (x, y))) {
             let z = SIDE - x.abs() - y.abs();
-            for z in if z < 0 {
-                vec![]
-            } else if z == 0 {
-                vec![0]
-            } else {
-                vec![z, -z]
-            } {
+            for z in BTreeSet::from([z, -z]).into_iter().filter(|_| z >= 0) {
                 ids.insert([x, y, z], mesh.points.len() as u32);
                 mesh.points.push(place(k, x, y, z));
             }

@@ -12,9 +12,9 @@
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p, the fills of the tables 36 t |
 //! | `mesh.boundary` | cells 16 t and vertices 16 p twice, faces 16 t and mates 16 t to and fro, neighbours 16 t |
 //! | `build.depth` | cells 16 t, points 12 p |
-//! | `build.count` | the same, counts 4 t, their scan |
-//! | `build.filter` | cells 16 t, points 28 p, offsets 4 t, hits and counts 8 s, their scan; with marks twice, and 8^l / 8 bytes of marks three times |
-//! | `build.emit` | cells 16 t, points 12 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
+//! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan |
+//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; with marks twice, and 8^l / 8 bytes of marks three times |
+//! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
 //! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 N, CO 4 I, cleared flags and masks |
@@ -38,12 +38,12 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let (t, p, n) = (u64::from(input.tets), u64::from(input.points), u64::from(status.entries));
     let (nodes, internal, leaves) = (u64::from(status.nodes), u64::from(status.internal), u64::from(status.leaves));
     let level = status.level;
-    let cells_and_points = 16 * t + 4 * u64::from(input.stride) * p;
+    let cells_and_vertices = 16 * t + 16 * p;
     let filtered = options.assign != Assign::Aabb || options.lists != Lists::All;
     let shares = t.max(u64::from(status.candidates) / SHARE);
     let marks = if options.lists == Lists::Boundary { 8u64.pow(level).div_ceil(8) } else { 0 };
     let dispatches = if options.lists == Lists::Boundary { 2 } else { 1 };
-    let filter = dispatches * (cells_and_points + 16 * p + 4 * t) + 8 * shares + SCAN * shares + 3 * marks;
+    let filter = dispatches * (cells_and_vertices + 4 * t) + 8 * shares + SCAN * shares + 3 * marks;
     let (passes, digit_bits) = target.sort.passes(3 * level);
     let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
     let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
@@ -53,10 +53,10 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let stages = [
         ("mesh.bounds", 16 * t + 24 * p + 16 * p + 36 * t),
         ("mesh.boundary", 2 * (16 * t + 16 * p) + 4 * 16 * t + 16 * t),
-        ("build.depth", cells_and_points),
-        ("build.count", cells_and_points + 4 * t + SCAN * t),
+        ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
+        ("build.count", cells_and_vertices + 4 * t + SCAN * t),
         ("build.filter", if filtered { filter } else { 0 }),
-        ("build.emit", cells_and_points + 4 * t + if filtered { 8 * shares } else { 0 } + 8 * n),
+        ("build.emit", cells_and_vertices + 4 * t + if filtered { 8 * shares } else { 0 } + 8 * n),
         ("build.sort", sort),
         ("build.count_splits", 4 * n + (4 + SCAN) * runs),
         ("build.splits", 4 * n + 4 * runs + 4 * nodes + 4 * internal + nodes / 8 + internal),

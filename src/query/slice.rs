@@ -189,6 +189,6 @@ fn cmd_values(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, p
         voxels: part.count(),
     };
     let (linear, field) = (u32::from(part.extrapolate == Extrapolate::Linear), u32::from(part.field.is_some()));
-    let spec = SliceValuesSpec { workgroup, on_cells: u32::from(on == On::Cells), linear, field, ..Default::default() };
-    r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Count(part.count().div_ceil(workgroup))))
+    let spec = SliceValuesSpec { workgroup, on_cells: u32::from(on == On::Cells), linear, field, run: RUN, ..Default::default() };
+    r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Count(part.count().div_ceil(RUN).div_ceil(workgroup))))
 }
