@@ -142,7 +142,7 @@ struct olbvh_SlicePlan {
     uint width;  // Voxels per row.
     uint height; // Rows of a layer.
     uint layers; // Layers.
-    uint pad;    // Unused.
+    uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.
@@ -165,10 +165,14 @@ struct olbvh_RunState {
     uint pad1;      // Unused.
 };
 
-// Counters of a slice.
+// What has become of a slice.
 struct olbvh_SliceStatus {
-    uint unfinished; // Items that need another dispatch.
-    uint pad;        // Unused.
+    uint locating; // Runs of voxels whose centres need another round.
+    uint touching; // Voxels whose boxes need another round; at least 1 as long as centres do.
+    uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
+    uint inside;   // Voxels with their centre in the mesh; counted once all are done, as the next two.
+    uint touched;  // Voxels that the mesh merely touches.
+    uint empty;    // Voxels that it does not.
 };
 
 // The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.
@@ -183,23 +187,26 @@ struct olbvh_NodeFrame {
     uint pad2;      // Unused.
 };
 
-// Counters of one direction of an overlap; 64 bits as two words, low first.
+// Counters of one direction of an overlap; 64 bits as two words, low first. Those that are zeroed between rounds lie 16 bytes behind the one that
+// dispatches are sized by, since a descriptor of a word covers as much.
 struct olbvh_OverlapStatus {
     uint waiting;    // Primitives that need a search.
-    uint unfinished; // Primitives that need another dispatch.
     uint by_vertex;  // Primitives with a vertex in the other mesh, or around one of its vertices.
     uint by_node;    // Primitives that touch a non-boundary node of the other tree.
     uint located;    // Vertices that had to be looked up in the list of a leaf.
-    uint pad;        // Unused.
+    uint unfinished; // Primitives that need another dispatch.
+    uint unfilled;   // Primitives whose pairs need another dispatch to be written; at least 1 as long as pairs are being counted.
     uint narrow[2];  // Tests of two tetrahedra by separating axes.
     uint pairs[2];   // Pairs that touch.
+    uint empty;      // Not 0: one of the meshes has no valid tetrahedron, so nothing intersects.
+    uint pad;        // Unused.
 };
 
 // Where the search of a primitive stands between two dispatches.
 struct olbvh_SearchState {
     uint code;  // Morton code of the leaf to go on with; all ones: done.
     uint entry; // Entries of that leaf already seen.
-    uint phase; // 0: non-boundary nodes; 1: lists.
+    uint phase; // 0: non-boundary nodes; 1: lists. Of pairs, 0: counted; 1: written.
     uint place; // Pairs found so far, or where the next one goes.
 };
 
