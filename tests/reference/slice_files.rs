@@ -17,29 +17,30 @@ fn dot(a: P, b: P) -> f64 {
     (0..3).map(|c| a[c] * b[c]).sum()
 }
 
-/// Voxels along the axis `step` (numbered from `origin`, `half` of a box reaching that far) that a tetrahedron may meet, `n` there are.
-fn reached(v: &[P; 4], origin: P, step: P, half: P, n: u32) -> std::ops::Range<u32> {
+/// Voxels along the axis `step` (numbered from `origin`, `half` of a box reaching that far) that a tetrahedron may meet, `n` there are; `slack`: the
+/// allowance of a touch.
+fn reached(v: &[P; 4], origin: P, step: P, half: P, n: u32, slack: f64) -> std::ops::Range<u32> {
     let length = dot(step, step);
     let places = v.map(|p| dot([0, 1, 2].map(|c| p[c] - origin[c]), step) / length);
-    // Far from 0, centres are rounded by more than voxels are wide.
-    let rounding = origin.iter().fold(0.0, |most: f64, x| most.max(x.abs())) * 1e-6 / length.sqrt();
-    let reach = dot(half, step).abs() / length + 0.01 + rounding;
+    // The allowance of a touch, and far from 0 the rounding of centres, may be more than a voxel is wide.
+    let rounding = origin.iter().fold(0.0, |most: f64, x| most.max(x.abs())) * 1e-6;
+    let reach = dot(half, step).abs() / length + 0.01 + (rounding + slack) / length.sqrt();
     let lo = places.into_iter().fold(f64::MAX, f64::min) - reach;
     let hi = places.into_iter().fold(f64::MIN, f64::max) + reach;
     lo.ceil().clamp(0.0, f64::from(n)) as u32..(hi.floor() + 1.0).clamp(0.0, f64::from(n)) as u32
 }
 
 /// The smallest gap between each voxel and the tetrahedra that come near to it.
-fn gaps(voxels: &VoxelGrid, tets: &[[P; 4]]) -> Vec<f64> {
+fn gaps(voxels: &VoxelGrid, tets: &[[P; 4]], slack: f64) -> Vec<f64> {
     let [w, h] = voxels.size;
     let half = voxels.half.map(wide);
     let origin = wide(voxels.origin);
     let extent = [0, 1, 2].map(|c| half.iter().map(|h| h[c].abs()).sum::<f64>());
-    // What the box of a cell leaves out is apart.
-    let meets = |lo: P, hi: P, centre: P| (0..3).all(|c| lo[c] - extent[c] <= centre[c] && centre[c] <= hi[c] + extent[c]);
+    // What the box of a cell leaves out, by more than the allowance of a touch, is apart.
+    let meets = |lo: P, hi: P, centre: P| (0..3).all(|c| lo[c] - extent[c] - slack <= centre[c] && centre[c] <= hi[c] + extent[c] + slack);
     let normal = |layers: u32| if layers > 1 { voxels.up } else { voxels.half[2] };
     let near = |v: &[P; 4]| {
-        let along = |step: [f32; 3], k: usize, n: u32| reached(v, origin, wide(step), half[k], n);
+        let along = |step: [f32; 3], k: usize, n: u32| reached(v, origin, wide(step), half[k], n, slack);
         let (xs, ys) = (along(voxels.across, 0, w), along(voxels.down, 1, h));
         let layers = along(normal(voxels.layers), 2, voxels.layers);
         let [lo, hi] = [f64::min, f64::max].map(|pick| [0, 1, 2].map(|c| v.iter().map(|p| p[c]).fold(v[0][c], pick)));
@@ -85,7 +86,7 @@ fn check(file: &Path, finer: u32, tally: &mut Tally) {
         let band = slice(&mesh, &topology, &tree, None, voxels, Extrapolate::Nearest);
         let extent = voxels.half.iter().map(|h| h.iter().map(|&x| f64::from(x).abs()).sum::<f64>()).fold(0.0, f64::max);
         let slack = 4e-6 * (size + extent);
-        for (i, gap) in gaps(&voxels, &tets).into_iter().enumerate() {
+        for (i, gap) in gaps(&voxels, &tets, slack).into_iter().enumerate() {
             let (kind, owner) = (band.kinds[i], band.owners[i]);
             let what = || format!("{}: voxel {i} of {voxels:?}: kind {kind}, owner {owner}, gap {gap:e}", file.display());
             if kind == EMPTY {
