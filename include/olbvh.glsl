@@ -557,7 +557,7 @@ olbvh_Stand olbvh_stand_in(uint t) {
 
 olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(s.v0, s.v1, s.v2, s.v3, x); }
 
-// The first of the smallest. (As a mask: where vectors are indexed by a variable, compilers put them into memory.)
+// As `outermost` in tet.glsl, as a mask: it says which corner a step replaces.
 bvec4 olbvh_outermost_of(vec4 w) {
     bvec4 least = equal(w, vec4(min(min(w.x, w.y), min(w.z, w.w))));
     return bvec4(least.x, least.y && !least.x, least.z && !(least.x || least.y), !(least.x || least.y || least.z));

@@ -25,7 +25,7 @@ NodeFrame frame_of(Grid g, Grid joint) {
     for (uint c = 0u; c < 3u; ++c) {
         precise float extent = g.hi[c] - g.lo[c];
         precise float scaled = canonical(extent) * joint.scale;
-        precise float part = scaled * uintBitsToFloat((39u + 127u) << 23);
+        precise float part = scaled * two_to(39);
         f.half_size[c] = part;
         f.flat_axis[c] = g.inv[c] == 0.0 ? 1.0 : 0.0;
     }
@@ -41,7 +41,7 @@ void main() {
     uint empty = uint(mesh_a.at[0].bad == tets_a || mesh_b.at[0].bad == tets_b);
     status_a.at[0].empty = empty;
     status_b.at[0].empty = empty;
-    float largest = uintBitsToFloat((127u - 103u) << 23);
+    float largest = two_to(-103);
     joint.lo = vec4(min(a.lo.xyz, b.lo.xyz), 0.0);
     joint.hi = vec4(max(a.hi.xyz, b.hi.xyz), 0.0);
     for (uint c = 0u; c < 3u; ++c) {

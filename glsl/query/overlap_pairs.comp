@@ -7,7 +7,8 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0), then written (FILL 1) behind the scanned counts; those past the capacity are not. Twin of src/reference/overlap.rs.
+// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0), then written (FILL 1) behind the scanned counts; those
+// past the capacity are not. Twin of src/reference/overlap.rs.
 layout(constant_id = 2) const uint EACH_ONCE = 1;
 layout(constant_id = 3) const uint BUDGET = 256;
 layout(constant_id = 4) const uint OWN_STRIDE = 3;

@@ -33,11 +33,11 @@ float rounded(float x) {
 float steps(float x, float scale) {
     uint bits = floatBitsToUint(x);
     if ((bits & 0x7f800000u) == 0u) {
-        precise float small = float(bits & 0x007fffffu) * (scale * uintBitsToFloat((127u - 67u) << 23));
+        precise float small = float(bits & 0x007fffffu) * (scale * two_to(-67));
         return (bits & 0x80000000u) != 0u ? -small : small;
     }
     precise float unit = x * scale;
-    precise float many = canonical(unit) * uintBitsToFloat((82u + 127u) << 23);
+    precise float many = canonical(unit) * two_to(82);
     return many;
 }
 
@@ -65,7 +65,7 @@ void main() {
                 large = true;
                 continue;
             }
-            precise float fine = rounded(steps(x, g.scale)) * uintBitsToFloat((127u - 42u) << 23);
+            precise float fine = rounded(steps(x, g.scale)) * two_to(-42);
             normalised[k][c] = fine;
             nothing = nothing && fine == 0.0;
         }
@@ -75,7 +75,7 @@ void main() {
     plan.reach = vec4(0.0);
     for (uint c = 0u; c < 3u; ++c) {
         precise float sum = (abs(normalised[0][c]) + abs(normalised[1][c])) + abs(normalised[2][c]);
-        large = large || sum > uintBitsToFloat((41u + 127u) << 23);
+        large = large || sum > two_to(41);
         precise float extent = g.hi[c] - g.lo[c];
         largest = max(largest, canonical(extent));
     }

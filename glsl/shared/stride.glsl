@@ -15,7 +15,7 @@ Stand stand_in(uint t) {
 
 Sides sides_of(Stand s, vec3 x) { return sides_of(s.v0, s.v1, s.v2, s.v3, x); }
 
-// The first of the smallest. (As a mask: where vectors are indexed by a variable, compilers put them into memory.)
+// As `outermost` in tet.glsl, as a mask: it says which corner a step replaces.
 bvec4 outermost_of(vec4 w) {
     bvec4 least = equal(w, vec4(min(min(w.x, w.y), min(w.z, w.w))));
     return bvec4(least.x, least.y && !least.x, least.z && !(least.x || least.y), !(least.x || least.y || least.z));

@@ -1,37 +1,29 @@
-//! What the reference builds, with everything in between that a device's stages leave behind.
+//! What a device should build, with everything in between that its stages leave behind.
 
 use super::failure::Verdict;
+use super::twin::{Built, Twin};
 use crate::layout::BuildStatus;
-use crate::mesh::Mesh;
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::reference::boundary::Topology;
 use crate::reference::codes::Stage;
-use crate::reference::depth::{Sizes, measure};
-use crate::reference::marks::Marks;
-use crate::reference::vertices::Vertices;
 use crate::tree::TreeArrays;
+use std::sync::Arc;
 
 /// A tree and its making.
 pub(crate) struct Expected {
-    /// What the depth is chosen from.
-    pub sizes: Sizes,
-    /// The level that the heuristic alone chooses.
-    pub heuristic: u32,
     /// Where the candidates of every tetrahedron begin, or shares of 32 where they are filtered, and behind them their number.
     pub offsets: Vec<u32>,
-    /// Sorted codes.
-    pub codes: Vec<u32>,
-    /// The tree.
-    pub tree: TreeArrays,
+    /// Whether the device stores boxes; the reference always does.
+    pub boxes: bool,
     /// What the device's status block should say.
     pub status: BuildStatus,
+    /// The reference's tree; none where not even the root fits.
+    built: Option<Arc<Built>>,
 }
 
 impl Expected {
-    /// Builds within `entries` candidates and down to `level` at most.
-    pub(crate) fn new(mesh: &Mesh, topology: &Topology, options: &BuildOptions, entries: u32, level: u32) -> Verdict<Self> {
-        let vertices = Vertices::new(mesh, &topology.grid);
-        let sizes = measure(mesh, topology, &vertices);
+    /// Within `entries` candidates and down to `level` at most.
+    pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, entries: u32, level: u32) -> Verdict<Self> {
+        let sizes = twin.sizes;
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
         let mut status = BuildStatus { heuristic_level: heuristic, ..BuildStatus::default() };
         let sum: u64 = (0..).zip(sizes.histogram).map(|(alpha, n): (u64, u64)| alpha * n).sum();
@@ -41,27 +33,21 @@ impl Expected {
         }
         // A capacity of the deepest level that is allowed is a capacity for no deeper one (more entries at each), except where levels tie.
         let fits = |k: u32| k <= level && sizes.entries[k as usize] <= u64::from(entries);
-        let chosen = (0..=heuristic).rev().find(|&k| fits(k));
-        let Some(chosen) = chosen else {
+        let Some(chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
             status.overflow = 1;
-            let tree = crate::reference::build::build(&Mesh::default(), &crate::reference::boundary::topology(&Mesh::default())?, options)?;
-            return Ok(Self { sizes, heuristic, offsets: Vec::new(), codes: Vec::new(), tree, status });
+            return Ok(Self { offsets: Vec::new(), boxes: options.boxes, status, built: None });
         };
-        let mut grid = topology.grid;
-        grid.level = chosen;
-        let tree = tree_at(mesh, topology, options, chosen, &sizes)?;
+        let built = twin.built(options.assign, options.lists, chosen)?;
+        let tree = built.tree();
 
-        let stage = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: Assign::Aabb, marks: None };
-        let mut offsets = vec![0];
         let share = if options.assign == Assign::Aabb && options.lists == Lists::All { 1 } else { 32 };
-        offsets.extend(stage.count().iter().scan(0u32, |sum, n: &u32| {
+        let (mesh, topology, vertices) = (&twin.mesh, &twin.topology, &twin.vertices);
+        let candidates = Stage { mesh, topology, vertices, grid: &tree.grid, assign: Assign::Aabb, marks: None };
+        let mut offsets = vec![0];
+        offsets.extend(candidates.count().iter().scan(0u32, |sum, n: &u32| {
             *sum += n.div_ceil(share);
             Some(*sum)
         }));
-        let stage = Stage { assign: options.assign, ..stage };
-        let marks = (options.lists == Lists::Boundary).then(|| Marks::new(&stage));
-        let stage = Stage { marks: marks.as_ref(), ..stage };
-        let codes = stage.emit(&stage.count())?.sorted(chosen).codes;
 
         status.level = chosen;
         status.candidates = sizes.entries[chosen as usize] as u32;
@@ -74,20 +60,16 @@ impl Expected {
         for (k, n) in status.levels.iter_mut().enumerate() {
             *n = tree.no.get(k).copied().unwrap_or(status.nodes);
         }
-        Ok(Self { sizes, heuristic, offsets, codes, tree, status })
+        Ok(Self { offsets, boxes: options.boxes, status, built: Some(built) })
     }
-}
 
-/// The reference's tree with leaves at a level at or above the heuristic's: by a capacity that only admits it, or where levels tie in entries, by α.
-fn tree_at(mesh: &Mesh, topology: &Topology, options: &BuildOptions, level: u32, sizes: &Sizes) -> Verdict<TreeArrays> {
-    let capacity = u32::try_from(sizes.entries[level as usize]).ok();
-    let tree = crate::reference::build::build(mesh, topology, &BuildOptions { capacity, ..*options })?;
-    if tree.grid.level == level {
-        return Ok(tree);
+    /// The reference's tree, with boxes; none where not even the root fits.
+    pub(crate) fn tree(&self) -> Option<&TreeArrays> {
+        Some(self.built.as_ref()?.tree())
     }
-    // α is a difference of levels: what the heuristic lacks to `level`.
-    let alpha = (0..=160)
-        .map(|i| i as f32 / 16.0)
-        .find(|&a| BuildOptions { alpha: a, ..*options }.alpha_fixed().is_ok_and(|a| sizes.heuristic(a) == level));
-    Ok(crate::reference::build::build(mesh, topology, &BuildOptions { alpha: alpha.unwrap_or(options.alpha), ..*options })?)
+
+    /// The sorted codes of its entries.
+    pub(crate) fn codes(&self) -> &[u32] {
+        self.built.as_ref().map_or(&[], |built| &built.made.codes)
+    }
 }

@@ -1,7 +1,10 @@
 //! Runs cases on a device.
 
-use super::failure::Stop;
+use super::failure::{Stop, Verdict};
+use super::meshes::MeshRecipe;
+use super::twin::Twin;
 use super::{Case, Failure, TargetKind, Work, build, locate, overlap, picture, primitives, slice, topology};
+use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions};
 use std::time::{Duration, Instant};
@@ -33,6 +36,7 @@ pub struct Report {
 pub struct Lab {
     device: Gpu,
     messages: usize,
+    subject: Option<(Twin, DeviceMesh)>,
 }
 
 impl Lab {
@@ -43,7 +47,7 @@ impl Lab {
     /// As [`Gpu::new`].
     pub fn new(options: &GpuOptions) -> Result<Self> {
         let device = Gpu::new(&GpuOptions { trust: true, ..options.clone() })?;
-        Ok(Self { device, messages: 0 })
+        Ok(Self { device, messages: 0, subject: None })
     }
 
     /// The device as it chose its shapes itself.
@@ -83,18 +87,35 @@ impl Lab {
         Report { name: case.name.clone(), outcome, time: begin.elapsed() }
     }
 
-    fn work(&self, work: &Work) -> std::result::Result<(), Stop> {
+    fn work(&mut self, work: &Work) -> Verdict {
         match work {
             Work::SelfTest => Ok(crate::primitives::self_test(&self.device)?),
             Work::Reduce(case) => primitives::reduce(&self.gpu(case.target)?, *case),
             Work::Scan(case) => primitives::scan(&self.gpu(case.target)?, *case),
             Work::Sort(case) => primitives::sort(&self.gpu(case.target)?, *case),
-            Work::Topology(recipe) => topology::check(&self.device, recipe),
-            Work::Build(case) => build::check(&self.gpu(case.target)?, case),
-            Work::Locate(case) => locate::check(&self.device, case),
-            Work::Picture(case) => picture::check(&self.device, case),
-            Work::Slice(case) => slice::check(&self.device, case),
-            Work::Overlap(case) => overlap::check(&self.device, case),
+            Work::Topology(recipe) => self.over(recipe, |_, twin, device| topology::check(twin, device)),
+            Work::Build(case) if case.target != TargetKind::Device => {
+                let gpu = self.gpu(case.target)?;
+                self.over(&case.mesh, |_, twin, _| build::check(&gpu, case, twin, &DeviceMesh::upload(&gpu, &twin.mesh, BadCells::Skip)?))
+            }
+            Work::Build(case) => self.over(&case.mesh, |gpu, twin, device| build::check(gpu, case, twin, device)),
+            Work::Locate(case) => self.over(&case.mesh, |gpu, twin, device| locate::check(gpu, case, twin, device)),
+            Work::Picture(case) => self.over(&case.mesh, |gpu, twin, device| picture::check(gpu, case, twin, device)),
+            Work::Slice(case) => self.over(&case.mesh, |gpu, twin, device| slice::check(gpu, case, twin, device)),
+            Work::Overlap(case) => self.over(&case.mesh, |gpu, twin, device| overlap::check(gpu, case, twin, device)),
         }
+    }
+
+    /// Checks something over a mesh. The mesh stays, on host and device, until a case of another one comes.
+    fn over(&mut self, recipe: &MeshRecipe, check: impl FnOnce(&Gpu, &mut Twin, &DeviceMesh) -> Verdict) -> Verdict {
+        let subject = if let Some(kept) = self.subject.take().filter(|(twin, _)| twin.name == recipe.name) {
+            kept
+        } else {
+            let twin = Twin::new(recipe)?;
+            let device = DeviceMesh::upload(&self.device, &twin.mesh, BadCells::Skip)?;
+            (twin, device)
+        };
+        let (twin, device) = self.subject.insert(subject);
+        check(&self.device, twin, device)
     }
 }

@@ -4,13 +4,13 @@ use super::buffers::Guarded;
 use super::data::Random;
 use super::failure::{Verdict, compare, fail};
 use super::meshes::MeshRecipe;
-use crate::build::{BadCells, DeviceMesh, Tree};
+use super::twin::Twin;
+use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
-use crate::reference::boundary::{NONE, topology};
-use crate::reference::build::build;
+use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator};
 
 /// Meshes with cells turned over, 93 of 10,296 here: they overlap their neighbours' neighbours.
@@ -63,7 +63,7 @@ pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
     let used = |ids: &[u32; 4]| ids.map(|v| mesh.points.get(v as usize).copied());
     let cells: Vec<[[f32; 3]; 4]> = mesh.tets.iter().map(|t| used(t).map(|p| p.unwrap_or([f32::NAN; 3]))).collect();
     let finite: Vec<_> = cells.into_iter().filter(|c| c.iter().flatten().all(|x| x.abs() < 1e37)).collect();
-    for _ in 0..if finite.is_empty() { 0 } else { 600 } {
+    for _ in 0..if finite.is_empty() { 0 } else { 300 } {
         let v = finite[random.below(finite.len() as u32) as usize];
         let [a, b, c] = [random.unit(), random.unit(), random.unit()];
         let mix = |weights: [f32; 4]| {
@@ -86,7 +86,7 @@ pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
     let (lo, hi) = points
         .iter()
         .fold(([0.0f32; 3], [1.0f32; 3]), |(lo, hi), p| ([0, 1, 2].map(|i| lo[i].min(p[i])), [0, 1, 2].map(|i| hi[i].max(p[i]))));
-    points.extend((0..1000).map(|_| [0, 1, 2].map(|i| lo[i] + (random.unit() * 1.3 - 0.15) * (hi[i] - lo[i]))));
+    points.extend((0..500).map(|_| [0, 1, 2].map(|i| lo[i] + (random.unit() * 1.3 - 0.15) * (hi[i] - lo[i]))));
     points.extend([lo, hi, [lo[0], hi[1], lo[2]], [hi[0].next_up(), hi[1], hi[2]], lo.map(f32::next_down), hi.map(f32::next_up)]);
     points.extend([f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX, f32::MIN, -0.0, 1e-40, 1e30].map(|x| [x; 3]));
     for axis in 0..3 {
@@ -99,27 +99,23 @@ pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
     (points, inside)
 }
 
-pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
-    let mesh = case.mesh.mesh()?;
-    let topology = topology(&mesh)?;
+pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
-    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
-    let tree = Tree::build(gpu, &device, &options)?;
-    let host = build(&mesh, &topology, &options)?;
-    let locator = Locator::new(&mesh, &topology, &host);
-    let (points, inside) = points(&mesh);
-    let expected = locator.locate_all(&points);
+    let tree = Tree::build(gpu, device, &options)?;
+    let built = twin.tree(&options)?;
+    let (twin, (points, inside)) = (&*twin, twin.points());
+    let (mesh, locator) = (&twin.mesh, twin.locator(&built));
     let quiet: &dyn Fn(u64, u64) = &|_, _| {};
     match case.how {
         How::Descent | How::Traversal(_) => {
             let path = if let How::Traversal(stack) = case.how { Path::Traversal(stack) } else { Path::Descent };
-            let found = locate(&device, &tree, &points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
-            compare_locations(&expected, &found.owners, &found.barycentrics, &points)
+            let found = locate(device, &tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
+            compare_locations(twin.locations(&built), &found.owners, &found.barycentrics, points)
         }
-        How::Hints => hints(gpu, &mesh, &device, &tree, &locator, &points),
+        How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
             let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
-            compare("query.locate_all", "owners", &lists, &locate_all(&device, &tree, &points, &LocateOptions::default(), quiet)?)
+            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, &LocateOptions::default(), quiet)?)
         }
         How::Values => {
             // Whole numbers below 2^12: products and sums differ by the rounding of the barycentrics' division at most.
@@ -129,9 +125,9 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
                     on,
                     values: (0..n).map(|i| (super::data::mix(i as u32) % 4096) as f32).collect(),
                 };
-                let found = locate(&device, &tree, &points, Some((&field.values, on)), &LocateOptions::default(), quiet)?;
+                let found = locate(device, &tree, points, Some((&field.values, on)), &LocateOptions::default(), quiet)?;
                 let near = |a: f32, b: f32| (a.is_nan() && b.is_nan()) || (a - b).abs() <= 4096.0 * 1e-6;
-                let values: Vec<f32> = expected.iter().map(|e| locator.value(&field, e)).collect();
+                let values: Vec<f32> = twin.locations(&built).iter().map(|e| locator.value(&field, e)).collect();
                 if let Some(i) = (0..points.len()).find(|&i| !found.values.get(i).is_some_and(|v| near(*v, values[i]))) {
                     return Err(fail(
                         "query.interpolate",
@@ -145,16 +141,16 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase) -> Verdict {
             Ok(())
         }
         How::Same => {
-            let first = locate(&device, &tree, &points, None, &LocateOptions::default(), quiet)?;
+            let first = locate(device, &tree, points, None, &LocateOptions::default(), quiet)?;
             if let Some(i) = first.owners[..inside].iter().position(|&o| o == NONE) {
                 return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
             }
             // Where cells overlap, only lists name the lowest of those that contain a point (SPEC 3.1).
             let kinds = if OVERLAPPING.contains(&case.mesh.name) { vec![Lists::All] } else { Lists::EVERY.to_vec() };
-            for alpha in [0.0, 1.0, 2.0, 4.0] {
-                for (assign, &lists) in Assign::ALL.into_iter().flat_map(|assign| kinds.iter().map(move |lists| (assign, lists))) {
-                    let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, lists, ..options })?;
-                    let found = locate(&device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
+            for (alpha, assign) in [(0.0, Assign::Planes), (1.0, Assign::Exact), (2.0, Assign::Planes), (4.0, Assign::Aabb)] {
+                for &lists in &kinds {
+                    let tree = Tree::build(gpu, device, &BuildOptions { alpha, assign, lists, ..options })?;
+                    let found = locate(device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
                     compare(
                         &format!("query.locate (alpha {alpha}, {assign}, lists {lists})"),
                         "owners",

@@ -69,7 +69,7 @@ const RECIPES: &[Entry] = &[
     ("kuhn-16x16x16", Group::Quick, || kuhn([16; 3])),
     ("kuhn-17x1x1", Group::Full, || kuhn([17, 1, 1])),
     ("jitter-12x13x11", Group::Quick, || kuhn_jittered([12, 13, 11], 0.4, 3)),
-    ("jitter-30x30x30", Group::Full, || kuhn_jittered([30; 3], 0.45, 9)),
+    ("jitter-24x24x24", Group::Full, || kuhn_jittered([24; 3], 0.45, 9)),
     ("tangled", Group::Quick, || kuhn_jittered([8, 7, 6], 1.7, 4)),
     ("scaled-1e30", Group::Quick, || scaled(1e30)),
     ("scaled-1e-30", Group::Quick, || scaled(1e-30)),

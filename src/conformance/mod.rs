@@ -14,7 +14,7 @@
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
 //! render/one-tet/iso/points/shaded         mesh, camera, field [, light]
 //! slice/plate/aabb/alpha-2/oblique         mesh, assignment, α, stack of layers
-//! overlap/cloud/exact/alpha-1/grid         mesh, assignment, α, the other mesh
+//! overlap/cloud/exact/alpha-1/grid         mesh, assignment [, lists], α, the other mesh
 //! ```
 
 mod buffers;
@@ -33,6 +33,7 @@ mod primitives;
 mod query_cases;
 mod slice;
 mod topology;
+mod twin;
 
 pub use failure::Failure;
 pub use lab::{Lab, Outcome, Report};
@@ -109,11 +110,20 @@ impl Case {
         }
     }
 
-    /// What belongs together: the first two parts of the name, or the first where the second is a length.
+    /// What belongs together: the cases of a mesh, or those of a primitive (`sort/21-bits`; the second part of a scan's name is a length).
     pub fn family(&self) -> &str {
-        let parts = usize::from(!matches!(self.work, Work::Scan(_)));
-        let end = self.name.match_indices('/').nth(parts).map_or(self.name.len(), |(at, _)| at);
-        &self.name[..end]
+        let mut parts = self.name.match_indices('/').map(|(at, _)| at);
+        let (first, second) = (parts.next().unwrap_or(self.name.len()), parts.next().unwrap_or(self.name.len()));
+        match self.work {
+            _ if self.is_over_a_mesh() => &self.name[first + 1..second],
+            Work::Scan(_) => &self.name[..first],
+            _ => &self.name[..second],
+        }
+    }
+
+    /// Whether it is about a mesh, not a primitive of the device.
+    pub fn is_over_a_mesh(&self) -> bool {
+        !matches!(self.work, Work::SelfTest | Work::Reduce(_) | Work::Scan(_) | Work::Sort(_))
     }
 }
 
@@ -160,5 +170,7 @@ mod tests {
         assert_eq!(count(Some("no such case")), 0);
         let case = cases.iter().find(|c| c.name.starts_with("sort/21-bits/")).unwrap();
         assert_eq!(case.family(), "sort/21-bits");
+        let case = cases.iter().find(|c| c.name.starts_with("build/slivers/")).unwrap();
+        assert_eq!(case.family(), "slivers");
     }
 }

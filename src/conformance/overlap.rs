@@ -2,6 +2,7 @@
 
 use super::failure::{Stop, Verdict, compare, compare_one};
 use super::meshes::MeshRecipe;
+use super::twin::Twin;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -18,6 +19,7 @@ pub(crate) struct OverlapCase {
     pub mesh: MeshRecipe,
     pub alpha: f32,
     pub assign: Assign,
+    pub lists: Lists,
     pub other: Other,
 }
 
@@ -61,8 +63,8 @@ impl Both {
         Ok(Self { topology, host: tree.download()?, mesh, device, tree })
     }
 
-    fn side(&self) -> Side<'_> {
-        Side { mesh: &self.mesh, topology: &self.topology, tree: &self.host }
+    fn sides(&self) -> Sides<'_> {
+        (Side { mesh: &self.mesh, topology: &self.topology, tree: &self.host }, self.party())
     }
 
     /// The mesh and the tree of the device.
@@ -71,25 +73,26 @@ impl Both {
     }
 }
 
-pub(crate) fn check(gpu: &Gpu, case: &OverlapCase) -> Verdict {
-    Lists::EVERY.into_iter().try_for_each(|lists| check_lists(gpu, case, lists))
-}
+/// What is compared: a mesh as the reference has it, and as the device does.
+type Sides<'a> = (Side<'a>, Party<'a>);
 
-fn check_lists(gpu: &Gpu, case: &OverlapCase, lists: Lists) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists, ..BuildOptions::default() };
-    let own = Both::new(gpu, case.mesh.mesh()?, &options)?;
+pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let tree = Tree::build(gpu, device, &options)?;
+    let built = twin.tree(&options)?;
+    let own = (Side { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, Party { mesh: device, tree: &tree });
     let other = match case.other {
         Other::Grid => kuhn_jittered([6, 5, 4], 0.3, 9)?,
         Other::Itself => {
-            let grid = own.host.grid;
-            let mut mesh = own.mesh.clone();
+            let grid = twin.topology.grid;
+            let mut mesh = twin.mesh.clone();
             mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + [0.37, 0.11, -0.23][c] * (grid.hi[c] - grid.lo[c])));
             mesh
         }
     };
     let other = Both::new(gpu, other, &options)?;
-    compare_overlaps(&own, &other)?;
-    compare_overlaps(&other, &own)?;
+    compare_overlaps(own, other.sides())?;
+    compare_overlaps(other.sides(), own)?;
     Ok(())
 }
 
@@ -98,19 +101,19 @@ fn check_lists(gpu: &Gpu, case: &OverlapCase, lists: Lists) -> Verdict {
 /// # Errors
 /// What differs, or why there is no answer.
 pub fn check_overlap(a: &Both, b: &Both) -> std::result::Result<usize, String> {
-    compare_overlaps(a, b).map_err(|stop| match stop {
+    compare_overlaps(a.sides(), b.sides()).map_err(|stop| match stop {
         Stop::Failed(failure) => failure.to_string(),
         Stop::Skipped(why) => why,
     })
 }
 
-fn compare_overlaps(a: &Both, b: &Both) -> Verdict<usize> {
+fn compare_overlaps(a: Sides<'_>, b: Sides<'_>) -> Verdict<usize> {
     let mut hits = 0;
     // Pairs are found by lists.
-    let kinds: &[bool] = if a.host.lists == Lists::All { &[false, true] } else { &[false] };
+    let kinds: &[bool] = if a.0.tree.lists == Lists::All { &[false, true] } else { &[false] };
     for &pairs in kinds {
-        let expected = reference(a.side(), b.side(), pairs);
-        let found = overlap(a.party(), b.party(), pairs, &|_, _| {})?.overlap;
+        let expected = reference(a.0, b.0, pairs);
+        let found = overlap(a.1, b.1, pairs, &|_, _| {})?.overlap;
         hits = expected.a.len();
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
         compare(stage, "a", &expected.a, &found.a)?;

@@ -2,13 +2,12 @@
 
 use super::failure::{Verdict, compare_one, fail};
 use super::meshes::MeshRecipe;
-use crate::build::{BadCells, DeviceMesh, Tree};
+use super::twin::Twin;
+use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::render;
-use crate::reference::boundary::topology;
-use crate::reference::build::build;
 use crate::reference::volume::{Scene, render as draw};
 use crate::render::RenderSettings;
 
@@ -31,29 +30,20 @@ fn field(mesh: &Mesh, on: On) -> Field {
     Field { name: "wave".into(), on, values }
 }
 
-pub(crate) fn check(gpu: &Gpu, case: &PictureCase) -> Verdict {
-    let mesh = case.mesh.mesh()?;
-    let topology = topology(&mesh)?;
-    let field = field(&mesh, case.on);
-    let settings = RenderSettings { size: [50, 42], camera: case.camera.parse()?, shading: case.shading, ..RenderSettings::default() };
-    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
+pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
+    let field = field(&twin.mesh, case.on);
+    let settings = RenderSettings { size: [40, 34], camera: case.camera.parse()?, shading: case.shading, ..RenderSettings::default() };
     let mut first: Option<Vec<u8>> = None;
     let (all, boundary) = (Lists::All, Lists::Boundary);
-    for (alpha, assign, lists) in [
-        (0.0, Assign::Aabb, all),
-        (0.0, Assign::Planes, boundary),
-        (1.0, Assign::Planes, all),
-        (2.0, Assign::Exact, all),
-        (4.0, Assign::Aabb, boundary),
-    ] {
+    for (alpha, assign, lists) in [(0.0, Assign::Aabb, all), (0.0, Assign::Planes, boundary), (2.0, Assign::Exact, all)] {
         let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
-        let host = build(&mesh, &topology, &options)?;
-        let scene = Scene::new(&mesh, &topology, &host, &field, &settings)?;
+        let built = twin.tree(&options)?;
+        let scene = Scene::new(&twin.mesh, &twin.topology, built.tree(), &field, &settings)?;
         let plan = scene.plan();
-        let tree = Tree::build(gpu, &device, &options)?;
+        let tree = Tree::build(gpu, device, &options)?;
         let normals = &scene.prepared.normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
-        let drawn = render(&device, &tree, plan, (&field.values, field.on), normals, &|_, _| {})?;
+        let drawn = render(device, &tree, plan, (&field.values, field.on), normals, &|_, _| {})?;
         let [width, height] = plan.size;
         let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
         let pixels: Vec<u8> =

@@ -15,16 +15,15 @@ const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "re
 /// Meshes so small that voxels have denormal centres, which devices may flush to 0.
 const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
 /// A mesh whose overlap keeps the reference busy for minutes.
-const LARGE: &str = "jitter-30x30x30";
+const LARGE: &str = "jitter-24x24x24";
 /// Meshes that are drawn.
 const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
 
 pub(super) fn add(cases: &mut Vec<Case>) {
     for mesh in recipes() {
-        for assign in Assign::ALL {
-            for (alpha, lists) in [0.0, 1.0, 3.0].into_iter().flat_map(|alpha| Lists::EVERY.map(|lists| (alpha, lists))) {
-                let quick = assign == Assign::Exact && alpha == 0.0;
-                add_location(cases, quick, LocateCase { mesh, alpha, assign, lists, how: How::Descent });
+        for (alpha, assign) in [(0.0, Assign::Exact), (1.0, Assign::Planes), (3.0, Assign::Aabb)] {
+            for lists in Lists::EVERY {
+                add_location(cases, alpha == 0.0, LocateCase { mesh, alpha, assign, lists, how: How::Descent });
             }
         }
         for how in [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Hints, How::All, How::Values] {
@@ -60,7 +59,9 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
         Work::Picture(PictureCase { mesh, camera: "iso", on: On::Points, shading: true }),
     );
     add_slices(cases, mesh);
-    add_overlap(cases, OverlapCase { mesh, alpha: 0.0, assign: Assign::Aabb, other: Other::Itself });
+    for lists in Lists::EVERY {
+        add_overlap(cases, Group::Quick, OverlapCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, other: Other::Itself });
+    }
 }
 
 fn add_location(cases: &mut Vec<Case>, quick: bool, case: LocateCase) {
@@ -90,8 +91,10 @@ fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
     for (i, stack) in STACKS.into_iter().enumerate() {
         for (k, (alpha, assign)) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact)].into_iter().enumerate() {
-            for lists in Lists::EVERY {
-                let group = if (i + k) % 3 == 0 { mesh.group } else { Group::Full };
+            // Quick: both kinds of lists; otherwise one of them each.
+            let quick = (i + k) % 3 == 0;
+            for lists in Lists::EVERY.into_iter().skip(if quick { 0 } else { k % 2 }).take(if quick { 2 } else { 1 }) {
+                let group = if quick { mesh.group } else { Group::Full };
                 let name = format!("slice/{}/{assign}{}/alpha-{alpha}/{}", mesh.name, lists.suffix(), stack.name);
                 push(cases, name, group, Work::Slice(SliceCase { mesh, alpha, assign, lists, stack }));
             }
@@ -100,15 +103,19 @@ fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 }
 
 fn add_overlaps(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (2.0, Assign::Planes)] {
-        for other in [Other::Grid, Other::Itself] {
-            add_overlap(cases, OverlapCase { mesh, alpha, assign, other });
-        }
+    for (alpha, assign, lists, other) in [
+        (0.0, Assign::Aabb, Lists::All, Other::Itself),
+        (1.0, Assign::Exact, Lists::Boundary, Other::Grid),
+        (0.0, Assign::Planes, Lists::Boundary, Other::Itself),
+        (2.0, Assign::Planes, Lists::All, Other::Grid),
+    ] {
+        let group = if assign == Assign::Planes { Group::Full } else { mesh.group };
+        add_overlap(cases, group, OverlapCase { mesh, alpha, assign, lists, other });
     }
 }
 
-fn add_overlap(cases: &mut Vec<Case>, case: OverlapCase) {
-    let OverlapCase { mesh, alpha, assign, other } = case;
-    let group = if (alpha == 1.0) == (other == Other::Grid) { mesh.group } else { Group::Full };
-    push(cases, format!("overlap/{}/{assign}/alpha-{alpha}/{}", mesh.name, other.name()), group, Work::Overlap(case));
+fn add_overlap(cases: &mut Vec<Case>, group: Group, case: OverlapCase) {
+    let OverlapCase { mesh, alpha, assign, lists, other } = case;
+    let name = format!("overlap/{}/{assign}{}/alpha-{alpha}/{}", mesh.name, lists.suffix(), other.name());
+    push(cases, name, group, Work::Overlap(case));
 }

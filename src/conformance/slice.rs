@@ -2,12 +2,12 @@
 
 use super::failure::{Stop, Verdict, compare_one, fail};
 use super::meshes::MeshRecipe;
-use crate::build::{BadCells, DeviceMesh, Tree};
+use super::twin::Twin;
+use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::slice;
-use crate::reference::boundary::topology;
 use crate::reference::slice::Slicer;
 use crate::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
@@ -56,21 +56,19 @@ fn field(mesh: &Mesh, on: On) -> Field {
     Field { name: "ramp".into(), on, values }
 }
 
-pub(crate) fn check(gpu: &Gpu, case: &SliceCase) -> Verdict {
-    let mesh = case.mesh.mesh()?;
-    let topology = topology(&mesh)?;
+pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let Stack { plane, layers, size, extrapolate, .. } = case.stack;
-    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
-    let tree =
-        Tree::build(gpu, &device, &BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() })?;
-    let host = tree.download()?;
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let tree = Tree::build(gpu, device, &options)?;
+    let built = twin.tree(&options)?;
+    let (mesh, host) = (&twin.mesh, built.tree());
     let corner = |v: [f32; 4]| [v[0], v[1], v[2]];
     let settings = SliceSettings { plane, layers, size, ..SliceSettings::default() };
     // A mesh without extent, or as large as numbers go, has no slices.
     let voxels = settings.voxels(corner(host.grid.lo), corner(host.grid.hi), mesh.origin);
     let Some(voxels) = voxels.ok().filter(|v| v.plan(&host.grid).is_ok()) else { return Ok(()) };
-    let field = case.stack.field.map(|on| field(&mesh, on));
-    let slicer = Slicer::new(&mesh, &topology, &host, field.as_ref(), voxels, extrapolate)?;
+    let field = case.stack.field.map(|on| field(mesh, on));
+    let slicer = Slicer::new(mesh, &twin.topology, host, field.as_ref(), voxels, extrapolate)?;
     let mut verdict = Ok(());
     let mut hold = |found: Band| {
         if verdict.is_ok() {
@@ -79,7 +77,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase) -> Verdict {
         Ok(())
     };
     let values = field.as_ref().map(|f| (&f.values[..], f.on));
-    let sliced = slice(&device, &tree, values, &voxels, extrapolate, &|_, _| {}, &mut hold)?;
+    let sliced = slice(device, &tree, values, &voxels, extrapolate, &|_, _| {}, &mut hold)?;
     verdict?;
     let tally = sliced.tally;
     compare_one("query.slice", "voxels", &voxels.voxels(), &(tally.inside + tally.touched + tally.empty))

@@ -1,22 +1,12 @@
 //! Stage 0 against the reference: bad cells, bounds, normalised vertices, neighbours, boundary.
 
 use super::failure::{Verdict, compare, compare_one};
-use super::meshes::MeshRecipe;
-use crate::build::{BadCells, DeviceMesh};
-use crate::gpu::Gpu;
-use crate::mesh::Mesh;
-use crate::reference::boundary::{Topology, topology};
-use crate::reference::vertices::Vertices;
-
-pub(crate) fn check(gpu: &Gpu, recipe: &MeshRecipe) -> Verdict {
-    let mesh = recipe.mesh()?;
-    let expected = topology(&mesh)?;
-    let found = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
-    compare_mesh(&mesh, &expected, &found)
-}
+use super::twin::Twin;
+use crate::build::DeviceMesh;
 
 /// Holds a prepared mesh against its topology.
-pub(crate) fn compare_mesh(mesh: &Mesh, expected: &Topology, found: &DeviceMesh) -> Verdict {
+pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
+    let (mesh, expected, vertices) = (&twin.mesh, &twin.topology, &twin.vertices);
     let (counts, status) = (expected.counts, found.status());
     let bad: Vec<u32> = expected.bad.iter().map(|b| b.0).collect();
     compare("build.check_cells", "bad cells", &bad, &found.bad_cells()?)?;
@@ -24,7 +14,6 @@ pub(crate) fn compare_mesh(mesh: &Mesh, expected: &Topology, found: &DeviceMesh)
     let words = |grid| bytemuck::cast_slice::<_, u32>(std::slice::from_ref(grid)).to_vec();
     compare("build.make_grid", "grid", &words(&expected.grid), &words(found.grid()))?;
     // Points that are not finite have no place; no valid cell uses them.
-    let vertices = Vertices::new(mesh, &expected.grid);
     let finite: Vec<bool> = mesh.points.iter().map(|p| p.iter().all(|x| x.is_finite())).collect();
     let pack_cell = |q: [u32; 3]| q[0] | q[1] << 10 | q[2] << 20;
     let pack = |(v, q): (&[f32; 3], &[u16; 3])| [v[0].to_bits(), v[1].to_bits(), v[2].to_bits(), pack_cell(q.map(u32::from))];

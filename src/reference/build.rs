@@ -2,6 +2,7 @@
 
 use super::boundary::Topology;
 use super::codes::Stage;
+use super::grid::Grid;
 use super::marks::Marks;
 use super::vertices::Vertices;
 use super::{depth, leaves, levels};
@@ -9,6 +10,15 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;
+
+/// A tree, and what no array of it tells of its making.
+#[derive(Clone, Debug)]
+pub struct Construction {
+    /// Morton codes of the entries, sorted; [`TreeArrays::p`] holds their primitives.
+    pub codes: Vec<u32>,
+    /// The tree.
+    pub tree: TreeArrays,
+}
 
 /// Builds the tree over the valid cells of `mesh`, whose topology is `topology` (see [`super::boundary::topology`], which is stage 0: bounds and
 /// boundary marking).
@@ -24,25 +34,34 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     let vertices = Vertices::new(mesh, &topology.grid);
 
     // Stage 1: determine the depth of the tree.
-    let sizes = depth::measure(mesh, topology, &vertices);
-    let mut grid = topology.grid;
-    grid.level = sizes.level(options)?;
+    let level = depth::measure(mesh, topology, &vertices).level(options)?;
+
+    Ok(construct(mesh, topology, &vertices, level, options)?.tree)
+}
+
+/// Stages 2 to 4: the tree whose leaves are cells of `level`, whatever α and limits `options` has.
+///
+/// # Errors
+/// [`Error::TooLarge`] if 32 bits cannot count the entries.
+pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u32, options: &BuildOptions) -> Result<Construction> {
+    let grid = Grid { level, ..topology.grid };
 
     // Stage 2: calculate and sort the Morton codes of the primitives.
-    let all = Stage { mesh, topology, vertices: &vertices, grid: &grid, assign: options.assign, marks: None };
+    let all = Stage { mesh, topology, vertices, grid: &grid, assign: options.assign, marks: None };
     let marks = (options.lists == Lists::Boundary).then(|| Marks::new(&all));
     let stage = Stage { marks: marks.as_ref(), ..all };
     let counts = stage.count();
-    let entries = stage.emit(&counts)?.sorted(grid.level);
+    let entries = stage.emit(&counts)?.sorted(level);
 
     // Stage 3: record at which levels the codes split.
-    let splits = super::splits::splits(&entries.codes, grid.level);
+    let splits = super::splits::splits(&entries.codes, level);
 
     // Stage 4: construct the nodes bottom-up.
-    let flags = leaves::flags(&entries.primitives, &splits, mesh, topology, &vertices, &grid);
+    let flags = leaves::flags(&entries.primitives, &splits, mesh, topology, vertices, &grid);
     let boundary = levels::flags(flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let mask = levels::masks(&splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    Ok(TreeArrays { assign: options.assign, lists: options.lists, grid, p, po, co, no, boundary, mask, boxes })
+    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, po, co, no, boundary, mask, boxes };
+    Ok(Construction { codes: entries.codes, tree })
 }

@@ -1,0 +1,97 @@
+//! The reference's trees and answers over one mesh, kept while cases ask for them: most cases differ in how the device works, not in what it
+//! should find.
+
+use super::failure::Verdict;
+use super::locate::points;
+use super::meshes::MeshRecipe;
+use crate::mesh::Mesh;
+use crate::options::{Assign, BuildOptions, Lists};
+use crate::reference::boundary::{Topology, topology};
+use crate::reference::build::{Construction, construct};
+use crate::reference::depth::{Sizes, measure};
+use crate::reference::locate::{Location, Locator};
+use crate::reference::vertices::Vertices;
+use crate::tree::TreeArrays;
+use std::collections::HashMap;
+use std::sync::{Arc, OnceLock};
+
+/// What a tree is but for the mesh.
+type Kind = (Assign, Lists, u32);
+
+/// A mesh and what the reference has found out about it.
+#[derive(Debug)]
+pub(crate) struct Twin {
+    /// Name of the mesh.
+    pub name: &'static str,
+    /// The mesh.
+    pub mesh: Mesh,
+    /// Its topology.
+    pub topology: Topology,
+    /// What the depth is chosen from.
+    pub sizes: Sizes,
+    /// Its vertices in the grid.
+    pub vertices: Vertices,
+    trees: HashMap<Kind, Arc<Built>>,
+    points: OnceLock<(Vec<[f32; 3]>, usize)>,
+}
+
+/// A tree of the reference.
+#[derive(Debug)]
+pub(crate) struct Built {
+    /// The tree, boxes included, and its sorted codes.
+    pub made: Construction,
+    locations: OnceLock<Vec<Location>>,
+}
+
+impl Built {
+    /// The tree's arrays.
+    pub fn tree(&self) -> &TreeArrays {
+        &self.made.tree
+    }
+}
+
+impl Twin {
+    pub(crate) fn new(recipe: &MeshRecipe) -> Verdict<Self> {
+        let mesh = recipe.mesh()?;
+        let topology = topology(&mesh)?;
+        let vertices = Vertices::new(&mesh, &topology.grid);
+        let sizes = measure(&mesh, &topology, &vertices);
+        Ok(Self { name: recipe.name, mesh, topology, sizes, vertices, trees: HashMap::new(), points: OnceLock::new() })
+    }
+
+    /// The tree with leaves at `level`; one that breaks a rule fails.
+    pub(crate) fn built(&mut self, assign: Assign, lists: Lists, level: u32) -> Verdict<Arc<Built>> {
+        let kind = (assign, lists, level);
+        if let Some(built) = self.trees.get(&kind) {
+            return Ok(built.clone());
+        }
+        let options = BuildOptions { assign, lists, boxes: true, ..BuildOptions::default() };
+        let made = construct(&self.mesh, &self.topology, &self.vertices, level, &options)?;
+        made.tree.validate(&self.mesh, &self.topology)?;
+        let built = Arc::new(Built { made, locations: OnceLock::new() });
+        self.trees.insert(kind, built.clone());
+        Ok(built)
+    }
+
+    /// The tree that options without limits give.
+    pub(crate) fn tree(&mut self, options: &BuildOptions) -> Verdict<Arc<Built>> {
+        let level = self.sizes.level(options)?;
+        self.built(options.assign, options.lists, level)
+    }
+
+    /// Points to locate, and how many of them, from the first, lie in cells.
+    pub(crate) fn points(&self) -> (&[[f32; 3]], usize) {
+        let (all, inside) = self.points.get_or_init(|| points(&self.mesh));
+        (all, *inside)
+    }
+
+    /// Where they lie.
+    pub(crate) fn locations<'a>(&self, built: &'a Built) -> &'a [Location] {
+        built.locations.get_or_init(|| self.locator(built).locate_all(self.points().0))
+    }
+
+    /// The reference's location over a tree.
+    pub(crate) fn locator<'a>(&'a self, built: &'a Built) -> Locator<'a> {
+        Locator::new(&self.mesh, &self.topology, built.tree())
+    }
+}
