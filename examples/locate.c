@@ -41,6 +41,10 @@ int main(int argc, char **argv) {
     olbvh_tree *tree = NULL;
     check(olbvh_gpu_open(NULL, &gpu), "opening a device");
     check(olbvh_mesh_upload(gpu, place, points, cells, tets, &mesh), "uploading the mesh");
+    olbvh_build_options options = olbvh_default_build_options();
+    options.budget = 1;
+    if (olbvh_tree_build(mesh, &options, &tree) != OLBVH_STATUS_TOO_LARGE) return 1;
+    fprintf(stderr, "as it should be: %s\n", olbvh_last_error());
     check(olbvh_tree_build(mesh, NULL, &tree), "building the tree");
     /* Handles keep what they were made from. */
     olbvh_mesh_free(mesh);

@@ -79,6 +79,10 @@ typedef struct olbvh_build_options {
    Most entries the tree may have; it gets coarser until it fits. 0: no limit.
    */
   uint32_t capacity;
+  /*
+   Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
+   */
+  uint64_t budget;
 } olbvh_build_options;
 
 /*

@@ -67,6 +67,8 @@ pub struct OlbvhBuildOptions {
     pub lists: u32,
     /// Most entries the tree may have; it gets coarser until it fits. 0: no limit.
     pub capacity: u32,
+    /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
+    pub budget: u64,
 }
 
 /// What was built.
@@ -225,8 +227,8 @@ pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
 /// What `olbvh_tree_build` takes where it is given no options.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
-    let BuildOptions { alpha, assign, lists, capacity, .. } = BuildOptions::default();
-    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, capacity: capacity.unwrap_or(0) }
+    let BuildOptions { alpha, assign, lists, capacity, budget, .. } = BuildOptions::default();
+    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, capacity: capacity.unwrap_or(0), budget: budget.unwrap_or(0) }
 }
 
 /// Builds the tree over a mesh. `options` may be null.
@@ -243,7 +245,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
             lists: Lists::EVERY.into_iter().find(|l| *l as u32 == asked.lists).ok_or_else(|| unknown("lists", asked.lists))?,
             boxes: false,
             capacity: (asked.capacity != 0).then_some(asked.capacity),
-            budget: None,
+            budget: (asked.budget != 0).then_some(asked.budget),
         };
         let gpu = mesh.gpu();
         let tree = Tree::build(gpu, &mesh, &options)?;
