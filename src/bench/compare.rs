@@ -1,10 +1,10 @@
 //! Two files of results: the ratio of every measurement that both have, and whether it is more than the measurements' own spread.
 
 use super::measure::Spread;
+use super::stored::{StoredCopy, StoredFigure, StoredMesh, StoredStructure, leaves, read};
 use super::table::{Table, mebibytes, number, text_of};
-use crate::error::{Error, Result};
-use serde::de::IgnoredAny;
-use serde::{Deserialize, Serialize};
+use crate::error::Result;
+use serde::Serialize;
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -85,79 +85,10 @@ pub struct Comparison {
     pub incomparable: Vec<(String, String)>,
 }
 
-/// What is read of a file; results of other versions may have more, or less.
-#[derive(Deserialize)]
-struct Stored {
-    meshes: Vec<StoredMesh>,
-    copy: Option<StoredCopy>,
-    /// Follows from the figures.
-    #[serde(rename = "scaling")]
-    _scaling: Option<IgnoredAny>,
-    #[serde(flatten)]
-    facts: BTreeMap<String, Value>,
-}
-
-#[derive(Deserialize)]
-struct StoredCopy {
-    bytes: u64,
-    repetitions: u32,
-    command_ms: Spread,
-    kernel_ms: Spread,
-}
-
-#[derive(Deserialize)]
-struct StoredMesh {
-    name: String,
-    tets: u64,
-    points: u64,
-    structures: Vec<StoredStructure>,
-}
-
-#[derive(Deserialize)]
-struct StoredStructure {
-    name: String,
-    memory: StoredMemory,
-    figures: Vec<StoredFigure>,
-}
-
-#[derive(Deserialize)]
-struct StoredMemory {
-    total: u64,
-}
-
-#[derive(Deserialize)]
-struct StoredFigure {
-    quantity: String,
-    repetitions: u32,
-    device_ms: Option<Spread>,
-    wall_ms: Spread,
-    items: Option<u64>,
-}
-
-fn read(path: &Path) -> Result<Stored> {
-    let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    serde_json::from_str(&text).map_err(|e| Error::File {
-        path: path.into(),
-        place: format!("line {}: ", e.line()),
-        message: format!("{e}; it must be results that `olbvh bench -o FILE.json` wrote"),
-    })
-}
-
-/// Every leaf of a JSON object by its path, `device.name`; lists are leaves.
-fn leaves(prefix: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
-    if let Value::Object(members) = value {
-        for (name, member) in members {
-            leaves(&if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") }, member, out);
-        }
-    } else {
-        out.insert(prefix.to_owned(), value.clone());
-    }
-}
-
 /// Compares the results of two runs.
 ///
 /// # Errors
-/// [`Error::Io`] and [`Error::File`] if a file cannot be read, or is no such file.
+/// [`crate::Error::Io`] and [`crate::Error::File`] if a file cannot be read, or is no such file.
 pub fn compare(files: [&Path; 2]) -> Result<Comparison> {
     let stored = [read(files[0])?, read(files[1])?];
     let facts = stored.each_ref().map(|s| {
@@ -357,6 +288,7 @@ impl Compared {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
     use serde_json::json;
 
     fn figure(quantity: &str, [min, median, max]: [f64; 3], items: Option<u64>) -> Value {

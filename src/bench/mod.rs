@@ -19,6 +19,7 @@ mod measure;
 mod plot;
 mod report;
 mod scaling;
+mod stored;
 mod structure;
 mod subject;
 mod suite;

@@ -1,0 +1,79 @@
+//! Files of results, as far as comparing them needs it.
+
+use super::measure::Spread;
+use crate::error::{Error, Result};
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+use serde_json::Value;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// What is read of a file; results of other versions may have more, or less.
+#[derive(Deserialize)]
+pub(super) struct Stored {
+    pub meshes: Vec<StoredMesh>,
+    pub copy: Option<StoredCopy>,
+    /// Follows from the figures.
+    #[serde(rename = "scaling")]
+    _scaling: Option<IgnoredAny>,
+    #[serde(flatten)]
+    pub facts: BTreeMap<String, Value>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct StoredCopy {
+    pub bytes: u64,
+    pub repetitions: u32,
+    pub command_ms: Spread,
+    pub kernel_ms: Spread,
+}
+
+#[derive(Deserialize)]
+pub(super) struct StoredMesh {
+    pub name: String,
+    pub tets: u64,
+    pub points: u64,
+    pub structures: Vec<StoredStructure>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct StoredStructure {
+    pub name: String,
+    pub memory: StoredMemory,
+    pub figures: Vec<StoredFigure>,
+}
+
+#[derive(Deserialize)]
+pub(super) struct StoredMemory {
+    pub total: u64,
+}
+
+#[derive(Deserialize)]
+pub(super) struct StoredFigure {
+    pub quantity: String,
+    pub repetitions: u32,
+    pub device_ms: Option<Spread>,
+    pub wall_ms: Spread,
+    pub items: Option<u64>,
+}
+
+/// Reads a file of results.
+pub(super) fn read(path: &Path) -> Result<Stored> {
+    let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
+    serde_json::from_str(&text).map_err(|e| Error::File {
+        path: path.into(),
+        place: format!("line {}: ", e.line()),
+        message: format!("{e}; it must be results that `olbvh bench -o FILE.json` wrote"),
+    })
+}
+
+/// Every leaf of a JSON object by its path, `device.name`; lists are leaves.
+pub(super) fn leaves(prefix: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
+    if let Value::Object(members) = value {
+        for (name, member) in members {
+            leaves(&if prefix.is_empty() { name.clone() } else { format!("{prefix}.{name}") }, member, out);
+        }
+    } else {
+        out.insert(prefix.to_owned(), value.clone());
+    }
+}
