@@ -18,6 +18,7 @@ use olbvh::query::{
 };
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
+use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{Side, overlap as reference};
 use olbvh::reference::slice::Slicer;
 use olbvh::slicing::{Band, Extrapolate, Rows};
@@ -72,6 +73,22 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
     status
 }
 
+/// All owners of the mesh's points, or as many of them as there was room for; how many there are.
+fn compare_owners(gpu: &Gpu, queries: &Queries, locator: &Locator<'_>, points: &[[f32; 3]]) -> usize {
+    let expected: Vec<Vec<u32>> = points.iter().map(|&p| locator.owners(p)).collect();
+    let ends: Vec<u32> = read(gpu, queries, queries.owners.ends, points.len());
+    let counted = |sum: &mut usize, owners: &Vec<u32>| {
+        *sum += owners.len();
+        Some(*sum as u32)
+    };
+    assert_eq!(ends, expected.iter().scan(0, counted).collect::<Vec<_>>());
+    let all = expected.concat();
+    assert_eq!(read::<u32>(gpu, queries, queries.owners.total, 1), [all.len() as u32]);
+    let n = all.len().min(ROOM);
+    assert_eq!(read::<u32>(gpu, queries, queries.owner_lists, n), all[..n]);
+    all.len()
+}
+
 fn frames(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     let mesh = kuhn_jittered([5, 4, 6], 0.2, 3).unwrap();
@@ -81,7 +98,7 @@ fn frames(binding: Binding) {
     let frame = Frame::new(&gpu, &mesh);
     let queries = Queries::new(&gpu, &frame, &values, &other, ROOM as u64);
     let (other_topology, other_tree) = (topology(&other).unwrap(), queries.other_tree.download().unwrap());
-    let (mut touched, mut met, mut cut) = (0, 0, 0);
+    let (mut listed, mut touched, mut met, mut cut) = (0, 0, 0, 0);
     for i in 0..6 {
         let shown = moved(&mesh, i);
         let staging = gpu.upload("olbvh.test.staging", &shown.points).unwrap();
@@ -99,6 +116,7 @@ fn frames(binding: Binding) {
         let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
         let field = Field { name: "x".into(), on: On::Points, values: values.clone() };
         let slicer = Slicer::new(&shown, &topology, &host, Some(&field), queries.voxels, Extrapolate::Nearest).unwrap();
+        listed += compare_owners(&gpu, &queries, &Locator::new(&shown, &topology, &host), &shown.points);
         touched += compare_slice(&gpu, &queries, &slicer, &values, &device, &tree).touched;
 
         let (a, b) =
@@ -121,7 +139,7 @@ fn frames(binding: Binding) {
         met += found.len();
         cut += usize::from(pairs.len() > ROOM);
     }
-    assert!(touched > 1000 && met > 1000 && cut > 0 && cut < 6, "{touched} {met} {cut}");
+    assert!(listed > 1000 && touched > 1000 && met > 1000 && cut > 0 && cut < 6, "{touched} {met} {cut}");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }

@@ -108,7 +108,17 @@ fn queries() {
         let (slice, sets) = (&queries.slice, &queries.sets);
         read(
             r,
-            &[slice.answers, slice.values, slice.status, sets.hits[0], sets.hits[1], sets.status[0], sets.status[1], queries.found],
+            &[
+                slice.answers,
+                slice.values,
+                slice.status,
+                sets.hits[0],
+                sets.hits[1],
+                sets.status[0],
+                sets.status[1],
+                queries.found,
+                queries.owner_lists,
+            ],
             &sink,
         );
         Ok(())

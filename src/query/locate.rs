@@ -4,17 +4,14 @@ use super::Scene;
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
-use crate::kernels::{
-    Interpolate, InterpolateSpec, Locate, LocateAll, LocateAllSpec, LocateByTraversal, LocateByTraversalSpec, LocateSpec,
-};
+use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
-use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 
 /// Entries of a list that one dispatch searches.
-const SLICE: u32 = 16_384;
+pub(super) const SLICE: u32 = 16_384;
 /// Points of one submission of the convenient layer.
-const CHUNK: usize = 1 << 20;
+pub(super) const CHUNK: usize = 1 << 20;
 
 /// How the leaf of a point is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -216,81 +213,6 @@ pub fn locate(
         }
         all.stages.extend(time.stages);
         report(all.owners.len() as u64, points.len() as u64);
-    }
-    Ok(all)
-}
-
-/// Every tetrahedron that contains each point, ascending; where none does, the owner alone, if there is one.
-///
-/// # Errors
-/// As [`locate`].
-pub fn locate_all(
-    mesh: &DeviceMesh,
-    tree: &Tree,
-    points: &[[f32; 3]],
-    options: &LocateOptions,
-    report: &dyn Fn(u64, u64),
-) -> Result<Vec<Vec<u32>>> {
-    let gpu = tree.gpu();
-    let scene = Scene::new(mesh, tree);
-    let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
-    let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
-    let (workgroup, lists) = (gpu.target().query, scene.tree.lists as u32);
-    let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
-    let mut all = Vec::with_capacity(points.len());
-    for chunk in points.chunks(CHUNK) {
-        let buffer = gpu.upload("olbvh.query.points", chunk)?;
-        let (points_ref, count, n) = (buffer.all(), chunk.len() as u32, chunk.len() as u64);
-        let carve =
-            |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(n)?, a.words(n)?, a.words(1)?, ScanScratch::carve(gpu, a, count)?));
-        let memory = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
-        let (owners, barycentrics, counts, places, total, scan) = carve(&mut Arena::new(memory.all()))?;
-        let record = |r: &mut Recorder<'_>, fill: u32, places: BufferRef, found: BufferRef, capacity: u32| {
-            for slice in 0..slices {
-                let arguments = LocateAll {
-                    grid,
-                    masks,
-                    co,
-                    po,
-                    p,
-                    flags,
-                    cells,
-                    vertices,
-                    points: points_ref,
-                    owners,
-                    places,
-                    found,
-                    neighbours,
-                    count,
-                    stride: 3,
-                    slice,
-                    capacity,
-                };
-                r.dispatch(
-                    &arguments,
-                    LocateAllSpec { workgroup, fill, slice: SLICE, lists, ..Default::default() },
-                    Groups::Count(count.div_ceil(workgroup)),
-                )?;
-                r.barrier("locate_all.slice → next");
-            }
-            Ok(())
-        };
-        gpu.run("olbvh.query.count_owners", |r| {
-            let input = PointInput { points: points_ref, stride: 3, count, hints: None };
-            r.fill(counts, 0);
-            cmd_locate(r, &scene, &input, &LocateOutput { owners, barycentrics }, options)?;
-            r.barrier("locate → locate_all");
-            record(r, 0, counts, r.gpu().nothing(), 0)?;
-            cmd_exclusive_scan(r, counts, places, total, Count::host(count), &scan)
-        })?;
-        let mut begins: Vec<u32> = gpu.download(&memory, places.part(0, 4 * n))?;
-        let total = gpu.download::<u32>(&memory, total.part(0, 4))?.first().copied().unwrap_or(0);
-        begins.push(total);
-        let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
-        gpu.run("olbvh.query.list_owners", |r| record(r, 1, places, found.all(), total))?;
-        let found: Vec<u32> = gpu.download(&found, found.all())?;
-        all.extend(begins.windows(2).map(|w| found.get(w[0] as usize..w[1] as usize).unwrap_or_default().to_vec()));
-        report(all.len() as u64, points.len() as u64);
     }
     Ok(all)
 }

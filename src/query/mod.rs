@@ -1,11 +1,13 @@
 //! Questions to a tree on the device: point location (SPEC 3.1, 3.2), volume rendering (3.3), slicing (3.4), overlap (3.5).
 
+mod all_owners;
 mod locate;
 mod overlap;
 mod slice;
 mod volume;
 
-pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate, locate_all};
+pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
+pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
 pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};

@@ -1,4 +1,4 @@
-//! Slicing and overlap with a second mesh, recorded behind a [`Frame`].
+//! All owners, slicing, and overlap with a second mesh, recorded behind a [`Frame`].
 
 use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
@@ -7,13 +7,16 @@ use olbvh::mesh::{Mesh, On};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    OverlapMemory, PairMemory, Rounds, Scene, Searched, SliceInput, SliceMemory, Structure, cmd_count_pairs, cmd_list_pairs, cmd_overlap,
-    cmd_slice,
+    LocateOptions, OverlapMemory, OwnersMemory, PairMemory, PointInput, Rounds, Scene, Searched, SliceInput, SliceMemory, Structure,
+    cmd_count_owners, cmd_count_pairs, cmd_list_owners, cmd_list_pairs, cmd_overlap, cmd_slice,
 };
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 
 /// Memory of the queries of a frame, and what they ask.
 pub struct Queries {
+    pub points: PointInput,
+    pub owners: OwnersMemory,
+    pub owner_lists: BufferRef,
     pub voxels: VoxelGrid,
     pub rows: Rows,
     pub slice: SliceMemory,
@@ -49,15 +52,19 @@ impl Queries {
             let slice = SliceMemory::carve(a, 37, rows.count)?;
             let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
-            Ok((slice, sets, pairs, a.take(8 * room)?))
+            let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
+            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?))
         };
         let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
-        let (slice, sets, pairs, found) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (slice, sets, pairs, found, owners, owner_lists) = carve(&mut Arena::new(memory.all())).unwrap();
         let field = gpu.upload("olbvh.test.field", values).unwrap();
-        Self { voxels, rows, slice, other, other_tree, sets, pairs, found, memory, field, scene }
+        let points = frame.points;
+        Self { points, owners, owner_lists, voxels, rows, slice, other, other_tree, sets, pairs, found, memory, field, scene }
     }
 
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        cmd_count_owners(r, &self.scene, &self.points, &self.owners, &LocateOptions::default())?;
+        cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let searched = Searched { mesh: self.scene.mesh, structure: Structure::Octree(self.scene.tree) };
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };

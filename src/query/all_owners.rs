@@ -1,0 +1,149 @@
+//! Every tetrahedron that contains a point (SPEC 3.1): counted, then written within what memory there is.
+
+use super::Scene;
+use super::locate::{CHUNK, LocateOptions, LocateOutput, PointInput, SLICE, cmd_locate};
+use crate::build::{DeviceMesh, Tree};
+use crate::error::Result;
+use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::kernels::{LocateAll, LocateAllSpec};
+use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+
+/// Answers and scratch memory of all owners: 28 bytes per point, and what a scan takes.
+#[derive(Clone, Copy, Debug)]
+pub struct OwnersMemory {
+    /// The owner of each point and its barycentric coordinates, as [`cmd_locate`] writes them.
+    pub located: LocateOutput,
+    /// A word per point: where its owners end; they begin where those of the point before end, the first at 0.
+    pub ends: BufferRef,
+    /// A word: how many owners all points have together, whether or not there was room for them.
+    pub total: BufferRef,
+    counts: BufferRef,
+    scan: ScanScratch,
+}
+
+impl OwnersMemory {
+    /// For `count` points.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, count: u32) -> Result<Self> {
+        let n = u64::from(count);
+        Ok(Self {
+            located: LocateOutput { owners: arena.words(n)?, barycentrics: arena.take(16 * n)? },
+            ends: arena.words(n)?,
+            total: arena.words(1)?,
+            counts: arena.words(n)?,
+            scan: ScanScratch::carve(gpu, arena, count)?,
+        })
+    }
+}
+
+/// Records how many tetrahedra contain each point: the owner alone where none does, if there is one. Nothing is submitted, waited for, allocated or
+/// read back; [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete behind it.
+///
+/// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier
+/// before or after.
+///
+/// # Errors
+/// As [`cmd_locate`].
+pub fn cmd_count_owners(
+    r: &mut Recorder<'_>,
+    scene: &Scene,
+    input: &PointInput,
+    memory: &OwnersMemory,
+    options: &LocateOptions,
+) -> Result<()> {
+    r.fill(memory.counts, 0);
+    cmd_locate(r, scene, input, &memory.located, options)?;
+    r.barrier("locate → locate_all");
+    cmd_walk_lists(r, scene, input, memory, None)?;
+    cmd_exclusive_scan(r, memory.counts, memory.ends, memory.total, Count::host(input.count), &memory.scan)
+}
+
+/// Records the owners themselves, behind [`cmd_count_owners`] with the same points: a word each in `found`, those of a point ascending, point by
+/// point. As many are written as `found` holds; [`OwnersMemory::ends`] and [`OwnersMemory::total`] are right in any case.
+///
+/// Begins with a barrier. Last use: compute reads and writes; no barrier after.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if the pipeline cannot be made.
+pub fn cmd_list_owners(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memory: &OwnersMemory, found: BufferRef) -> Result<()> {
+    r.barrier("scan → locate_all");
+    cmd_walk_lists(r, scene, input, memory, Some(found))
+}
+
+/// Walks the lists in slices: counts, or writes to `found`.
+fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memory: &OwnersMemory, found: Option<BufferRef>) -> Result<()> {
+    let (tree, mesh) = (&scene.tree, &scene.mesh);
+    let workgroup = r.gpu().target().query;
+    let fill = u32::from(found.is_some());
+    let places = if fill == 0 { memory.counts } else { memory.ends };
+    let found = found.unwrap_or_else(|| r.gpu().nothing());
+    let spec = LocateAllSpec { workgroup, fill, slice: SLICE, lists: tree.lists as u32, ..Default::default() };
+    r.stage("query.locate_all", |r| {
+        for slice in 0..scene.longest_leaf.div_ceil(SLICE).max(1) {
+            if slice > 0 {
+                r.barrier("locate_all.slice → locate_all.slice");
+            }
+            let arguments = LocateAll {
+                grid: tree.grid,
+                masks: tree.masks,
+                co: tree.co,
+                po: tree.po,
+                p: tree.p,
+                flags: tree.flags,
+                cells: mesh.input.cells,
+                vertices: mesh.arrays.vertices,
+                points: input.points,
+                owners: memory.located.owners,
+                places,
+                found,
+                neighbours: mesh.arrays.neighbours,
+                count: input.count,
+                stride: input.stride,
+                slice,
+                capacity: u32::try_from(found.size / 4).unwrap_or(u32::MAX),
+            };
+            r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup)))?;
+        }
+        Ok(())
+    })
+}
+
+/// Every tetrahedron that contains each point, ascending; where none does, the owner alone, if there is one.
+///
+/// # Errors
+/// As [`super::locate`].
+pub fn locate_all(
+    mesh: &DeviceMesh,
+    tree: &Tree,
+    points: &[[f32; 3]],
+    options: &LocateOptions,
+    report: &dyn Fn(u64, u64),
+) -> Result<Vec<Vec<u32>>> {
+    let gpu = tree.gpu();
+    let scene = Scene::new(mesh, tree);
+    let mut all = Vec::with_capacity(points.len());
+    for chunk in points.chunks(CHUNK) {
+        let asked = gpu.upload("olbvh.query.points", chunk)?;
+        let count = chunk.len() as u32;
+        let input = PointInput { points: asked.all(), stride: 3, count, hints: None };
+        let carve = |a: &mut Arena| OwnersMemory::carve(gpu, a, count);
+        let buffer = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
+        let memory = carve(&mut Arena::new(buffer.all()))?;
+        gpu.run("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, options))?;
+        let total = gpu.download::<u32>(&buffer, memory.total.part(0, 4))?.first().copied().unwrap_or(0);
+        let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
+        gpu.run("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
+        let ends: Vec<u32> = gpu.download(&buffer, memory.ends.part(0, 4 * u64::from(count)))?;
+        let found: Vec<u32> = gpu.download(&found, found.all())?;
+        let mut begin = 0;
+        all.extend(ends.into_iter().map(|end| {
+            let owners = found.get(begin..end as usize).unwrap_or_default().to_vec();
+            begin = end as usize;
+            owners
+        }));
+        report(all.len() as u64, points.len() as u64);
+    }
+    Ok(all)
+}
