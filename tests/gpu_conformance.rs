@@ -2,8 +2,9 @@
 //! start a process per test do not open the device a thousand times; its message names every case that failed.
 //!
 //! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address; other drivers and
-//! the descriptors run the quick ones; under a validation layer, and where the reference driver only differs in the width of its subgroups, those
-//! over a few meshes that between them record every kernel. `OLBVH_TEST_GROUP` = `quick`, `full` or `large` says otherwise.
+//! the descriptors run the quick ones; under a validation layer, where the reference driver only differs in the width of its subgroups, and on
+//! SwiftShader, which compiles every kernel anew in every process, those over a few meshes that between them record every kernel.
+//! `OLBVH_TEST_GROUP` = `quick`, `full` or `large` says otherwise.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use olbvh::conformance::{Case, Lab, Outcome, cases};
@@ -20,7 +21,7 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     if let Ok(group) = env::var("OLBVH_TEST_GROUP") {
         return grouped(&group, |_| true);
     }
-    let brief = validation || (!reference && driver.starts_with("lavapipe25"));
+    let brief = validation || (!reference && (driver.starts_with("lavapipe25") || driver == "swiftshader"));
     let group = if reference && binding == Binding::Address { "full" } else { "quick" };
     grouped(group, |case| !brief || !case.is_over_a_mesh() || BRIEF.contains(&case.family()))
 }
