@@ -96,7 +96,7 @@ struct olbvh_RenderPlan {
     float value_lo;  // Value at place 0 of the table.
     float value_scale; // Places per unit of value.
     float termination; // A ray ends once it is this opaque.
-    uint pad;        // Unused.
+    uint visible_at; // Words of the flags before the marks of visible nodes, where there are any.
 };
 
 // Where the march of a ray stands between two dispatches.
@@ -109,7 +109,7 @@ struct olbvh_RayState {
     uint best;      // Best candidate among them, or all ones.
     float olbvh_smallest; // Its smallest barycentric coordinate.
     uint in_box;    // Whether its box holds the sample.
-    uint pad;       // Unused.
+    uint check;     // From this sample on the tree is asked whether there is anything to see.
 };
 
 // Counters of a picture, 64 bits each, low word first.
@@ -118,6 +118,7 @@ struct olbvh_RenderStatus {
     uint found[2];   // Samples in the mesh.
     uint unfinished; // Rays that need another dispatch.
     uint pad;        // Unused.
+    uint skipped[2]; // Samples not taken, in nodes where nothing is to be seen.
 };
 
 // A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31
@@ -437,22 +438,24 @@ struct olbvh_Node {
 };
 // A tree as queries see it (SPEC 2.5). The including kernel declares: grid, masks, co, po, p, and where used flags, cells, vertices.
 
+// The children of a node. The including kernel declares masks and co.
+
 uint olbvh_child_mask(uint node) { return olbvh_masks.at[node >> 2u] >> (8u * (node & 3u)) & 0xffu; }
 
 uint olbvh_child_of(uint node, uint mask, uint digit) { return olbvh_co.at[node] + 1u + bitCount(mask & ((1u << digit) - 1u)); }
 
-// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
-uint olbvh_find_leaf(uint level, uvec3 finest) {
-    uint code = olbvh_morton(finest) >> (3u * (olbvh_MAX_LEVEL - level));
-    uint node = 0u;
-    for (uint k = level; k > 0u; --k) {
-        uint digit = code >> (3u * (k - 1u)) & 7u;
-        uint mask = olbvh_child_mask(node);
+// The node of a cell of `level`, found below `node` of level `from`; NONE if there is none.
+uint olbvh_find_node(uint node, uint from, uint level, uint code) {
+    for (uint k = level - from; k > 0u; --k) {
+        uint digit = code >> (3u * (k - 1u)) & 7u, mask = olbvh_child_mask(node);
         if ((mask >> digit & 1u) == 0u) return olbvh_NONE;
         node = olbvh_child_of(node, mask, digit);
     }
     return node;
 }
+
+// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
+uint olbvh_find_leaf(uint level, uvec3 finest) { return olbvh_find_node(0u, 0u, level, olbvh_morton(finest) >> (3u * (olbvh_MAX_LEVEL - level))); }
 
 // First entry of a node and the one behind its last.
 uvec2 olbvh_entry_range(uint node) {

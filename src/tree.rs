@@ -111,7 +111,11 @@ impl TreeArrays {
     /// The leaf that stands for a cell of the finest grid (as [`Grid::quantize`] gives it), by descent over the child masks.
     pub fn find_leaf(&self, finest: [u32; 3]) -> Option<u32> {
         let level = self.grid.level;
-        let code = morton(finest) >> (3 * (MAX_LEVEL - level));
+        self.find_node(morton(finest) >> (3 * (MAX_LEVEL - level)), level)
+    }
+
+    /// The node of a level that stands for the cell with this Morton code.
+    pub fn find_node(&self, code: u32, level: u32) -> Option<u32> {
         (0..level).try_fold(0, |node, k| self.child(node, code >> (3 * (level - 1 - k)) & 7))
     }
 }

@@ -75,6 +75,17 @@ fn render_takes_every_setting() {
 }
 
 #[test]
+fn what_nobody_sees_is_skipped() {
+    let folder = TempDir::new().unwrap();
+    let picture = ["render", "kuhn:24,20,16", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
+    let run = |opacity: &str| json(folder.path(), &[&picture[..], &["--opacity", opacity]].concat());
+    let (opaque, narrow) = (run("0.2"), run("0:0,0.6:0,0.65:0.9,0.7:0"));
+    let of = |result: &Value, key: &str| result[key].as_u64().unwrap();
+    assert_eq!(of(&opaque, "skipped_samples"), 0);
+    assert!(of(&narrow, "skipped_samples") > 0 && of(&narrow, "samples") < of(&opaque, "samples"), "{narrow:#}");
+}
+
+#[test]
 fn info_tells_mesh_and_tree() {
     let folder = TempDir::new().unwrap();
     let result = json(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);

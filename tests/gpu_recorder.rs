@@ -8,15 +8,17 @@ use host::Frame;
 use host::queries::Queries;
 use olbvh::Error;
 use olbvh::build::{
-    BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh,
+    BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
+    cmd_ranges, range_bytes,
 };
 use olbvh::gpu::{Buffer, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::{Row, SortTarget, Target};
-use olbvh::mesh::kuhn_jittered;
+use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
+use olbvh::query::{cmd_visible, visible_bytes};
 
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
@@ -124,6 +126,28 @@ fn queries() {
         Ok(())
     });
     assert!(barriers >= 40, "{barriers}");
+}
+
+#[test]
+fn ranges_of_a_field() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([6, 5, 4], 0.3, 1).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
+    let drawn = gpu.upload("olbvh.test.drawn", &[[0.4f32, 0.5]]).unwrap();
+    let nodes = tree.memory().capacity.nodes;
+    let memory = |bytes: u64| gpu.buffer("olbvh.test.ranges", bytes).unwrap();
+    let (ranges, marks, sink) = (memory(range_bytes(nodes)), memory(visible_bytes(nodes)), memory(64));
+    let barriers = every_barrier_counts(&gpu, "ranges", |r| {
+        cmd_ranges(r, &view, tree.memory(), (field.all(), On::Points), ranges.all())?;
+        cmd_visible(r, tree.memory(), ranges.all(), (drawn.all(), 1), marks.all())?;
+        r.barrier("visible → caller");
+        read(r, &[marks.all()], &sink);
+        Ok(())
+    });
+    assert!(barriers as u32 >= 4 + 2 * tree.grid().level, "{barriers}");
 }
 
 #[test]

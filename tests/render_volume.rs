@@ -79,6 +79,34 @@ fn pictures_agree_with_brute_force() {
 }
 
 #[test]
+fn skipped_samples_have_nothing_to_add() {
+    let narrow = TransferFunction::parse_opacity("0:0,0.5:0,0.52:0.9,0.54:0,1:0").unwrap();
+    let peak = |camera: &str| RenderSettings {
+        transfer: TransferFunction::named("viridis").unwrap().with_opacity(narrow.clone()).unwrap(),
+        ..settings(camera)
+    };
+    for camera in ["iso", "front,ortho", "eye=-0.5,14,4,target=0,15,4,fov=100"] {
+        let mut mesh = grid([14, 12, 10]);
+        let topology = topology(&mesh).unwrap();
+        for on in [On::Points, On::Cells] {
+            if on == On::Cells {
+                mesh.fields[0] = Field { name: "id".into(), on, values: (0..mesh.tets.len()).map(|i| ((i / 1200) % 9) as f32).collect() };
+                mesh.fields[0].values[40] = f32::NAN;
+            }
+            let settings = RenderSettings { range: (on == On::Cells).then_some([0.0, 7.7]), ..peak(camera) };
+            let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+            let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+            let picture = render(&scene, &|_, _| ());
+            let every = render(&scene.without_skipping(), &|_, _| ());
+            assert_eq!(picture.pixels, every.pixels, "{camera} {on:?}");
+            assert!(picture.skipped_samples > 0 && every.skipped_samples == 0, "{camera} {on:?}");
+            assert!(picture.samples < every.samples, "{camera} {on:?}: {} of {}", picture.samples, every.samples);
+            assert!(picture.pixels.iter().any(|&p| p != 255), "{camera} {on:?}: an empty picture proves nothing");
+        }
+    }
+}
+
+#[test]
 fn fields_of_cells_and_holes_in_fields_agree_with_brute_force() {
     let mut mesh = grid([3, 3, 2]);
     let n = mesh.tets.len();

@@ -1,6 +1,7 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/ordered.glsl"
 // Bad cells (SPEC 2.3), and the bounds of the vertices that valid cells use. Floats are ordered as unsigned keys: no rounding, and
 // the order of atomics does not matter.
 ARGUMENTS(4)
@@ -16,11 +17,10 @@ BUFFER(3, READ_WRITE, MeshStatus, status)
 
 const uint LIMIT = (125u + 127u) << 23; // coordinates from 2^125 on count as infinite
 
-// An unsigned key with the order of the floats; denormals count as 0.
-uint ordered(float x) {
-    uint u = floatBitsToUint(x);
-    if ((u & 0x7f800000u) == 0u) u = 0u;
-    return (u & 0x80000000u) != 0u ? ~u : u | 0x80000000u;
+// A key; denormals count as 0.
+uint key_of(float x) {
+    uint bits = floatBitsToUint(x);
+    return ordered((bits & 0x7f800000u) == 0u ? 0u : bits);
 }
 
 void main() {
@@ -35,8 +35,8 @@ void main() {
             for (uint c = 0u; c < 3u; ++c) {
                 float x = positions.at[v[i] * stride + c];
                 ok = ok && (floatBitsToUint(x) & 0x7fffffffu) < LIMIT;
-                tl[c] = max(tl[c], ~ordered(x));
-                th[c] = max(th[c], ordered(x));
+                tl[c] = max(tl[c], ~key_of(x));
+                th[c] = max(th[c], key_of(x));
             }
         }
         if (ok) {

@@ -2,6 +2,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
+#include "shared/ordered.glsl"
 // From the bounds to the grid (SPEC 2.1), by integers where the host divides: Vulkan's division is not correctly rounded.
 ARGUMENTS(2)
     uint unused;
@@ -9,7 +10,7 @@ END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, status)
 BUFFER16(1, writeonly, Grid, grid)
 
-float from_ordered(uint k) { return uintBitsToFloat((k & 0x80000000u) != 0u ? k & 0x7fffffffu : ~k); }
+float from_ordered(uint key) { return uintBitsToFloat(unordered(key)); }
 
 // 1024 / e for a normal e, correctly rounded (to nearest, ties to even): long division of the mantissas.
 float divide_1024(float e) {

@@ -7,6 +7,7 @@
 #include "shared/boxes.glsl"
 #include "shared/rays.glsl"
 // Ray intervals (SPEC 3.3): from the first to the last boundary leaf that a ray meets, or in the binary tree the box of a boundary primitive.
+// Where values are transparent the marks of visible nodes stand in for the boundary flags.
 // Twin of src/reference/volume/interval.rs.
 layout(constant_id = 2) const uint STACK = 8;
 ARGUMENTS(5 + STRUCTURE_BUFFERS)
@@ -109,12 +110,7 @@ void main() {
         g = grid.at[0];
         vec3 way;
         make_ray(plan, pixel, origin, way);
-        const float LEAST = 1e-20;
-        for (uint c = 0u; c < 3u; ++c) {
-            bool parallel = abs(way[c]) < LEAST;
-            bool negative = (floatBitsToUint(way[c]) & 0x80000000u) != 0u;
-            inverse_way[c] = parallel ? (negative ? -1e20 : 1e20) : reciprocal(way[c]);
-        }
+        inverse_way = inverse_of(way);
         first = 3.40282347e38;
         last = -1.0;
         bool within = all(lessThanEqual(g.lo.xyz, origin)) && all(lessThanEqual(origin, g.hi.xyz));

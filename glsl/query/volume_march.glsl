@@ -5,7 +5,7 @@
 #include "shared/structure.glsl"
 #include "shared/rays.glsl"
 // Marching (SPEC 3.3): samples (k + 1/2)·Δ from the ray's origin, front to back, until the ray is opaque or a dispatch's share of work is done.
-// Twin of src/reference/volume/march.rs.
+// With SKIP the tree is asked for stretches without anything to see as soon as a sample adds nothing. Twin of src/reference/volume/march.rs.
 layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
@@ -24,6 +24,7 @@ BUFFER16(8, READ_WRITE, RayState, states)
 BUFFER(9, READ_WRITE, RenderStatus, status)
 STRUCTURE(10)
 #include "shared/structure_owner.glsl"
+#include "shared/skip.glsl"
 
 const uint WALK = 6u; // steps of a walk across faces before the structure is asked
 const uint TABLE = 1024u;
@@ -77,7 +78,7 @@ vec3 shade(RenderPlan plan, vec3 n, vec3 way, vec3 halfway) {
 
 void main() {
     uint i = item_index();
-    uint samples = 0u, found = 0u, unfinished = 0u;
+    uint samples = 0u, found = 0u, skipped = 0u, unfinished = 0u;
     if (i < items && states.at[i].next < states.at[i].end) {
         RenderPlan plan = plans.at[0];
         Grid g = grid.at[0];
@@ -93,12 +94,26 @@ void main() {
             precise vec3 unit = h * inverse_sqrt(square);
             halfway = unit;
         }
+        vec3 inverse_way = SKIP != 0u ? inverse_of(way) : vec3(0.0);
         bool in_cell = state.hint != NONE;
         if (in_cell) enter(state.hint);
         uint work = 0u;
         for (; state.next < state.end && work < budget; ++work) {
-            precise float t = (float(state.next) + 0.5) * plan.step_size;
-            precise vec3 at = origin + way * t;
+#ifndef BINARY_TREE
+            if (SKIP != 0u && state.next >= state.check) {
+                bool hidden;
+                uint behind = stretch_end(plan, g, origin, way, inverse_way, state.next, state.end, hidden);
+                if (!hidden) {
+                    state.check = behind;
+                } else {
+                    in_cell = in_cell && behind - state.next < WALK;
+                    skipped += behind - state.next;
+                    state.next = behind;
+                    continue;
+                }
+            }
+#endif
+            vec3 at = sample_at(plan, origin, way, state.next);
             vec3 x = normalise(g, at);
             Weights w;
             bool inside = false;
@@ -141,6 +156,7 @@ void main() {
             if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) continue;
             vec4 color = lookup(plan, value);
             if (color.w <= 0.0) continue;
+            if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
             if (SHADING != 0u) {
                 precise vec3 n = (b.x * cell_normals[0] + b.y * cell_normals[1]) + (b.z * cell_normals[2] + b.w * cell_normals[3]);
                 vec3 lit = shade(plan, n, way, halfway);
@@ -163,10 +179,12 @@ void main() {
     }
     samples = subgroupAdd(samples);
     found = subgroupAdd(found);
+    skipped = subgroupAdd(skipped);
     unfinished = subgroupAdd(unfinished);
     if (subgroupElect()) {
         if (samples > 0u && atomicAdd(status.at[0].samples[0], samples) > NONE - samples) atomicAdd(status.at[0].samples[1], 1u);
         if (found > 0u && atomicAdd(status.at[0].found[0], found) > NONE - found) atomicAdd(status.at[0].found[1], 1u);
+        if (skipped > 0u && atomicAdd(status.at[0].skipped[0], skipped) > NONE - skipped) atomicAdd(status.at[0].skipped[1], 1u);
         if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
     }
 }

@@ -58,7 +58,7 @@ struct RenderPlan {
     float value_lo;  // Value at place 0 of the table.
     float value_scale; // Places per unit of value.
     float termination; // A ray ends once it is this opaque.
-    uint pad;        // Unused.
+    uint visible_at; // Words of the flags before the marks of visible nodes, where there are any.
 };
 
 // Where the march of a ray stands between two dispatches.
@@ -71,7 +71,7 @@ struct RayState {
     uint best;      // Best candidate among them, or all ones.
     float smallest; // Its smallest barycentric coordinate.
     uint in_box;    // Whether its box holds the sample.
-    uint pad;       // Unused.
+    uint check;     // From this sample on the tree is asked whether there is anything to see.
 };
 
 // Counters of a picture, 64 bits each, low word first.
@@ -80,6 +80,7 @@ struct RenderStatus {
     uint found[2];   // Samples in the mesh.
     uint unfinished; // Rays that need another dispatch.
     uint pad;        // Unused.
+    uint skipped[2]; // Samples not taken, in nodes where nothing is to be seen.
 };
 
 // A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31

@@ -23,6 +23,25 @@ void make_ray(RenderPlan plan, uvec2 pixel, out vec3 origin, out vec3 direction)
     direction = d;
 }
 
+const float LEAST = 1e-20; // of a component of a direction, so that its reciprocal is finite
+
+vec3 inverse_of(vec3 way) {
+    vec3 r;
+    for (uint c = 0u; c < 3u; ++c) {
+        bool parallel = abs(way[c]) < LEAST;
+        bool negative = (floatBitsToUint(way[c]) & 0x80000000u) != 0u;
+        r[c] = parallel ? (negative ? -1e20 : 1e20) : reciprocal(way[c]);
+    }
+    return r;
+}
+
+// Where a sample lies.
+vec3 sample_at(RenderPlan plan, vec3 origin, vec3 way, uint k) {
+    precise float t = (float(k) + 0.5) * plan.step_size;
+    precise vec3 at = origin + way * t;
+    return at;
+}
+
 // Pixels go to invocations in blocks of 8 × 8, within them along a Z curve: neighbouring rays read neighbouring cells.
 bool pixel_of(uint item, uvec2 size, out uvec2 pixel) {
     uint across = (size.x + 7u) / 8u;

@@ -7,17 +7,20 @@
 //! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
 //! 4 leaves   boundary flags, boxes                                                                         Alg. 1
 //!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
+//! 5 ranges   smallest and largest value of a field per node: cells · down · up                             (once per field and time step)
 //! ```
 //! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole pipeline within given capacities;
 //! [`Tree::build`] records the same stages in three submissions, and reads two counts back to allocate exactly.
 
 mod mesh;
 mod plan;
+mod ranges;
 mod stages;
 mod tree;
 
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use stages::MeshView;
 pub use tree::Tree;
 

@@ -49,6 +49,8 @@ impl Capacity {
 pub struct TreeMemory {
     /// Which cells list a primitive.
     pub assign: Assign,
+    /// What there is room for.
+    pub capacity: Capacity,
     /// Which primitives a leaf lists.
     pub lists: Lists,
     /// [`BuildStatus`]: what was built.
@@ -89,6 +91,7 @@ impl TreeMemory {
         let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
         Ok(Self {
             assign: options.assign,
+            capacity: *capacity,
             lists: options.lists,
             status,
             grid,

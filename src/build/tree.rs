@@ -80,6 +80,7 @@ impl Tree {
         let nothing = gpu.nothing();
         let mut memory = TreeMemory {
             assign,
+            capacity,
             lists,
             status,
             grid,
@@ -105,6 +106,7 @@ impl Tree {
             let (nodes, internal) = (u64::from(planned.nodes), u64::from(planned.internal));
             Ok(TreeMemory {
                 assign,
+                capacity,
                 lists,
                 status,
                 grid,

@@ -3,7 +3,7 @@
 use super::failure::{Stop, Verdict};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
-use super::{Case, Failure, TargetKind, Work, build, locate, overlap, picture, primitives, slice, topology};
+use super::{Case, Failure, TargetKind, Work, build, locate, overlap, picture, primitives, ranges, slice, topology};
 use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions};
@@ -100,6 +100,7 @@ impl Lab {
             }
             Work::Build(case) => self.over(&case.mesh, |gpu, twin, device| build::check(gpu, case, twin, device)),
             Work::Locate(case) => self.over(&case.mesh, |gpu, twin, device| locate::check(gpu, case, twin, device)),
+            Work::Ranges(case) => self.over(&case.mesh, |gpu, twin, device| ranges::check(gpu, case, twin, device)),
             Work::Picture(case) => self.over(&case.mesh, |gpu, twin, device| picture::check(gpu, case, twin, device)),
             Work::Slice(case) => self.over(&case.mesh, |gpu, twin, device| slice::check(gpu, case, twin, device)),
             Work::Overlap(case) => self.over(&case.mesh, |gpu, twin, device| overlap::check(gpu, case, twin, device)),

@@ -12,7 +12,8 @@
 //! scan/100003/host/in-place/row-amd        … under the shapes of a kind of device
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
-//! render/one-tet/iso/points/shaded         mesh, camera, field [, light]
+//! ranges/slivers/exact/alpha-1/cells       mesh, assignment [, lists], α, field
+//! render/one-tet/iso/points/shaded         mesh, camera, field [, light] [, transfer function]
 //! slice/plate/aabb/alpha-2/oblique         mesh, assignment, α, stack of layers
 //! overlap/cloud/exact/alpha-1/grid         mesh, assignment [, lists], α, the other mesh
 //! ```
@@ -31,6 +32,7 @@ mod picture;
 mod primitive_cases;
 mod primitives;
 mod query_cases;
+mod ranges;
 mod slice;
 mod topology;
 mod twin;
@@ -47,6 +49,7 @@ use meshes::MeshRecipe;
 use overlap::OverlapCase;
 use picture::PictureCase;
 use primitives::{ReduceCase, ScanCase, SortCase};
+use ranges::RangesCase;
 use slice::SliceCase;
 
 use crate::mesh::Mesh;
@@ -93,6 +96,7 @@ enum Work {
     Topology(MeshRecipe),
     Build(BuildCase),
     Locate(LocateCase),
+    Ranges(RangesCase),
     Picture(PictureCase),
     Slice(SliceCase),
     Overlap(OverlapCase),

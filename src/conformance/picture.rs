@@ -1,6 +1,6 @@
 //! Volume rendering against the reference renderer (SPEC 3.3).
 
-use super::failure::{Verdict, compare_one, fail};
+use super::failure::{Verdict, compare, compare_one, fail};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
@@ -9,7 +9,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::render;
 use crate::reference::volume::{Scene, render as draw};
-use crate::render::RenderSettings;
+use crate::render::{Plan, RenderSettings, TransferFunction};
 
 /// A small picture.
 #[derive(Clone, Copy, Debug)]
@@ -18,10 +18,12 @@ pub(crate) struct PictureCase {
     pub camera: &'static str,
     pub on: On,
     pub shading: bool,
+    /// Opacity points; by default what fits the field.
+    pub opacity: Option<&'static str>,
 }
 
 /// A wave through the mesh.
-fn field(mesh: &Mesh, on: On) -> Field {
+pub(super) fn field(mesh: &Mesh, on: On) -> Field {
     let wave = |p: &[f32; 3]| (p[0] * 0.9 + p[1] * 0.4).sin() + p[2] * 0.1;
     let values = match on {
         On::Points => mesh.points.iter().map(wave).collect(),
@@ -32,7 +34,12 @@ fn field(mesh: &Mesh, on: On) -> Field {
 
 pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let field = field(&twin.mesh, case.on);
-    let settings = RenderSettings { size: [40, 34], camera: case.camera.parse()?, shading: case.shading, ..RenderSettings::default() };
+    let mut transfer = TransferFunction::default();
+    if let Some(opacity) = case.opacity {
+        transfer = transfer.with_opacity(TransferFunction::parse_opacity(opacity)?)?;
+    }
+    let settings =
+        RenderSettings { size: [40, 34], camera: case.camera.parse()?, shading: case.shading, transfer, ..RenderSettings::default() };
     let mut first: Option<Vec<u8>> = None;
     let (all, boundary) = (Lists::All, Lists::Boundary);
     for (alpha, assign, lists) in [(0.0, Assign::Aabb, all), (0.0, Assign::Planes, boundary), (2.0, Assign::Exact, all)] {
@@ -52,6 +59,14 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // The intervals follow the tree's leaves, the picture does not.
         compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
+        compare_one(&stage, "skipped samples", &expected.skipped_samples, &drawn.skipped_samples)?;
+        if plan.hides(&field.values) {
+            // As if nothing were skipped, to the bit.
+            let all = Plan { drawn: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
+            let all = render(device, &tree, &all, (&field.values, field.on), normals, &|_, _| {})?;
+            let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
+            compare(&stage, "colours beside those of every sample", &bits(&all.colors), &bits(&drawn.colors))?;
+        }
         near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
         match &first {
             Some(first) => near(&stage, "pixels beside those of alpha 0", first, &pixels, 1, 0)?,

@@ -5,6 +5,7 @@ use super::meshes::{MeshRecipe, recipes};
 use super::overlap::{Other, OverlapCase};
 use super::picture::PictureCase;
 use super::primitive_cases::push;
+use super::ranges::RangesCase;
 use super::slice::{STACKS, SliceCase};
 use super::{Case, Group, Work};
 use crate::mesh::On;
@@ -16,6 +17,20 @@ const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "re
 const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
 /// A mesh whose overlap keeps the reference busy for minutes.
 const LARGE: &str = "jitter-24x24x24";
+/// Ranges of a field: mesh, α, assignment, lists, where the values are.
+const RANGED: [(&str, f32, Assign, Lists, On); 8] = [
+    ("no-cells", 0.0, Assign::Aabb, Lists::All, On::Points),
+    ("one-tet", 0.0, Assign::Exact, Lists::All, On::Cells),
+    ("bad-cells", 1.0, Assign::Aabb, Lists::Boundary, On::Cells),
+    ("tangled", 1.0, Assign::Exact, Lists::All, On::Points),
+    ("slivers", 3.0, Assign::Exact, Lists::All, On::Points),
+    ("slivers", 0.0, Assign::Planes, Lists::Boundary, On::Cells),
+    ("jitter-12x13x11", 3.0, Assign::Aabb, Lists::All, On::Cells),
+    ("jitter-12x13x11", 0.0, Assign::Planes, Lists::Boundary, On::Points),
+];
+/// A transfer function that shows few values, and the mesh that is drawn with it, by the same kernels from all sides, as they take long to compile.
+const PEAK: &str = "0:0,0.3:0,0.33:0.8,0.36:0,0.7:0,0.7:0.1,0.72:0.1,0.72:0,1:0";
+const PEAKED: &str = "jitter-12x13x11";
 /// Meshes that are drawn.
 const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
 
@@ -42,6 +57,12 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         if mesh.name != LARGE {
             add_overlaps(cases, mesh);
         }
+        for (_, alpha, assign, lists, on) in RANGED.into_iter().filter(|of| of.0 == mesh.name) {
+            add_ranges(cases, RangesCase { mesh, alpha, assign, lists, on });
+        }
+        for camera in ["iso", "top,ortho"].into_iter().filter(|_| mesh.name == PEAKED) {
+            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity: Some(PEAK) });
+        }
     }
 }
 
@@ -52,12 +73,8 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
             add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
         }
     }
-    push(
-        cases,
-        format!("render/{}/iso/points/shaded", mesh.name),
-        Group::Quick,
-        Work::Picture(PictureCase { mesh, camera: "iso", on: On::Points, shading: true }),
-    );
+    add_picture(cases, Group::Quick, PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None });
+    add_ranges(cases, RangesCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, on: On::Points });
     add_slices(cases, mesh);
     for lists in Lists::EVERY {
         add_overlap(cases, Group::Quick, OverlapCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, other: Other::Itself });
@@ -70,19 +87,30 @@ fn add_location(cases: &mut Vec<Case>, quick: bool, case: LocateCase) {
     push(cases, name, group, Work::Locate(case));
 }
 
+fn add_ranges(cases: &mut Vec<Case>, case: RangesCase) {
+    let RangesCase { mesh, alpha, assign, lists, on } = case;
+    let name = format!("ranges/{}/{assign}{}/alpha-{alpha}/{}", mesh.name, lists.suffix(), values(on));
+    push(cases, name, Group::Quick, Work::Ranges(case));
+}
+
 fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for (name, camera) in [("iso", "iso"), ("top", "top,ortho")] {
+    for camera in ["iso", "top,ortho"] {
         for (on, shading) in [(On::Points, true), (On::Points, false), (On::Cells, false)] {
-            let (values, light) = (if on == On::Points { "points" } else { "cells" }, if shading { "/shaded" } else { "" });
-            let group = if name == "iso" && shading { mesh.group } else { Group::Full };
-            push(
-                cases,
-                format!("render/{}/{name}/{values}{light}", mesh.name),
-                group,
-                Work::Picture(PictureCase { mesh, camera, on, shading }),
-            );
+            let group = if camera == "iso" && shading { mesh.group } else { Group::Full };
+            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None });
         }
     }
+}
+
+fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
+    let PictureCase { mesh, camera, on, shading, opacity } = case;
+    let camera = camera.split(',').next().unwrap_or(camera);
+    let (light, transfer) = (if shading { "/shaded" } else { "" }, if opacity.is_some() { "/peak" } else { "" });
+    push(cases, format!("render/{}/{camera}/{}{light}{transfer}", mesh.name, values(on)), group, Work::Picture(case));
+}
+
+fn values(on: On) -> &'static str {
+    if on == On::Points { "points" } else { "cells" }
 }
 
 fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {

@@ -4,6 +4,7 @@ mod all_owners;
 mod locate;
 mod overlap;
 mod slice;
+mod visible;
 mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
@@ -11,6 +12,7 @@ pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_int
 pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
+pub use visible::{cmd_visible, visible_bytes};
 pub use volume::{Drawn, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
@@ -100,6 +102,14 @@ impl Searched {
     /// A mesh in memory of our own.
     pub fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
         Self { mesh: MeshView { input: *mesh.input(), arrays: *mesh.arrays() }, structure: structure.into() }
+    }
+
+    /// The same with other flags for the nodes of an octree.
+    fn with_flags(mut self, to: BufferRef) -> Self {
+        if let Structure::Octree(TreeMemory { flags, .. }) = &mut self.structure {
+            *flags = to;
+        }
+        self
     }
 
     /// Which lists an octree keeps, for its kernels.

@@ -1,9 +1,9 @@
 //! Direct volume rendering (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of bounded work.
 
-use super::{Searched, Structure, dispatch};
-use crate::build::DeviceMesh;
+use super::{Searched, Structure, cmd_visible, dispatch, visible_bytes};
+use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Recorder};
+use crate::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
 };
@@ -25,6 +25,8 @@ struct Canvas {
     states: BufferRef,
     status: BufferRef,
     items: u32,
+    /// Nodes without anything to see are skipped.
+    skip: bool,
 }
 
 impl Canvas {
@@ -37,7 +39,7 @@ impl Canvas {
 }
 
 /// What the kernels need of a plan.
-fn kernel_plan(plan: &Plan, grid: &Grid) -> RenderPlan {
+fn kernel_plan(plan: &Plan, grid: &Grid, visible_at: u32) -> RenderPlan {
     let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     let lighting = plan.lighting.unwrap_or(crate::render::Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
     let (slack, inverse_step) = crate::render::interval_slack(grid, plan);
@@ -57,7 +59,7 @@ fn kernel_plan(plan: &Plan, grid: &Grid) -> RenderPlan {
         value_lo: plan.value_lo,
         value_scale: plan.value_scale,
         termination: plan.termination,
-        pad: 0,
+        visible_at,
     }
 }
 
@@ -68,8 +70,12 @@ pub struct Drawn {
     pub colors: Vec<[f32; 4]>,
     /// Samples taken.
     pub samples: u64,
-    /// Samples in the mesh.
+    /// Samples within the intervals that were not taken: their nodes have nothing to see.
+    pub skipped_samples: u64,
+    /// Samples taken that lie in the mesh.
     pub found_samples: u64,
+    /// Device time of the field's ranges and of the marks of visible nodes, where values are transparent.
+    pub ranges_ms: f64,
     /// Device time of the ray intervals.
     pub interval_ms: f64,
     /// Device time of the march.
@@ -101,9 +107,9 @@ fn cmd_march(
 ) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let (shading, on_cells, lists) = (u32::from(normals.is_some()), u32::from(on == On::Cells), searched.lists());
-    let normals = normals.unwrap_or_else(|| r.gpu().nothing());
+    let (skip, normals) = (u32::from(canvas.skip), normals.unwrap_or_else(|| r.gpu().nothing()));
     r.stage("query.march", |r| {
-        dispatch!(r, canvas.items, searched, VolumeMarch VolumeMarchSpec {} { lists }, LbvhMarch LbvhMarchSpec, {
+        dispatch!(r, canvas.items, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
             cells: input.cells,
             vertices: arrays.vertices,
             neighbours: arrays.neighbours,
@@ -117,6 +123,40 @@ fn cmd_march(
             budget: BUDGET,
         }, { shading, on_cells })
     })
+}
+
+/// Which nodes of an octree have something to see, where the plan hides some values.
+struct Visible {
+    /// The boundary flags, and behind them the marks of the visible nodes.
+    flags: BufferRef,
+    marks: BufferRef,
+    milliseconds: f64,
+    _memory: Buffer,
+}
+
+impl Visible {
+    fn new(gpu: &Gpu, searched: &Searched, plan: &Plan, field: (BufferRef, On)) -> Result<Option<Self>> {
+        let Structure::Octree(tree) = searched.structure else { return Ok(None) };
+        let nodes = tree.capacity.nodes;
+        let bits = visible_bytes(nodes);
+        let drawn = gpu.upload("olbvh.query.drawn", &plan.drawn)?;
+        let carve = |a: &mut Arena| Ok((a.take(bits)?, a.take(bits)?, a.take(range_bytes(nodes))?));
+        let memory = gpu.buffer("olbvh.query.visible", Arena::measure(carve)?)?;
+        let (flags, marks, ranges) = carve(&mut Arena::new(memory.all()))?;
+        let ((), time) = gpu.run("olbvh.query.visible", |r| {
+            r.copy(tree.flags.part(0, bits), flags.part(0, bits));
+            cmd_ranges(r, &searched.mesh, &tree, field, ranges)?;
+            cmd_visible(r, &tree, ranges, (drawn.all(), plan.drawn.len() as u32), marks)
+        })?;
+        let milliseconds = time.milliseconds("build.ranges") + time.milliseconds("query.visible");
+        let flags = memory.all().part(flags.offset, marks.offset + bits - flags.offset);
+        Ok(Some(Self { flags, marks, milliseconds, _memory: memory }))
+    }
+
+    /// Where the marks begin, in words of the flags.
+    fn at(&self) -> u32 {
+        ((self.marks.offset - self.flags.offset) / 4) as u32
+    }
 }
 
 /// Draws a plan of a field (values per point or per tetrahedron); `normals`: one per point, for shading. `report` is told how many rays
@@ -143,24 +183,31 @@ pub fn render(
     }
     let field = gpu.upload("olbvh.query.field", values)?;
     let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
-    let kernel_plan = gpu.upload("olbvh.query.plan", &[kernel_plan(plan, mesh.grid())])?;
     let table = gpu.upload("olbvh.query.table", &plan.table)?;
+    let visible = if plan.hides(values) { Visible::new(gpu, &searched, plan, (field.all(), on))? } else { None };
+    let (for_intervals, for_march) = match &visible {
+        Some(visible) => (searched.with_flags(visible.marks), searched.with_flags(visible.flags)),
+        None => (searched, searched),
+    };
+    let visible_at = visible.as_ref().map_or(0, Visible::at);
+    let kernel_plan = gpu.upload("olbvh.query.plan", &[kernel_plan(plan, mesh.grid(), visible_at)])?;
     let items = Canvas::items(plan.size)?;
     let carve = |a: &mut Arena| Ok((a.take(size_of::<RayState>() as u64 * u64::from(items))?, a.take(size_of::<RenderStatus>() as u64)?));
     let memory = gpu.buffer("olbvh.query.canvas", Arena::measure(carve)?)?;
     let (states, status) = carve(&mut Arena::new(memory.all()))?;
-    let canvas = Canvas { plan: kernel_plan.all(), table: table.all(), states, status, items };
+    let canvas = Canvas { plan: kernel_plan.all(), table: table.all(), states, status, items, skip: visible.is_some() };
     let ((), time) = gpu.run("olbvh.query.intervals", |r| {
         r.fill(canvas.status, 0);
-        cmd_intervals(r, &searched, &canvas)
+        cmd_intervals(r, &for_intervals, &canvas)
     })?;
-    let mut drawn = Drawn { interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
+    let ranges_ms = visible.as_ref().map_or(0.0, |visible| visible.milliseconds);
+    let mut drawn = Drawn { ranges_ms, interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
     let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
     loop {
         let ((), time) = gpu.run("olbvh.query.march", |r| {
             r.fill(canvas.status.part(16, 4), 0);
             r.barrier("march.clear → march");
-            cmd_march(r, &searched, &canvas, field.all(), on, normals.as_ref().map(crate::gpu::Buffer::all))
+            cmd_march(r, &for_march, &canvas, field.all(), on, normals.as_ref().map(Buffer::all))
         })?;
         drawn.march_ms += time.milliseconds("query.march");
         drawn.submissions += 1;
@@ -169,7 +216,7 @@ pub fn render(
         report(rays.saturating_sub(u64::from(status.unfinished)), rays);
         if status.unfinished == 0 {
             let wide = |w: [u32; 2]| u64::from(w[0]) | u64::from(w[1]) << 32;
-            (drawn.samples, drawn.found_samples) = (wide(status.samples), wide(status.found));
+            (drawn.samples, drawn.skipped_samples, drawn.found_samples) = (wide(status.samples), wide(status.skipped), wide(status.found));
             break;
         }
     }

@@ -17,20 +17,21 @@ pub type Box6 = [f32; 6];
 /// `lo + extent·((k+1)·2^-l)` without denormals, where `extent = hi − lo`. The far side of the last cell is `hi` to the bit. On an axis that is
 /// flat to the quantization (`inv = 0`) cell 0 stands for everything: `[lo, hi]`.
 pub fn cell_box(grid: &Grid, level: u32, code: u32) -> Box6 {
-    let cells = 1u32 << level;
-    let size = f32::from_bits((127 - level) << 23);
-    let cell = unmorton(code);
-    let at = |c: usize, k: u32| {
-        if k == 0 {
-            grid.lo[c]
-        } else if k == cells || grid.inv[c] == 0.0 {
-            grid.hi[c]
-        } else {
-            canonical(grid.lo[c] + canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size))
-        }
-    };
-    let [x, y, z] = cell;
+    let [x, y, z] = unmorton(code);
+    let at = |c: usize, k: u32| cell_side(grid, c, level, k);
     [at(0, x), at(1, y), at(2, z), at(0, x + 1), at(1, y + 1), at(2, z + 1)]
+}
+
+/// The lower side of cell `k` at `level` along axis `c`.
+pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
+    if k == 0 {
+        grid.lo[c]
+    } else if k == 1 << level || grid.inv[c] == 0.0 {
+        grid.hi[c]
+    } else {
+        let size = f32::from_bits((127 - level) << 23);
+        canonical(grid.lo[c] + canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size))
+    }
 }
 
 /// Entries of a leaf without boundary primitives that are asked whether they touch its cell.

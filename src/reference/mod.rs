@@ -15,6 +15,7 @@ pub mod levels;
 pub mod locate;
 pub mod marks;
 pub mod overlap;
+pub mod ranges;
 pub mod separate;
 pub mod slice;
 pub mod sort;

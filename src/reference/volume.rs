@@ -1,18 +1,22 @@
 //! Direct volume rendering (SPEC 3.3, the paper's §4.2). Twin of `glsl/query/volume_intervals` and `volume_march`.
 //!
 //! Ray intervals first, from the boundary nodes of the tree alone; then samples within them. What a sample is and how it adds up is said in
-//! [`crate::render`]. The tree decides only where samples need not be taken, so the picture does not depend on it.
+//! [`crate::render`]. Where the transfer function is transparent for some values, nodes without any other ([`super::ranges`]) are left out of intervals and
+//! skipped between them. The tree decides only where samples need not be taken, so the picture does not depend on it.
 
 mod brute;
 mod interval;
 mod march;
+mod skip;
 
 pub use brute::brute_force;
 pub use interval::Intervals;
 pub use march::Marcher;
+pub use skip::Skips;
 
 use super::boundary::Topology;
 use super::locate::Locator;
+use super::ranges::{ranges, visible};
 use super::tet::Vec3;
 use crate::error::{Error, Result};
 use crate::mesh::{Field, Mesh, On};
@@ -29,8 +33,12 @@ pub struct Picture {
     pub pixels: Vec<u8>,
     /// Samples taken within the ray intervals.
     pub samples: u64,
+    /// Samples within them that were not taken: their nodes have nothing to see.
+    pub skipped_samples: u64,
     /// Those that lie in the mesh.
     pub found_samples: u64,
+    /// Milliseconds for the field's ranges, where values are transparent.
+    pub ranges_ms: f64,
     /// Milliseconds for the ray intervals.
     pub interval_ms: f64,
     /// Milliseconds for marching.
@@ -45,6 +53,9 @@ pub struct Scene<'a> {
     pub(crate) field: &'a Field,
     pub(crate) normalised: Vec<Vec3>,
     pub(crate) prepared: Prepared,
+    /// Which nodes have something to see; `None` where no value of the field is transparent.
+    pub(crate) visible: Option<Vec<u32>>,
+    pub(crate) ranges_ms: f64,
     /// With tolerance 0: whether a point just outside counts would depend on the leaf that it lies in.
     pub(crate) locator: Locator<'a>,
 }
@@ -67,7 +78,18 @@ impl<'a> Scene<'a> {
         let valid = |tet: usize| topology.is_valid(tet as u32);
         let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Ok(Self { mesh, topology, tree, field, normalised, prepared, locator: Locator::new(mesh, topology, tree).with_tolerance(0.0) })
+        let start = Instant::now();
+        let visible = prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.drawn));
+        let ranges_ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
+        let locator = Locator::new(mesh, topology, tree).with_tolerance(0.0);
+        Ok(Self { mesh, topology, tree, field, normalised, prepared, visible, ranges_ms, locator })
+    }
+
+    /// The same with every sample in the mesh taken, transparent or not.
+    #[must_use]
+    pub fn without_skipping(mut self) -> Self {
+        self.visible = None;
+        self
     }
 
     /// What is drawn.
@@ -85,8 +107,8 @@ impl<'a> Scene<'a> {
 pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
     let [width, height] = plan.size;
-    let intervals = Intervals::new(scene.tree, plan);
-    let (done, samples, found) = (AtomicU64::new(0), AtomicU64::new(0), AtomicU64::new(0));
+    let intervals = Intervals::new(scene.tree, scene.visible.as_deref(), plan);
+    let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();
     let row = |(y, pixels): (usize, &mut [u8])| {
@@ -102,6 +124,7 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
         interval_ns.fetch_add((middle - begin).as_nanos() as u64, Ordering::Relaxed);
         march_ns.fetch_add(middle.elapsed().as_nanos() as u64, Ordering::Relaxed);
         samples.fetch_add(marcher.samples, Ordering::Relaxed);
+        skipped.fetch_add(marcher.skipped_samples, Ordering::Relaxed);
         found.fetch_add(marcher.found_samples, Ordering::Relaxed);
         report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height));
     };
@@ -114,5 +137,6 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     };
     let ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
     let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
-    Picture { pixels, samples: samples.into_inner(), found_samples: found.into_inner(), interval_ms, march_ms }
+    let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
+    Picture { pixels, samples, skipped_samples, found_samples, ranges_ms: scene.ranges_ms, interval_ms, march_ms }
 }

@@ -15,6 +15,7 @@
 
 pub mod auto;
 pub mod camera;
+mod drawn;
 pub mod maps;
 pub mod plan;
 pub mod settings;

@@ -1,5 +1,6 @@
 //! A picture's settings worked out for one mesh and field: all that the kernels and the reference renderer need to know.
 
+use super::drawn::drawn_values;
 use super::settings::DEFAULT_STEPS;
 use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, shading_normals};
 use crate::error::{Error, Result};
@@ -27,6 +28,8 @@ pub struct Plan {
     pub value_scale: f32,
     /// [`TABLE_SIZE`] entries: sRGB colour, and opacity of one step.
     pub table: Vec<[f32; 4]>,
+    /// Ranges of values, ascending and apart, outside of which the table is transparent.
+    pub drawn: Vec<[f32; 2]>,
     /// A ray ends once it is this opaque.
     pub termination: f32,
     /// The light; `None`: colours as they are.
@@ -69,17 +72,41 @@ impl Plan {
             let [r, g, b, a] = settings.transfer.at(i as f32 / (TABLE_SIZE - 1) as f32);
             [r, g, b, (1.0 - (1.0 - f64::from(a)).powf(exponent)) as f32]
         };
+        let (value_lo, value_scale) = (range[0] as f32, (1.0 / (range[1] - range[0])) as f32);
+        let table: Vec<_> = (0..TABLE_SIZE).map(entry).collect();
         Ok(Self {
             size: settings.size,
             rays: camera.rays(settings.size, bounds),
             step: step as f32,
-            value_lo: range[0] as f32,
-            value_scale: (1.0 / (range[1] - range[0])) as f32,
-            table: (0..TABLE_SIZE).map(entry).collect(),
+            value_lo,
+            value_scale,
+            drawn: drawn_values(&table, value_lo, value_scale),
+            table,
             termination: settings.termination,
             lighting: settings.shading.then(|| Lighting::new(to_light, (1.0 - (1.0 - f64::from(settings.outline)).powf(exponent)) as f32)),
             background: settings.background,
         })
+    }
+
+    /// Whether some of these values are transparent, so that parts of the mesh need not be looked at.
+    pub fn hides(&self, values: &[f32]) -> bool {
+        let everything = matches!(self.drawn[..], [[lo, hi]] if lo.is_infinite() && hi.is_infinite());
+        let is_hidden = |v: f32| {
+            let first = self.drawn.partition_point(|&[_, end]| end < v);
+            v.is_finite() && self.drawn.get(first).is_none_or(|&[begin, _]| v < begin)
+        };
+        !everything && values.iter().copied().any(is_hidden)
+    }
+
+    /// The reciprocal of the step.
+    pub fn inverse_step(&self) -> f32 {
+        1.0 / self.step
+    }
+
+    /// Where sample `k` of a ray (origin, unit direction) lies.
+    pub fn sample(&self, (origin, direction): ([f32; 3], [f32; 3]), k: u32) -> [f32; 3] {
+        let t = (k as f32 + 0.5) * self.step;
+        [0, 1, 2].map(|c| origin[c] + direction[c] * t)
     }
 
     /// Colour, and opacity of one step, at a finite value: with `x = clamp((value − lo)·scale, 0, 1)·1023`, i = min(floor(x), 1022), t = x − i,
@@ -100,7 +127,7 @@ pub fn interval_slack(grid: &Grid, plan: &Plan) -> ([f32; 3], f32) {
     let largest = (0..3).map(|c| hi[c] - lo[c]).fold(0.0, f32::max);
     let power = |n: u32| f32::from_bits((127 - n) << 23);
     let slack = [0, 1, 2].map(|c| largest * power(18) + (lo[c].abs() + hi[c].abs()) * power(21));
-    (slack, 1.0 / plan.step)
+    (slack, plan.inverse_step())
 }
 
 /// A plan and the normals that its light needs.

@@ -24,7 +24,8 @@ Examples:
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
 The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the
-mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step.";
+mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step.
+Where the opacity is 0 nothing is looked at: octree nodes with no other values are skipped, so pictures of few values are quick.";
 
 /// Draw a field of a mesh as a volume, into a PNG file.
 #[derive(clap::Args)]
@@ -101,17 +102,19 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
     let json = json!({
         "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi],
-        "step": step, "samples": picture.samples, "found_samples": picture.found_samples, "interval_ms": picture.interval_ms,
-        "march_ms": picture.march_ms, "build_ms": built.summary().build_ms, "seconds": seconds, "device": engine.name(),
+        "step": step, "samples": picture.samples, "skipped_samples": picture.skipped_samples, "found_samples": picture.found_samples,
+        "ranges_ms": picture.ranges_ms, "interval_ms": picture.interval_ms, "march_ms": picture.march_ms,
+        "build_ms": built.summary().build_ms, "seconds": seconds, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh; ray intervals {}, marching {} on {}\n",
+        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}\n",
         args.output.display(),
         field.name,
         settings.size[0],
         settings.size[1],
         grouped(picture.samples),
         grouped(picture.found_samples),
+        grouped(picture.skipped_samples),
         milliseconds(picture.interval_ms),
         milliseconds(picture.march_ms),
         engine.name()

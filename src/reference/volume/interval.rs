@@ -1,6 +1,7 @@
 //! Where a ray can meet the mesh, by the boundary nodes of the tree.
 
-use crate::reference::grid::reciprocal;
+use super::skip::inverse_of;
+use crate::reference::boundary::bit;
 use crate::reference::leaves::{Box6, cell_box};
 use crate::render::{Plan, interval_slack};
 use crate::tree::TreeArrays;
@@ -8,6 +9,8 @@ use crate::tree::TreeArrays;
 /// Ray intervals of a plan.
 pub struct Intervals<'a> {
     tree: &'a TreeArrays,
+    /// One bit per node: to be looked at.
+    nodes: &'a [u32],
     inverse_step: f32,
     /// Boxes are larger by this, so that rounding of samples, boxes and rays loses nothing.
     slack: [f32; 3],
@@ -16,20 +19,17 @@ pub struct Intervals<'a> {
 /// A node still to be visited: index, level, Morton code of its cell.
 type Node = (u32, u32, u32);
 
-/// A component of a direction is at least this large, so that its reciprocal is finite.
-const LEAST: f32 = 1e-20;
-
 impl<'a> Intervals<'a> {
-    /// Prepares the rays of `plan`.
-    pub fn new(tree: &'a TreeArrays, plan: &Plan) -> Self {
+    /// Prepares the rays of `plan`. `visible`: which nodes have something to see.
+    pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &Plan) -> Self {
         let (slack, inverse_step) = interval_slack(&tree.grid, plan);
-        Self { tree, inverse_step, slack }
+        Self { tree, nodes: visible.unwrap_or(&tree.boundary), inverse_step, slack }
     }
 
     /// The samples `[begin, end)` of a ray (origin, unit direction) that the mesh can hold: from the first to the last leaf with the
-    /// boundary flag whose box the ray meets, and one more on either side. A ray that starts in a leaf of the mesh starts at 0.
+    /// boundary flag (or with something to see) whose box the ray meets, and one more on either side. A ray that starts in a leaf of the mesh starts at 0.
     pub fn of(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [u32; 2] {
-        let inverse = direction.map(|d| if d.abs() < LEAST { 1.0 / LEAST.copysign(d) } else { reciprocal(d) });
+        let inverse = inverse_of(direction);
         let grid = &self.tree.grid;
         let (mut first, mut last) = (f32::MAX, -1.0f32);
         let within = (0..3).all(|c| grid.lo[c] <= origin[c] && origin[c] <= grid.hi[c]);
@@ -39,7 +39,7 @@ impl<'a> Intervals<'a> {
         // Depth first; what lies within the interval found so far has nothing to add, so the order of the visits does not matter.
         let mut stack: Vec<Node> = vec![(0, 0, 0)];
         while let Some((node, level, code)) = stack.pop() {
-            if !self.tree.is_boundary(node) {
+            if !bit(self.nodes, node) {
                 continue;
             }
             let Some([enter, leave]) = self.hit(cell_box(grid, level, code), origin, inverse) else { continue };

@@ -1,6 +1,7 @@
 //! Marching: samples of a ray, front to back.
 
 use super::Scene;
+use super::skip::{Skips, inverse_of};
 use crate::mesh::On;
 use crate::reference::boundary::NONE;
 use crate::reference::tet::Tet;
@@ -17,7 +18,9 @@ pub struct Marcher<'a> {
     cell: Option<Cell>,
     /// Samples taken so far.
     pub samples: u64,
-    /// Those that lie in the mesh.
+    /// Samples left out: nothing is to be seen in their nodes.
+    pub skipped_samples: u64,
+    /// Samples taken that lie in the mesh.
     pub found_samples: u64,
 }
 
@@ -33,19 +36,33 @@ struct Cell {
 impl<'a> Marcher<'a> {
     /// Ready for any ray of the scene.
     pub fn new(scene: &'a Scene<'a>) -> Self {
-        Self { scene, plan: scene.plan(), cell: None, samples: 0, found_samples: 0 }
+        Self { scene, plan: scene.plan(), cell: None, samples: 0, skipped_samples: 0, found_samples: 0 }
     }
 
     /// Colour (premultiplied) and opacity that a ray gathers over its samples `[begin, end)`.
-    pub fn march(&mut self, (origin, direction): ([f32; 3], [f32; 3]), [begin, end]: [u32; 2]) -> [f32; 4] {
+    pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), [begin, end]: [u32; 2]) -> [f32; 4] {
+        let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
         let mut sum = [0.0f32; 4];
         // Each ray begins without a hint, so that no pixel depends on another one.
         self.cell = None;
-        for k in begin..end {
-            let t = (k as f32 + 0.5) * plan.step;
-            let p = [0, 1, 2].map(|c| origin[c] + direction[c] * t);
+        let skips = self.scene.visible.as_deref().map(|visible| Skips { tree: self.scene.tree, visible, plan });
+        let inverse = inverse_of(direction);
+        let (mut next, mut check) = (begin, 0);
+        while next < end {
+            if let Some(skips) = skips.as_ref().filter(|_| next >= check) {
+                let (behind, hidden) = skips.stretch(ray, inverse, next, end);
+                if hidden {
+                    self.cell = self.cell.filter(|_| behind - next < WALK);
+                    self.skipped_samples += u64::from(behind - next);
+                    next = behind;
+                    continue;
+                }
+                check = behind;
+            }
+            let p = plan.sample(ray, next);
+            next += 1;
             self.samples += 1;
             let Some((cell, b)) = self.locate(p) else {
                 // Behind a gap the tree is asked first.
@@ -62,6 +79,7 @@ impl<'a> Marcher<'a> {
             if a <= 0.0 {
                 continue;
             }
+            check = check.max(next + 1);
             let mut color = [red, green, blue];
             if let Some((light, half)) = &light {
                 let m = cell.normals;

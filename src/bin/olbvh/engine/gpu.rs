@@ -128,8 +128,12 @@ impl Built for DeviceTree<'_> {
         let [width, height] = plan.size;
         let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
         let pixels = rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
-        let query::Drawn { samples, found_samples, interval_ms, march_ms, .. } = drawn;
-        Ok(Drawn { picture: Picture { pixels, samples, found_samples, interval_ms, march_ms }, range, step: plan.step })
+        let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
+        Ok(Drawn {
+            picture: Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms },
+            range,
+            step: plan.step,
+        })
     }
 
     fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()> {

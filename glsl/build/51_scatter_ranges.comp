@@ -1,0 +1,56 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/ordered.glsl"
+// Ranges of a field, 1 of 3: every valid tetrahedron with finite values adds its own to the nodes that its quantized box meets, on the deepest level where
+// that is at most SPAN cells along each axis: so large tetrahedra are no long loops. Twin of src/reference/ranges.rs.
+layout(constant_id = 2) const uint ON_CELLS = 0;
+ARGUMENTS(9)
+    uint tets;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, quantized)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER(4, readonly, uint, field) // one float per point or tetrahedron, as bits
+BUFFER(5, readonly, uint, masks)
+BUFFER(6, readonly, uint, co)
+BUFFER(7, readonly, BuildStatus, status)
+BUFFER(8, READ_WRITE, uint, ranges) // zeroed; two keys per node, the lower end's complemented, so that both only grow
+#include "shared/cells.glsl"
+#include "shared/children.glsl"
+
+const uint SPAN = 4u;
+
+bool is_finite(uint bits) { return (bits & 0x7f800000u) != 0x7f800000u; }
+
+void main() {
+    uint t = item_index();
+    if (t >= tets || is_bad(t) || status.at[0].overflow != 0u) return;
+    uvec4 ids = cells.at[t];
+    uvec4 values = ON_CELLS != 0u ? uvec4(field.at[t]) : uvec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
+    uint lo = 0u, hi = 0u;
+    for (uint i = 0u; i < 4u; ++i) {
+        if (!is_finite(values[i])) return; // nowhere in it is a value
+        lo = max(lo, ~ordered(values[i]));
+        hi = max(hi, ordered(values[i]));
+    }
+    Grid g = grid.at[0];
+    CellBox finest = finest_box(t), box = coarser(finest, g.level);
+    uint level = g.level;
+    while (max(max(box.size.x, box.size.y), box.size.z) > SPAN) box = coarser(finest, --level);
+    // The smallest node around the whole box.
+    uint first = morton(box.lo), last = morton(box.lo + box.size - 1u);
+    uint from = first == last ? level : level - 1u - uint(findMSB(first ^ last)) / 3u;
+    uint top = find_node(0u, 0u, from, first >> (3u * (level - from)));
+    if (top == NONE) return;
+    uvec3 at = box.lo;
+    for (uint n = box.size.x * box.size.y * box.size.z; n > 0u; --n) {
+        uint node = find_node(top, from, level, morton(at));
+        at = next_candidate(box, at);
+        if (node == NONE) continue;
+        atomicMax(ranges.at[2u * node], lo);
+        atomicMax(ranges.at[2u * node + 1u], hi);
+    }
+}

@@ -1,0 +1,115 @@
+//! The range of a field's values in every node of a tree (a min–max octree): new values need this alone, not a new tree.
+
+use super::{DeviceMesh, MeshView, Tree, TreeMemory};
+use crate::error::{Error, Result};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
+use crate::kernels::{MergeRanges, MergeRangesSpec, PushRanges, PushRangesSpec, ScatterRanges, ScatterRangesSpec};
+use crate::mesh::On;
+
+/// Bytes of the ranges of so many nodes: the smallest and the largest value of each, as floats.
+pub fn range_bytes(nodes: u32) -> u64 {
+    8 * u64::from(nodes)
+}
+
+/// Records the ranges of a field (one float per point of the mesh or per tetrahedron) into `ranges`, [`range_bytes`] for the nodes of the tree's
+/// capacity; what they hold is said in [`mod@crate::reference::ranges`]. Needs no scratch memory.
+///
+/// First use of `ranges`: a transfer write. Mesh, tree and field are read by compute shaders. The last use is a compute write, behind it stands a barrier
+/// to compute, transfer and indirect reads.
+///
+/// # Errors
+/// [`Error::Vulkan`] if a pipeline cannot be made.
+pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (field, on): (BufferRef, On), ranges: BufferRef) -> Result<()> {
+    let (input, bad, workgroup) = (mesh.input, mesh.arrays.bad, r.gpu().target().each);
+    let TreeMemory { capacity, status, grid, co, masks, .. } = *tree;
+    let of_level = |level: u32| Groups::Count(8u64.pow(level).min(u64::from(capacity.nodes)).div_ceil(u64::from(workgroup)) as u32);
+    r.stage("build.ranges", |r| {
+        r.fill(ranges.part(0, range_bytes(capacity.nodes)), 0);
+        r.barrier("ranges.clear → ranges.scatter");
+        let scatter = ScatterRanges {
+            grid,
+            quantized: mesh.arrays.vertices,
+            cells: input.cells,
+            bad,
+            field,
+            masks,
+            co,
+            status,
+            ranges,
+            tets: input.tets,
+        };
+        let spec = ScatterRangesSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };
+        r.dispatch(&scatter, spec, Groups::Count(input.tets.div_ceil(workgroup)))?;
+        r.barrier("ranges.scatter → ranges.push");
+        for level in 0..capacity.level {
+            let spec = PushRangesSpec { workgroup, ..Default::default() };
+            r.dispatch(&PushRanges { status, co, ranges, level }, spec, of_level(level))?;
+            r.barrier("ranges.upper → ranges.lower");
+        }
+        for level in (0..=capacity.level).rev() {
+            let spec = MergeRangesSpec { workgroup, ..Default::default() };
+            r.dispatch(&MergeRanges { status, co, ranges, level }, spec, of_level(level))?;
+            r.barrier("ranges.lower → ranges.upper");
+        }
+        Ok(())
+    })
+}
+
+/// The ranges of a field in device memory of our own.
+#[derive(Debug)]
+pub struct FieldRanges {
+    gpu: Gpu,
+    buffer: Buffer,
+    time: Readback,
+}
+
+impl FieldRanges {
+    /// The ranges of a field (values per point or per tetrahedron) over a tree.
+    ///
+    /// # Errors
+    /// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
+    pub fn new(mesh: &DeviceMesh, tree: &Tree, field: (&[f32], On)) -> Result<Self> {
+        let gpu = tree.gpu();
+        let buffer = gpu.buffer("olbvh.ranges.values", range_bytes(tree.status().nodes))?;
+        let mut made = Self { gpu: gpu.clone(), buffer, time: Readback::default() };
+        made.update(mesh, tree, field)?;
+        Ok(made)
+    }
+
+    /// The same for new values, in the same memory. The tree must be the one that the ranges were made for.
+    ///
+    /// # Errors
+    /// As [`FieldRanges::new`].
+    pub fn update(&mut self, mesh: &DeviceMesh, tree: &Tree, (values, on): (&[f32], On)) -> Result<()> {
+        let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
+        if values.len() != expected as usize {
+            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
+        }
+        if self.buffer.size() < range_bytes(tree.status().nodes) {
+            return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
+        }
+        let field = self.gpu.upload("olbvh.ranges.field", values)?;
+        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let ranges = self.memory();
+        self.time = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &view, tree.memory(), (field.all(), on), ranges))?.1;
+        Ok(())
+    }
+
+    /// Where they lie: two floats per node.
+    pub fn memory(&self) -> BufferRef {
+        self.buffer.all()
+    }
+
+    /// `[smallest, largest]` of every node, `[∞, −∞]` of those without a value.
+    ///
+    /// # Errors
+    /// A failed transfer.
+    pub fn download(&self, tree: &Tree) -> Result<Vec<[f32; 2]>> {
+        self.gpu.download(&self.buffer, self.memory().part(0, range_bytes(tree.status().nodes)))
+    }
+
+    /// Device time of the last update.
+    pub fn time(&self) -> &Readback {
+        &self.time
+    }
+}
