@@ -1,9 +1,10 @@
 //! The conformance suite as tests, on both ways of binding buffers. A test is a family of cases (`address sort/21-bits`), so that runners which
 //! start a process per test do not open the device a thousand times; its message names every case that failed.
 //!
-//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address; other drivers and
-//! the descriptors run the quick ones; under a validation layer, where the reference driver only differs in the width of its subgroups, and on
-//! SwiftShader, which compiles every kernel anew in every process, those over a few meshes that between them record every kernel.
+//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address, and the quick ones by
+//! descriptors; other drivers, other widths of its subgroups and validation layers get those over a few meshes that between them record every kernel.
+//! SwiftShader compiles every kernel anew on every device that is opened, which takes longer than all cases over a mesh: there the meshes are one
+//! family.
 //! `OLBVH_TEST_GROUP` = `quick`, `full` or `large` says otherwise.
 
 use libtest_mimic::{Arguments, Failed, Trial};
@@ -21,9 +22,14 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     if let Ok(group) = env::var("OLBVH_TEST_GROUP") {
         return grouped(&group, |_| true);
     }
-    let brief = validation || (!reference && (driver.starts_with("lavapipe25") || driver == "swiftshader"));
     let group = if reference && binding == Binding::Address { "full" } else { "quick" };
-    grouped(group, |case| !brief || !case.is_over_a_mesh() || BRIEF.contains(&case.family()))
+    let families = grouped(group, |case| reference || !case.is_over_a_mesh() || BRIEF.contains(&case.family()));
+    if driver != "swiftshader" {
+        return families;
+    }
+    let (meshes, others): (Vec<_>, Vec<_>) = families.into_iter().partition(|(_, cases)| cases.iter().any(Case::is_over_a_mesh));
+    let meshes = meshes.into_iter().flat_map(|(_, cases)| cases).collect();
+    [vec![("meshes".to_string(), meshes)], others].concat()
 }
 
 fn run(binding: Binding, cases: &[Case]) -> Result<(), Failed> {

@@ -1,0 +1,34 @@
+//! `include/olbvh.h` is what cbindgen makes of `src/capi`.
+
+#![allow(clippy::unwrap_used)]
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+#[test]
+fn the_header_in_the_repository_is_the_generated_one() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    // One module for cbindgen, which does not follow private ones.
+    let mut source = String::new();
+    for file in ["mod.rs", "host.rs"] {
+        let text = fs::read_to_string(root.join("src/capi").join(file)).unwrap();
+        for line in text.lines().filter(|l| !["//!", "#![", "mod host;"].iter().any(|begin| l.starts_with(begin))) {
+            writeln!(source, "{line}").unwrap();
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let module = folder.path().join("capi.rs");
+    fs::write(&module, source).unwrap();
+    let mut config = cbindgen::Config::from_file(root.join(".config/cbindgen.toml")).unwrap();
+    config.language = cbindgen::Language::C;
+    let mut generated = Vec::new();
+    cbindgen::Builder::new().with_config(config).with_src(module).generate().unwrap().write(&mut generated);
+
+    let header = root.join("include/olbvh.h");
+    let same = fs::read(&header).unwrap() == generated;
+    if !same && std::env::var_os("OLBVH_BLESS").is_some() {
+        fs::write(&header, generated).unwrap();
+    }
+    assert!(same, "include/olbvh.h is old; OLBVH_BLESS=1 writes it anew");
+}
