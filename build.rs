@@ -60,15 +60,27 @@ fn find_kernels(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
     for path in entries.filter_map(Result::ok).map(|e| e.path()) {
         if path.is_dir() {
             find_kernels(&path, found)?;
-        } else if path.extension().is_some_and(|e| e == "comp") {
+        } else if stage_of(&path).is_some() {
             found.push(path);
         }
     }
     Ok(())
 }
 
+/// The stage that a file is for; none: it is there to be included.
+fn stage_of(path: &Path) -> Option<shaderc::ShaderKind> {
+    match path.extension()?.to_str()? {
+        "comp" => Some(shaderc::ShaderKind::Compute),
+        "rgen" => Some(shaderc::ShaderKind::RayGeneration),
+        "rmiss" => Some(shaderc::ShaderKind::Miss),
+        "rchit" => Some(shaderc::ShaderKind::ClosestHit),
+        _ => None,
+    }
+}
+
 /// Compiles one source, with `#include`s from `glsl/`.
 fn compile(source: &str, name: &str, descriptors: bool, optimise: bool) -> Result<Vec<u32>, String> {
+    let stage = stage_of(Path::new(name)).unwrap_or(shaderc::ShaderKind::Compute);
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
     let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
@@ -78,13 +90,16 @@ fn compile(source: &str, name: &str, descriptors: bool, optimise: bool) -> Resul
     if descriptors {
         options.add_macro_definition("OLBVH_DESCRIPTORS", Some("1"));
     }
+    if stage != shaderc::ShaderKind::Compute {
+        options.add_macro_definition("OLBVH_RAY_TRACING", Some("1"));
+    }
     options.set_include_callback(|file, _, _, _| {
         let path = Path::new(GLSL).join(file);
         let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
     let artifact = compiler
-        .compile_into_spirv(source, shaderc::ShaderKind::Compute, name, "main", Some(&options))
+        .compile_into_spirv(source, stage, name, "main", Some(&options))
         .map_err(|e| format!("{e}{}", if descriptors { "\n(in the descriptor permutation)" } else { "" }))?;
     Ok(artifact.as_binary().to_vec())
 }

@@ -85,12 +85,13 @@ fn a_tiny_mesh_is_measured() {
     assert_eq!(report["settings"]["budget"]["repetitions"], 3);
     assert!(report["device"]["name"].is_string() && report["device"]["target"].is_string());
     assert_eq!(strings(&report["meshes"], "name"), ["kuhn:4,5,3", "shell:8"]);
-    let rays = report["device"]["ray_query"].as_bool().unwrap();
+    let has = |way: &str| report["device"][way].as_bool().unwrap();
     for mesh in report["meshes"].as_array().unwrap() {
         let structures = mesh["structures"].as_array().unwrap();
         let kinds = strings(&mesh["structures"], "kind");
         assert_eq!(kinds.iter().filter(|&&k| k == "olbvh").count(), 12);
-        assert_eq!((kinds.contains(&"lbvh"), kinds.contains(&"ray_query")), (true, rays));
+        assert!(kinds.contains(&"lbvh"));
+        assert!(["ray_query", "ray_pipeline"].iter().all(|way| kinds.contains(way) == has(way)), "{kinds:?}");
         let lbvh = structures.iter().find(|s| s["kind"] == "lbvh").unwrap();
         for structure in structures {
             let memory = &structure["memory"];
@@ -99,7 +100,7 @@ fn a_tiny_mesh_is_measured() {
             let quantities = strings(&structure["figures"], "quantity");
             let expected = ["build", "locate_random", "locate_coherent", "locate_samples", "intervals", "march", "slice", "overlap"];
             assert!(quantities.starts_with(&expected[..4]), "{quantities:?}");
-            if structure["kind"] != "ray_query" {
+            if !structure["kind"].as_str().unwrap().starts_with("ray_") {
                 assert_eq!(quantities, expected);
             }
             if structure["kind"] == "olbvh" {
@@ -126,7 +127,7 @@ fn a_tiny_mesh_is_measured() {
             }
         }
         let lost = structures.iter().map(|s| s["lost"]["points"].as_u64());
-        assert!(lost.zip(&kinds).all(|(lost, &kind)| lost.is_some() == (kind == "ray_query")));
+        assert!(lost.zip(&kinds).all(|(lost, &kind)| lost.is_some() == kind.starts_with("ray_")));
     }
     let out = folder.path().join("out");
     let stored: Value = serde_json::from_slice(&std::fs::read(out.join("bench.json")).unwrap()).unwrap();

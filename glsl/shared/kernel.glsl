@@ -30,11 +30,12 @@
 // Elements of 16 bytes at addresses that are multiples of 16: one load each.
 #define BUFFER16(slot, access, T, name) ALIGNED_BUFFER(16, slot, access, T, name)
 
+const uint NONE = 0xffffffffu;
+
+#ifndef OLBVH_RAY_TRACING // whose launches have no workgroups
 layout(constant_id = 0) const uint WORKGROUP = 64; // invocations per workgroup
 layout(constant_id = 1) const uint ROWS = 4;       // items per invocation
 layout(local_size_x_id = 0) in;
-
-const uint NONE = 0xffffffffu;
 
 // Workgroups are folded into two dimensions, since 65,535 is the limit of one.
 uint group_index() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
@@ -47,3 +48,4 @@ uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
 
 // One item per invocation.
 uint item_index() { return group_index() * WORKGROUP + local_index(); }
+#endif

@@ -3,7 +3,7 @@
 
 mod lbvh;
 mod overlap;
-mod ray_query;
+mod rays;
 
 pub use lbvh::{Lbvh, LbvhArrays};
-pub use ray_query::RayQuery;
+pub use rays::{RayMethod, Rays};

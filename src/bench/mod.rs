@@ -61,7 +61,7 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn
         let structure = match Structure::build(gpu, &subject.device, kind) {
             Ok(Some(structure)) => structure,
             Ok(None) => {
-                report.skip(kind, "the device has no ray queries", progress);
+                report.skip(kind, "the device traces no rays that way", progress);
                 continue;
             }
             // Too large for the device or for 32 bits, which others may not be.

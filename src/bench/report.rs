@@ -5,6 +5,7 @@ use super::structure::Structure;
 use super::subject::{Subject, corners, volume};
 use super::traffic::traffic;
 use super::{CopyRate, Kind, Scale, Settings, Suite, Timing};
+use crate::baseline::RayMethod;
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::kernels::Target;
@@ -137,7 +138,7 @@ pub struct Lost {
 pub struct StructureReport {
     /// Its name in tables.
     pub name: String,
-    /// `olbvh`, `lbvh` or `ray_query`.
+    /// `olbvh`, `lbvh`, `ray_query` or `ray_pipeline`.
     pub kind: &'static str,
     /// The paper's α.
     pub alpha: Option<u8>,
@@ -153,7 +154,7 @@ pub struct StructureReport {
     pub nodes: Option<u32>,
     /// Bytes.
     pub memory: MemoryFigures,
-    /// Points that ray queries lost.
+    /// Points that rays lost.
     pub lost: Option<Lost>,
     /// Measurements.
     pub figures: Vec<Figure>,
@@ -202,12 +203,13 @@ impl StructureReport {
                 ("olbvh", memory, Some(tree.status()))
             }
             Structure::Lbvh(lbvh) => ("lbvh", plain(lbvh.bytes(), vec![("nodes and ids", lbvh.bytes())]), None),
-            Structure::RayQuery(rays) => {
+            Structure::Rays(rays) => {
                 let built = rays.structure();
                 let arrays = vec![("structure", built.bytes()), ("sides", rays.bytes() - built.bytes())];
                 let memory = plain(rays.bytes(), arrays);
                 let scratch = Some(built.scratch_bytes());
-                ("ray_query", MemoryFigures { before_compaction: Some(built.built_bytes()), scratch, ..memory }, None)
+                let name = if kind == Kind::Rays(RayMethod::Pipeline) { "ray_pipeline" } else { "ray_query" };
+                (name, MemoryFigures { before_compaction: Some(built.built_bytes()), scratch, ..memory }, None)
             }
         };
         let (level, entries, nodes) = (status.map(|s| s.level), status.map(|s| s.entries), status.map(|s| s.nodes));
@@ -335,6 +337,8 @@ pub struct DeviceFacts {
     pub subgroup: u32,
     /// Whether it has ray queries.
     pub ray_query: bool,
+    /// Whether it has ray-tracing pipelines.
+    pub ray_pipeline: bool,
     /// Name of the shapes of the kernels.
     pub target: String,
     /// The shapes themselves.
@@ -377,7 +381,8 @@ impl Report {
             api: report.api.clone(),
             kind: report.kind,
             subgroup: report.subgroup,
-            ray_query: report.requirements.ray_query(),
+            ray_query: report.requirements.ray_tracing.queries,
+            ray_pipeline: report.requirements.ray_tracing.pipelines,
             target: gpu.target().name.to_string(),
             tunables: gpu.target().clone(),
             binding: format!("{:?}", gpu.binding()).to_lowercase(),

@@ -1,6 +1,6 @@
 //! One structure over one mesh, whichever it is.
 
-use crate::baseline::{Lbvh, RayQuery};
+use crate::baseline::{Lbvh, RayMethod, Rays};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
@@ -22,7 +22,7 @@ pub enum Kind {
     /// The binary tree of the paper's comparison.
     Lbvh,
     /// The device's acceleration structure over faces.
-    RayQuery,
+    Rays(RayMethod),
 }
 
 impl Kind {
@@ -31,12 +31,12 @@ impl Kind {
         let [aabb, planes, exact] = Assign::ALL.map(|assign| (assign, Lists::All));
         let choices = [aabb, planes, exact, (Assign::Aabb, Lists::Boundary)];
         let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
-        octrees.chain([Self::Lbvh, Self::RayQuery]).collect()
+        octrees.chain([Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
     }
 
     /// Whether it can tell the overlap of two meshes.
     pub(super) fn overlaps(self) -> bool {
-        self != Self::RayQuery
+        !matches!(self, Self::Rays(_))
     }
 }
 
@@ -46,7 +46,8 @@ impl std::fmt::Display for Kind {
             Self::Octree { alpha, assign, lists: Lists::All } => write!(f, "OLBVH α={alpha} {assign}"),
             Self::Octree { alpha, lists, .. } => write!(f, "OLBVH α={alpha} lists {lists}"),
             Self::Lbvh => f.write_str("LBVH"),
-            Self::RayQuery => f.write_str("ray query"),
+            Self::Rays(RayMethod::Query) => f.write_str("ray query"),
+            Self::Rays(RayMethod::Pipeline) => f.write_str("ray pipeline"),
         }
     }
 }
@@ -55,7 +56,7 @@ impl std::fmt::Display for Kind {
 pub(super) enum Structure {
     Octree(Tree),
     Lbvh(Lbvh),
-    RayQuery(RayQuery),
+    Rays(Rays),
 }
 
 /// A mesh and its structure.
@@ -74,7 +75,7 @@ impl Structure {
                 Some(Self::Octree(Tree::build(gpu, mesh, &options)?))
             }
             Kind::Lbvh => Some(Self::Lbvh(Lbvh::build(gpu, mesh)?)),
-            Kind::RayQuery => RayQuery::build(gpu, mesh)?.map(Self::RayQuery),
+            Kind::Rays(method) => Rays::build(gpu, mesh, method)?.map(Self::Rays),
         })
     }
 
@@ -83,16 +84,16 @@ impl Structure {
         match self {
             Self::Octree(tree) => tree.stages(),
             Self::Lbvh(lbvh) => lbvh.stages(),
-            Self::RayQuery(rays) => rays.stages(),
+            Self::Rays(rays) => rays.stages(),
         }
     }
 
-    /// As pictures and slices take it; `None` for ray queries, which only locate.
+    /// As pictures and slices take it; `None` for rays, which only locate.
     pub(super) fn searched(&self) -> Option<query::Structure> {
         match self {
             Self::Octree(tree) => Some(tree.into()),
             Self::Lbvh(lbvh) => Some(lbvh.into()),
-            Self::RayQuery(_) => None,
+            Self::Rays(_) => None,
         }
     }
 
@@ -101,7 +102,7 @@ impl Structure {
         match self {
             Self::Octree(tree) => query::locate(mesh, tree, points, None, &LocateOptions::default(), &|_, _| {}),
             Self::Lbvh(lbvh) => lbvh.locate(mesh, points, TOLERANCE),
-            Self::RayQuery(rays) => rays.locate(mesh, points),
+            Self::Rays(rays) => rays.locate(mesh, points),
         }
     }
 }

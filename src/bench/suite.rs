@@ -29,7 +29,7 @@ impl Suite {
         let plain = |kind: &Kind| match kind {
             Kind::Octree { alpha, assign, .. } => *alpha == 0 && *assign == Assign::Aabb,
             Kind::Lbvh => true,
-            Kind::RayQuery => false,
+            Kind::Rays(_) => false,
         };
         let all = Kind::all();
         if self == Self::Scaling { all.into_iter().filter(plain).collect() } else { all }

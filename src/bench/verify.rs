@@ -72,7 +72,7 @@ fn near(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
     tet == u32::MAX || weights(subject, tet, point).is_some_and(|w| !w.inside && w.smallest() >= -TOLERANCE)
 }
 
-/// Compares with the answers of the first structure. Ray queries may lose points, and name any cell that holds a point.
+/// Compares with the answers of the first structure. Rays may lose points, and name any cell that holds a point.
 pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers: &Answers) -> Result<Option<Lost>> {
     let wrong = |what: String| Err(Error::Mismatch(format!("{kind}: {what}")));
     let mut lost = Lost { points: 0, of: 0 };
@@ -83,9 +83,9 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
             let holding = [expected, found].map(|tet| holds(subject, tet, point));
             let outside = [expected, found].iter().all(|&tet| near(subject, tet, point));
             match kind {
-                Kind::RayQuery if found == u32::MAX => lost.points += u64::from(holding[0]),
+                Kind::Rays(_) if found == u32::MAX => lost.points += u64::from(holding[0]),
                 // Where cells overlap, walks may end in another one.
-                Kind::RayQuery | Kind::Octree { lists: Lists::Boundary, .. } if holding[1] => {}
+                Kind::Rays(_) | Kind::Octree { lists: Lists::Boundary, .. } if holding[1] => {}
                 // Outside by less than the tolerance, a point may be found from one leaf and not from another.
                 Kind::Octree { .. } | Kind::Lbvh if outside => {}
                 _ => return wrong(format!("point {point:?} lies in cell {expected}, not {found}")),
@@ -112,7 +112,7 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
         let counts = [expected, found].map(|sets| sets.each_ref().map(Vec::len));
         return wrong(format!("{:?} primitives overlap where there are {:?}", counts[1], counts[0]));
     }
-    Ok((kind == Kind::RayQuery).then_some(lost))
+    Ok(matches!(kind, Kind::Rays(_)).then_some(lost))
 }
 
 /// Compares a tree and the owners found with it with the reference.

@@ -1,8 +1,9 @@
-//! Acceleration structures over triangles, where the device has `VK_KHR_ray_query`: built on the device, compacted, and put as its one instance
-//! into a scene that shaders query.
+//! Acceleration structures over triangles, where the device traces rays: built on the device, compacted, and put as its one instance into a scene
+//! that shaders trace rays in.
 
 use super::context::Gpu;
 use super::memory::{Buffer, BufferRef};
+use super::ray_pipeline::RayFunctions;
 use super::recorder::Recorder;
 use super::submit::StageTime;
 use super::{debug, failed};
@@ -18,11 +19,13 @@ pub(super) struct Acceleration {
     functions: ash::khr::acceleration_structure::Device,
     scratch_alignment: u64,
     most_triangles: u64,
+    /// Those of ray-tracing pipelines, where they are enabled too.
+    pub(super) pipelines: Option<RayFunctions>,
 }
 
 impl Acceleration {
-    /// Of a device that was made with the extension.
-    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
+    /// Of a device that was made with the extension, and perhaps with ray-tracing pipelines.
+    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device, pipelines: bool) -> Self {
         let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
         // SAFETY: the handle is one of this instance; the structs live until the call returns.
@@ -31,6 +34,7 @@ impl Acceleration {
             functions: ash::khr::acceleration_structure::Device::new(instance, device),
             scratch_alignment: u64::from(limits.min_acceleration_structure_scratch_offset_alignment.max(1)),
             most_triangles: limits.max_primitive_count,
+            pipelines: pipelines.then(|| RayFunctions::new(instance, physical, device)),
         }
     }
 }
@@ -85,7 +89,7 @@ impl Drop for Structure {
 }
 
 fn extension(gpu: &Gpu) -> Result<&Acceleration> {
-    gpu.acceleration().ok_or_else(|| Error::Invalid(format!("{} has no ray queries", gpu.report().name)))
+    gpu.acceleration().ok_or_else(|| Error::Invalid(format!("{} traces no rays", gpu.report().name)))
 }
 
 const BUILDS: vk::PipelineStageFlags = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
@@ -97,10 +101,18 @@ fn barrier_before(r: &mut Recorder<'_>) {
     r.barrier_between("acceleration.input → acceleration.build", (source, written), (BUILDS, vk::AccessFlags::SHADER_READ));
 }
 
-/// A structure that was written becomes visible to copies, builds and ray queries.
+/// A structure that was written becomes visible to copies, builds and rays.
 fn barrier_after(r: &mut Recorder<'_>) {
     let written = vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
-    let target = (BUILDS | vk::PipelineStageFlags::COMPUTE_SHADER, vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR);
+    let ways = r.gpu().report().requirements.ray_tracing;
+    let mut stages = BUILDS;
+    if ways.queries {
+        stages |= vk::PipelineStageFlags::COMPUTE_SHADER;
+    }
+    if ways.pipelines {
+        stages |= vk::PipelineStageFlags::RAY_TRACING_SHADER_KHR;
+    }
+    let target = (stages, vk::AccessFlags::ACCELERATION_STRUCTURE_READ_KHR);
     r.barrier_between("acceleration.build → acceleration.use", (BUILDS, written), target);
 }
 
@@ -181,7 +193,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     Ok((smaller, time.stages))
 }
 
-/// A scene of triangles that `GL_EXT_ray_query` can trace rays in.
+/// A scene of triangles that `GL_EXT_ray_query` and `GL_EXT_ray_tracing` trace rays in.
 pub struct AccelerationStructure {
     scene: Structure,
     triangles: Structure,
@@ -195,7 +207,7 @@ impl AccelerationStructure {
     /// Builds the structure, compacts it, and makes the scene. Triangle i of the input is primitive i of the scene, opaque.
     ///
     /// # Errors
-    /// [`Error::Invalid`] without ray queries, [`Error::TooLarge`], [`Error::Memory`], or a failed Vulkan call.
+    /// [`Error::Invalid`] where the device traces no rays, [`Error::TooLarge`], [`Error::Memory`], or a failed Vulkan call.
     pub fn build(gpu: &Gpu, input: &Triangles) -> Result<Self> {
         let most = extension(gpu)?.most_triangles;
         if u64::from(input.count) > most {
@@ -235,7 +247,7 @@ impl AccelerationStructure {
         Ok(Self { scene, triangles, built_bytes: built.memory.size(), scratch_bytes, stages, _instance: instance })
     }
 
-    /// Device address of the scene, low word first: `accelerationStructureEXT(uvec2)` in shaders. Visible to compute shaders.
+    /// Device address of the scene, low word first: `accelerationStructureEXT(uvec2)` in shaders. Visible to shaders that trace rays.
     pub fn address(&self) -> [u32; 2] {
         [self.scene.address as u32, (self.scene.address >> 32) as u32]
     }

@@ -130,6 +130,7 @@ impl Gpu {
         let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
         let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
         target.check(&report.room)?;
+        let traced = requirements.ray_tracing;
         let inner = Inner {
             allocator: Some(allocator),
             pipelines: RwLock::default(),
@@ -138,7 +139,7 @@ impl Gpu {
             binding,
             limits,
             debug_device: foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device)),
-            acceleration: requirements.ray_query().then(|| Acceleration::new(instance, *physical, device)),
+            acceleration: traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines)),
             unbounded: OnceLock::new(),
             foundation,
         };
@@ -272,7 +273,7 @@ impl Gpu {
         self.inner.foundation.report.requirements.buffer_addresses
     }
 
-    /// Functions for acceleration structures, where the device has ray queries.
+    /// Functions for acceleration structures and rays, where the device traces rays.
     pub(super) fn acceleration(&self) -> Option<&Acceleration> {
         self.inner.acceleration.as_ref()
     }

@@ -15,8 +15,8 @@ pub struct Enabled {
     pub buffer_addresses: bool,
     /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Needed where subgroup sizes vary.
     pub subgroup_size_control: bool,
-    /// `VK_KHR_ray_query` and `VK_KHR_acceleration_structure` with their features: for a baseline only.
-    pub ray_query: bool,
+    /// `VK_KHR_acceleration_structure`, and of `VK_KHR_ray_query` and `VK_KHR_ray_tracing_pipeline` those named, with their features: for a baseline only.
+    pub ray_tracing: RayTracing,
     /// Instance extension `VK_EXT_debug_utils`: objects are named and stages labelled.
     pub debug_utils: bool,
 }
@@ -70,9 +70,8 @@ impl Gpu {
         }
         requirements.buffer_addresses &= enabled.buffer_addresses;
         requirements.subgroup_size_control &= enabled.subgroup_size_control;
-        if !(enabled.ray_query && requirements.buffer_addresses) {
-            requirements.ray_tracing = RayTracing::None;
-        }
+        requirements.ray_tracing.queries &= enabled.ray_tracing.queries && requirements.buffer_addresses;
+        requirements.ray_tracing.pipelines &= enabled.ray_tracing.pipelines && requirements.buffer_addresses;
         // SAFETY: the handle is one of this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let Some(of_family) = families.get(family as usize).filter(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)) else {

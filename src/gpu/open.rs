@@ -122,8 +122,15 @@ impl Gpu {
         }
         let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
         let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-        if requirements.ray_query() {
-            info = info.push_next(&mut structures).push_next(&mut ray_queries);
+        let mut ray_pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+        if requirements.ray_tracing.any() {
+            info = info.push_next(&mut structures);
+        }
+        if requirements.ray_tracing.queries {
+            info = info.push_next(&mut ray_queries);
+        }
+        if requirements.ray_tracing.pipelines {
+            info = info.push_next(&mut ray_pipelines);
         }
         // SAFETY: only features and extensions that the device reported are enabled; all structs outlive the calls.
         let (device, queue) = unsafe {

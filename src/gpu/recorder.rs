@@ -95,7 +95,7 @@ impl<'a> Recorder<'a> {
         unsafe { Self::new(gpu, vk::CommandBuffer::null(), None) }
     }
 
-    fn is_rehearsal(&self) -> bool {
+    pub(super) fn is_rehearsal(&self) -> bool {
         self.commands == vk::CommandBuffer::null()
     }
 
@@ -287,7 +287,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// Notes the uses of one command and looks for earlier ones that they must not overlap.
-    fn touch(&mut self, ranges: &[(BufferRef, bool)], by: &'static str) {
+    pub(super) fn touch(&mut self, ranges: &[(BufferRef, bool)], by: &'static str) {
         let before = self.uses.len();
         for &(range, writes) in ranges {
             let (buffer, begin, end) = (range.buffer, range.offset, range.offset + range.size);

@@ -4,15 +4,20 @@ use crate::kernels::Room;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
-/// How a device traces rays.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum RayTracing {
-    /// Not at all.
-    None,
-    /// In ray-tracing pipelines only, which are not supported here.
-    Pipelines,
+/// How a device traces rays; a baseline uses that, nothing else does.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RayTracing {
     /// From any shader (`VK_KHR_ray_query`).
-    Queries,
+    pub queries: bool,
+    /// By pipelines of their own (`VK_KHR_ray_tracing_pipeline`).
+    pub pipelines: bool,
+}
+
+impl RayTracing {
+    /// Either way.
+    pub fn any(self) -> bool {
+        self.queries || self.pipelines
+    }
 }
 
 /// What the engine needs of a physical device, checked against one.
@@ -26,7 +31,7 @@ pub struct Requirements {
     pub buffer_addresses: bool,
     /// Subgroup sizes can be required per pipeline.
     pub subgroup_size_control: bool,
-    /// Whether the device traces rays; a baseline uses that, nothing else does.
+    /// Whether and how the device traces rays.
     pub ray_tracing: RayTracing,
     /// Smallest, usual and largest subgroup size.
     pub subgroup_sizes: [u32; 3],
@@ -110,13 +115,8 @@ fn missing(offer: &Offer) -> Vec<String> {
 }
 
 impl Requirements {
-    /// The device traces rays from compute shaders.
-    pub fn ray_query(&self) -> bool {
-        self.ray_tracing == RayTracing::Queries
-    }
-
     /// Checks a physical device: Vulkan 1.2, a compute queue, subgroup basic, vote, arithmetic and ballot in compute, 256 invocations per
-    /// workgroup; buffer addresses and subgroup size control are preferred, ray queries optional.
+    /// workgroup; buffer addresses and subgroup size control are preferred, ray tracing optional.
     pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
@@ -152,8 +152,13 @@ impl Requirements {
             }
             instance.get_physical_device_features2(device, &mut features);
         }
-        let ray_extensions = [ash::khr::ray_query::NAME, ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
-        let ray_query = addresses.buffer_device_address != 0 && ray_extensions.iter().all(|e| has(e)) && can_query_rays(instance, device);
+        let for_structures = [ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
+        let can_trace = addresses.buffer_device_address != 0 && for_structures.iter().all(|e| has(e));
+        let listed_ways = RayTracing {
+            queries: can_trace && has(ash::khr::ray_query::NAME),
+            pipelines: can_trace && has(ash::khr::ray_tracing_pipeline::NAME),
+        };
+        let ray_tracing = traces_rays(instance, device, listed_ways);
         let subgroup_size_control = can_control && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
         let sizes = if can_control {
             [control.min_subgroup_size, subgroup.subgroup_size, control.max_subgroup_size]
@@ -161,19 +166,17 @@ impl Requirements {
             [subgroup.subgroup_size; 3]
         };
         let mut extensions: Vec<_> = [ash::ext::subgroup_size_control::NAME].into_iter().filter(|e| has(e)).collect();
-        if ray_query {
-            extensions.extend(ray_extensions);
+        if ray_tracing.any() {
+            extensions.extend(for_structures);
         }
+        extensions.extend(ray_tracing.queries.then_some(ash::khr::ray_query::NAME));
+        extensions.extend(ray_tracing.pipelines.then_some(ash::khr::ray_tracing_pipeline::NAME));
         Self {
             missing,
             extensions,
             buffer_addresses: addresses.buffer_device_address != 0,
             subgroup_size_control,
-            ray_tracing: match ray_query {
-                true => RayTracing::Queries,
-                false if has(ash::khr::ray_tracing_pipeline::NAME) => RayTracing::Pipelines,
-                false => RayTracing::None,
-            },
+            ray_tracing,
             subgroup_sizes: sizes,
             workgroup_subgroups: if subgroup_size_control && sizes[0] != sizes[2] {
                 control.max_compute_workgroup_subgroups
@@ -185,14 +188,25 @@ impl Requirements {
     }
 }
 
-/// Whether the features of the ray query extensions, which the device must list, are there.
-fn can_query_rays(instance: &ash::Instance, device: vk::PhysicalDevice) -> bool {
+/// Which of the ways of tracing rays, whose extensions the device lists, have their features.
+fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: RayTracing) -> RayTracing {
     let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
-    let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut structures).push_next(&mut queries);
-    // SAFETY: the handle is one of this instance; the structs live until the call returns.
+    let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
+    let mut features = vk::PhysicalDeviceFeatures2::default();
+    if listed.any() {
+        features = features.push_next(&mut structures);
+    }
+    if listed.queries {
+        features = features.push_next(&mut queries);
+    }
+    if listed.pipelines {
+        features = features.push_next(&mut pipelines);
+    }
+    // SAFETY: the handle is one of this instance; the structs live until the call returns, and are chained only where the extension exists.
     unsafe { instance.get_physical_device_features2(device, &mut features) };
-    structures.acceleration_structure != 0 && queries.ray_query != 0
+    let structures = structures.acceleration_structure != 0;
+    RayTracing { queries: structures && queries.ray_query != 0, pipelines: structures && pipelines.ray_tracing_pipeline != 0 }
 }
 
 impl DeviceReport {

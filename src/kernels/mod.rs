@@ -12,7 +12,7 @@ fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
 }
 
 mod generated {
-    #![allow(clippy::all, clippy::pedantic)]
+    #![allow(clippy::all, clippy::pedantic, unused_variables)]
     use super::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization, put};
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }

@@ -1,7 +1,7 @@
-//! The ray query baseline, where the device has ray queries: what it finds is right, and what it loses is counted.
+//! The ray tracing baseline, by ray queries and by ray-tracing pipelines where the device has them: what it finds is right, and what it loses is counted.
 #![allow(clippy::unwrap_used)]
 
-use olbvh::baseline::RayQuery;
+use olbvh::baseline::{RayMethod, Rays};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
@@ -10,19 +10,19 @@ use olbvh::query::{LocateOptions, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
-/// Whether the device has ray queries; says so loudly where not. The reference driver must have them.
-fn has_rays(gpu: &Gpu) -> bool {
-    let has = gpu.report().requirements.ray_query();
+/// Whether the device traces rays that way; says so loudly where not. The reference driver must.
+fn has_rays(gpu: &Gpu, method: RayMethod) -> bool {
+    let has = method.of(gpu);
     if !has {
-        println!("NOT RUN: {} has no ray queries", gpu.report().name);
+        println!("NOT RUN: {} traces no rays by {method:?}", gpu.report().name);
         let driver = std::env::var("OLBVH_TEST_DRIVER").unwrap_or_default();
-        assert!(!driver.starts_with("lavapipe25"), "{driver} is expected to have ray queries");
+        assert!(!driver.starts_with("lavapipe25"), "{driver} is expected to trace rays");
     }
     has
 }
 
-fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, points: &[[f32; 3]]) -> (RayQuery, Vec<u32>, Vec<[f32; 4]>) {
-    let rays = RayQuery::build(gpu, mesh).unwrap().unwrap();
+fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod, points: &[[f32; 3]]) -> (Rays, Vec<u32>, Vec<[f32; 4]>) {
+    let rays = Rays::build(gpu, mesh, method).unwrap().unwrap();
     let found = rays.locate(mesh, points).unwrap();
     (rays, found.owners, found.barycentrics)
 }
@@ -40,9 +40,9 @@ fn scaled(mut mesh: Mesh, by: [f32; 3]) -> (Mesh, Vec<[f32; 3]>) {
     (mesh, points)
 }
 
-fn what_rays_find_is_right(binding: Binding) {
+fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..Default::default() }).unwrap();
-    if !has_rays(&gpu) {
+    if !has_rays(&gpu, method) {
         return;
     }
     let meshes = [
@@ -58,7 +58,7 @@ fn what_rays_find_is_right(binding: Binding) {
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
         let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
         let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, &|_, _| {}).unwrap();
-        let (rays, owners, weights) = by_rays(&gpu, &device, &points);
+        let (rays, owners, weights) = by_rays(&gpu, &device, method, &points);
         let host = tree.download().unwrap();
         let topology = topology(&mesh).unwrap();
         let locator = Locator::new(&mesh, &topology, &host);
@@ -77,7 +77,7 @@ fn what_rays_find_is_right(binding: Binding) {
         }
         let structure = rays.structure();
         println!(
-            "{binding:?} {name}: {} faces, {} bytes ({} before compaction), lost {} of {inside} points and {} of {} vertices",
+            "{binding:?} {method:?} {name}: {} faces, {} bytes ({} before compaction), lost {} of {inside} points and {} of {} vertices",
             rays.faces(),
             structure.bytes(),
             structure.built_bytes(),
@@ -91,7 +91,7 @@ fn what_rays_find_is_right(binding: Binding) {
         assert_eq!(2 * rays.faces() as usize, 4 * mesh.tets.len() + surface);
         assert!(structure.bytes() <= structure.built_bytes() + 4096 && rays.bytes() > structure.bytes());
         let stages: Vec<&str> = rays.stages().iter().map(|s| s.name.as_str()).collect();
-        let faces = "ray_query.faces";
+        let faces = "rays.faces";
         assert_eq!(stages, [faces, faces, "acceleration.build", "acceleration.compact", "acceleration.scene"]);
     }
     let messages = gpu.validation_messages();
@@ -100,24 +100,28 @@ fn what_rays_find_is_right(binding: Binding) {
 
 #[test]
 fn what_rays_find_is_right_by_address() {
-    what_rays_find_is_right(Binding::Address);
+    what_rays_find_is_right(Binding::Address, RayMethod::Query);
 }
 
 #[test]
 fn what_rays_find_is_right_by_descriptors() {
-    what_rays_find_is_right(Binding::Descriptors);
+    what_rays_find_is_right(Binding::Descriptors, RayMethod::Query);
+}
+
+#[test]
+fn what_pipelines_find_is_right() {
+    what_rays_find_is_right(Binding::Address, RayMethod::Pipeline);
 }
 
 #[test]
 fn meshes_without_cells_have_no_owners() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
-    if !has_rays(&gpu) {
-        return;
-    }
-    for mesh in [Mesh::default(), Mesh::new(vec![[0.0; 3]; 4], vec![[0, 1, 1, 9]; 3])] {
-        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-        let (rays, owners, _) = by_rays(&gpu, &device, &[[0.0; 3], [0.5; 3]]);
-        assert_eq!((rays.faces(), owners), (0, vec![u32::MAX; 2]));
+    for method in RayMethod::ALL.into_iter().filter(|&method| has_rays(&gpu, method)) {
+        for mesh in [Mesh::default(), Mesh::new(vec![[0.0; 3]; 4], vec![[0, 1, 1, 9]; 3])] {
+            let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+            let (rays, owners, _) = by_rays(&gpu, &device, method, &[[0.0; 3], [0.5; 3]]);
+            assert_eq!((rays.faces(), owners), (0, vec![u32::MAX; 2]));
+        }
     }
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");

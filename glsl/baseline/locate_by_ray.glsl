@@ -1,11 +1,9 @@
-#version 460
-#extension GL_EXT_ray_query : require
-#include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Ray query baseline: the first face that a short ray from a point meets tells the tetrahedron around the point (Wald et al. 2019). The device's
+// Ray tracing baseline: the first face that a short ray from a point meets tells the tetrahedron around the point (Wald et al. 2019). The device's
 // intersections are not exact, so a tetrahedron is an answer only if it holds the point; a ray that slips past an edge loses its point.
+// The including shader traces the ray.
 ARGUMENTS(8)
     uvec2 scene; // address of the acceleration structure
     uint count;
@@ -24,8 +22,10 @@ BUFFER16(7, writeonly, vec4, barycentrics)
 const vec3 WAY = vec3(0.36, 0.48, 0.8); // unit, and in no plane of a regular grid
 const float SCALE = 9.094947017729282379150390625e-13; // 2^-40: the coordinates of the scene are in [0, 2)
 
-void main() {
-    uint i = item_index();
+// The first face on the way, or NONE, and whether its front is seen.
+uvec2 first_face(vec3 origin, float most);
+
+void locate(uint i) {
     if (i >= count) return;
     Grid g = grid.at[0];
     vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
@@ -33,14 +33,11 @@ void main() {
     vec4 b = vec4(0.0);
     if (near_bounds(g, at)) {
         vec3 x = normalise(g, at);
-        float most = uintBitsToFloat(longest.at[0]) * (1.0625 * SCALE);
-        rayQueryEXT query;
-        rayQueryInitializeEXT(query, accelerationStructureEXT(scene), gl_RayFlagsOpaqueEXT, 0xffu, x * SCALE, 0.0, WAY, most);
-        rayQueryProceedEXT(query); // opaque faces: once is enough
-        if (rayQueryGetIntersectionTypeEXT(query, true) == gl_RayQueryCommittedIntersectionTriangleEXT) {
-            uvec2 pair = sides.at[rayQueryGetIntersectionPrimitiveIndexEXT(query, true)];
+        uvec2 face = first_face(x * SCALE, uintBitsToFloat(longest.at[0]) * (1.0625 * SCALE));
+        if (face.x != NONE) {
+            uvec2 pair = sides.at[face.x];
             // Next to certain is the one that the ray left.
-            pair = rayQueryGetIntersectionFrontFaceEXT(query, true) ? pair.xy : pair.yx;
+            pair = face.y != 0u ? pair.xy : pair.yx;
             for (uint side = 0u; side < 2u && owner == NONE; ++side) {
                 if (pair[side] == NONE) continue;
                 Tet tet = load_tet(cells.at[pair[side]]);

@@ -1,23 +1,45 @@
-//! Point location by ray tracing hardware (or the driver's own tracing), where the device has `VK_KHR_ray_query`: an acceleration structure over
-//! the faces of a mesh, each with the tetrahedra on either side, and a short ray per point (Wald et al. 2019).
+//! Point location by ray tracing hardware (or the driver's own tracing), where the device has it: an acceleration structure over the faces of a mesh,
+//! each with the tetrahedra on either side, and a short ray per point (Wald et al. 2019), traced by ray queries or by a ray-tracing pipeline.
 //!
 //! It is **not watertight**: the device's intersections are rounded, so a ray may slip past an edge, or meet a face that is not the first. Every
 //! answer is verified and does hold its point; a point whose ray went wrong is lost. Points on faces get any of their cells.
 
 use crate::build::{DeviceMesh, MeshInput};
 use crate::error::Result;
-use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime, Triangles};
-use crate::kernels::{ListFaces, ListFacesSpec, LocateByRay, LocateByRaySpec};
+use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
+use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput};
 
 /// From normalised coordinates to those of the scene, [0, 2): safe for whatever the device multiplies.
 const SCALE: f32 = f32::from_bits((127 - 40) << 23);
 
+/// How rays are traced.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RayMethod {
+    /// From a compute shader, `VK_KHR_ray_query`.
+    Query,
+    /// By a pipeline of its own, `VK_KHR_ray_tracing_pipeline`.
+    Pipeline,
+}
+
+impl RayMethod {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Query, Self::Pipeline];
+
+    /// Whether the device has it.
+    pub fn of(self, gpu: &Gpu) -> bool {
+        let ways = gpu.report().requirements.ray_tracing;
+        if self == Self::Query { ways.queries } else { ways.pipelines }
+    }
+}
+
 /// An acceleration structure over the faces of a mesh.
 #[derive(Debug)]
-pub struct RayQuery {
+pub struct Rays {
     gpu: Gpu,
+    /// None: ray queries.
+    pipeline: Option<Box<RayPipeline>>,
     structure: AccelerationStructure,
     faces: u32,
     sides: Buffer,
@@ -26,46 +48,50 @@ pub struct RayQuery {
     _memory: Buffer,
 }
 
-impl RayQuery {
-    /// Lists the faces and builds the structure over them. `None` where the device has no ray queries.
+impl Rays {
+    /// Lists the faces and builds the structure over them. `None` where the device cannot trace rays that way.
     ///
     /// # Errors
     /// [`crate::Error::Memory`], [`crate::Error::TooLarge`] for more faces than the device's structures hold, or a failed Vulkan call.
-    pub fn build(gpu: &Gpu, mesh: &DeviceMesh) -> Result<Option<Self>> {
-        if !gpu.report().requirements.ray_query() {
+    pub fn build(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod) -> Result<Option<Self>> {
+        if !method.of(gpu) {
             return Ok(None);
         }
         let (input, arrays) = (mesh.input(), mesh.arrays());
         let MeshInput { cells, tets, points, .. } = *input;
         let vertices = arrays.vertices;
         let carve = |a: &mut Arena| Ok((a.words(u64::from(tets))?, a.words(1)?, ScanScratch::carve(gpu, a, tets)?));
-        let counts = gpu.buffer("olbvh.ray_query.counts", Arena::measure(carve)?)?;
+        let counts = gpu.buffer("olbvh.rays.counts", Arena::measure(carve)?)?;
         let (places, total, scan) = carve(&mut Arena::new(counts.all()))?;
-        let memory = gpu.buffer("olbvh.ray_query.longest", 4)?;
+        let memory = gpu.buffer("olbvh.rays.longest", 4)?;
         let longest = memory.all();
         let list = |r: &mut Recorder<'_>, fill: u32, indices: BufferRef, sides: BufferRef| {
             let workgroup = gpu.target().each;
             let (bad, neighbours) = (arrays.bad, arrays.neighbours);
             let arguments = ListFaces { vertices, cells, bad, neighbours, places, indices, sides, longest, tets };
             let spec = ListFacesSpec { workgroup, fill, ..Default::default() };
-            r.stage("ray_query.faces", |r| r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup))))
+            r.stage("rays.faces", |r| r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup))))
         };
-        let ((), time) = gpu.run("olbvh.ray_query.count", |r| {
+        let ((), time) = gpu.run("olbvh.rays.count", |r| {
             r.fill(longest, 0);
-            r.barrier("clear → ray_query.faces");
+            r.barrier("clear → rays.faces");
             list(r, 0, gpu.nothing(), gpu.nothing())?;
             cmd_exclusive_scan(r, places, places, total, Count::host(tets), &scan)
         })?;
         let mut stages = time.stages;
         let faces = gpu.download::<u32>(&counts, total.part(0, 4))?.first().copied().unwrap_or(0);
-        let indices = gpu.buffer("olbvh.ray_query.indices", 12 * u64::from(faces))?;
-        let sides = gpu.buffer("olbvh.ray_query.sides", 8 * u64::from(faces))?;
-        let ((), time) = gpu.run("olbvh.ray_query.list", |r| list(r, 1, indices.all(), sides.all()))?;
+        let indices = gpu.buffer("olbvh.rays.indices", 12 * u64::from(faces))?;
+        let sides = gpu.buffer("olbvh.rays.sides", 8 * u64::from(faces))?;
+        let ((), time) = gpu.run("olbvh.rays.list", |r| list(r, 1, indices.all(), sides.all()))?;
         stages.extend(time.stages);
         let triangles = Triangles { vertices, points, indices: indices.all(), count: faces, scale: SCALE };
         let structure = AccelerationStructure::build(gpu, &triangles)?;
         stages.extend_from_slice(structure.stages());
-        Ok(Some(Self { gpu: gpu.clone(), structure, faces, sides, longest, stages, _memory: memory }))
+        let pipeline = match method {
+            RayMethod::Query => None,
+            RayMethod::Pipeline => Some(Box::new(RayPipeline::new::<LocateByPipeline, FaceMissed, FaceHit>(gpu)?)),
+        };
+        Ok(Some(Self { gpu: gpu.clone(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
     }
 
     /// The acceleration structure.
@@ -89,27 +115,27 @@ impl RayQuery {
     }
 
     /// Records point location, without hints: a tetrahedron that holds the point, or all ones if the point is outside or lost. Reads mesh and points
-    /// in compute shaders, writes `output` in compute shaders; no barrier before or after.
+    /// in compute shaders, writes `output` in compute shaders, with no barrier before or after; with a ray-tracing pipeline there is one before, from
+    /// compute shaders and transfers, and one after, to these and the host.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if the pipeline cannot be made.
+    /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a ray-tracing pipeline launches rays.
     pub fn cmd_locate(&self, r: &mut Recorder<'_>, mesh: &DeviceMesh, input: &PointInput, output: &LocateOutput) -> Result<()> {
-        let workgroup = r.gpu().target().query;
-        let arguments = LocateByRay {
-            grid: mesh.arrays().grid,
-            sides: self.sides.all(),
-            longest: self.longest,
-            cells: mesh.input().cells,
-            vertices: mesh.arrays().vertices,
-            points: input.points,
-            owners: output.owners,
-            barycentrics: output.barycentrics,
-            scene: self.structure.address(),
-            count: input.count,
-            stride: input.stride,
-        };
-        let spec = LocateByRaySpec { workgroup, ..Default::default() };
-        r.stage("ray_query.locate", |r| r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup))))
+        let (grid, cells, vertices) = (mesh.arrays().grid, mesh.input().cells, mesh.arrays().vertices);
+        let (sides, longest, scene) = (self.sides.all(), self.longest, self.structure.address());
+        let PointInput { points, stride, count, .. } = *input;
+        let LocateOutput { owners, barycentrics } = *output;
+        r.stage("rays.locate", |r| {
+            if let Some(pipeline) = &self.pipeline {
+                let arguments =
+                    LocateByPipeline { grid, sides, longest, cells, vertices, points, owners, barycentrics, scene, count, stride };
+                return pipeline.record(r, &arguments, count);
+            }
+            let workgroup = r.gpu().target().query;
+            let arguments = LocateByQuery { grid, sides, longest, cells, vertices, points, owners, barycentrics, scene, count, stride };
+            let spec = LocateByQuerySpec { workgroup, ..Default::default() };
+            r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup)))
+        })
     }
 
     /// Locates points (relative to the mesh's origin): a tetrahedron that holds each, or all ones if it is outside or lost.
@@ -118,13 +144,13 @@ impl RayQuery {
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
         let n = points.len() as u64;
-        let uploaded = self.gpu.upload("olbvh.ray_query.points", points)?;
+        let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
-        let memory = self.gpu.buffer("olbvh.ray_query.located", Arena::measure(carve)?)?;
+        let memory = self.gpu.buffer("olbvh.rays.located", Arena::measure(carve)?)?;
         let (owners, barycentrics) = carve(&mut Arena::new(memory.all()))?;
         let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None };
         let output = LocateOutput { owners, barycentrics };
-        let ((), time) = self.gpu.run("olbvh.ray_query.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
+        let ((), time) = self.gpu.run("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
         Ok(Located {
             owners: self.gpu.download(&memory, owners.part(0, 4 * n))?,
             barycentrics: self.gpu.download(&memory, barycentrics.part(0, 16 * n))?,
