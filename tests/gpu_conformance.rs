@@ -1,8 +1,8 @@
 //! The conformance suite as tests, on both ways of binding buffers. A test is a family of cases (`address sort/21-bits`), so that runners which
 //! start a process per test do not open the device a thousand times; its message names every case that failed.
 //!
-//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address, and the quick ones by
-//! descriptors; other drivers, other widths of its subgroups and validation layers get those over a few meshes that between them record every kernel.
+//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address. Descriptors, other
+//! drivers, other widths of its subgroups and validation layers get the quick ones over a few meshes that between them record every kernel.
 //! SwiftShader compiles every kernel anew on every device that is opened, which takes longer than all cases over a mesh: there the meshes are one
 //! family.
 //! `OLBVH_TEST_GROUP` = `quick`, `full` or `large` says otherwise.
@@ -18,11 +18,11 @@ const BRIEF: [&str; 6] = ["no-cells", "one-tet", "bad-cells", "jitter-12x13x11",
 fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     let validation = env::var("OLBVH_TEST_VALIDATION").is_ok_and(|v| v == "1");
     let driver = env::var("OLBVH_TEST_DRIVER").unwrap_or_default();
-    let reference = !validation && (driver.is_empty() || driver == "lavapipe25-256");
+    let reference = binding == Binding::Address && !validation && (driver.is_empty() || driver == "lavapipe25-256");
     if let Ok(group) = env::var("OLBVH_TEST_GROUP") {
         return grouped(&group, |_| true);
     }
-    let group = if reference && binding == Binding::Address { "full" } else { "quick" };
+    let group = if reference { "full" } else { "quick" };
     let families = grouped(group, |case| reference || !case.is_over_a_mesh() || BRIEF.contains(&case.family()));
     if driver != "swiftshader" {
         return families;
