@@ -52,6 +52,7 @@ void main() {
     plan.width = width;
     plan.height = height;
     plan.layers = layers;
+    plan.listed = 0u;
     // 2 / scale: a half axis beyond is larger than twice the mesh, and need not be scaled.
     float most = uintBitsToFloat((255u << 23) - floatBitsToUint(g.scale));
     vec4 axes[3] = vec4[3](wide(half0), wide(half1), wide(half2)), normalised[3];

@@ -8,7 +8,7 @@
 #include "shared/separate.glsl"
 #include "shared/voxels.glsl"
 // Slicing (SPEC 3.4), second part: for voxels whose centre lies in no cell, the boundary primitive that touches the box and is closest to the
-// centre. Boundary leaves only, in Morton order; in the binary tree nodes above boundary primitives, in the order of places. Twin of src/reference/slice.rs.
+// centre; they have been listed. Boundary leaves only, in Morton order; in the binary tree nodes above boundary primitives, in the order of places. Twin of src/reference/slice.rs.
 #ifdef BINARY_TREE
 ARGUMENTS(7 + STRUCTURE_BUFFERS)
 #else
@@ -16,15 +16,13 @@ ARGUMENTS(8 + STRUCTURE_BUFFERS)
 #endif
     uint layer;
     uint first;  // number of the first row in that layer
-    uint voxels;
-    uint fresh;  // not 0: nothing has been done yet
     uint budget; // nodes and candidates per voxel and dispatch
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, cells)
 BUFFER16(2, readonly, vec4, vertices)
 BUFFER16(3, readonly, SlicePlan, plans)
-BUFFER16(4, READ_WRITE, TouchState, states)
+BUFFER(4, READ_WRITE, TouchState, states)
 BUFFER(5, READ_WRITE, uint, answers)
 BUFFER(6, READ_WRITE, SliceStatus, status)
 STRUCTURE(7)
@@ -118,25 +116,23 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
 void main() {
     uint i = item_index();
     uint unfinished = 0u;
-    // Only once all centres have been located.
-    bool waits = status.at[0].locating != 0u;
-    if (waits && i == 0u) unfinished = 1u;
-    if (waits && fresh != 0u && i < voxels) states.at[i] = TouchState(0u, 0u, NONE, 3.40282347e38);
-    if (!waits && i < voxels && answers.at[i] == SLICE_PENDING) {
-        SlicePlan plan = plans.at[0];
-        Grid g = grid.at[0];
-        uint row = i / plan.width;
-        uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
-        vec3 centre = voxel_centre(plan, i - row * plan.width, y, k);
-        state = TouchState(0u, 0u, NONE, 3.40282347e38);
-        if (fresh == 0u) state = states.at[i];
-        x = normalise(g, centre);
-        h = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
-        if (measure_all(g, centre, plan.reach.xyz)) {
-            answers.at[i] = state.owner == NONE ? NONE : state.owner | SLICE_TOUCHED;
-        } else {
-            states.at[i] = state;
-            unfinished = 1u;
+    SlicePlan plan = plans.at[0];
+    if (i < plan.listed) {
+        state = states.at[i];
+        uint voxel = state.voxel;
+        if (answers.at[voxel] == SLICE_LISTED) {
+            Grid g = grid.at[0];
+            uint row = voxel / plan.width;
+            uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
+            vec3 centre = voxel_centre(plan, voxel - row * plan.width, y, k);
+            x = normalise(g, centre);
+            h = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
+            if (measure_all(g, centre, plan.reach.xyz)) {
+                answers.at[voxel] = state.owner == NONE ? NONE : state.owner | SLICE_TOUCHED;
+            } else {
+                states.at[i] = state;
+                unfinished = 1u;
+            }
         }
     }
     unfinished = subgroupAdd(unfinished);

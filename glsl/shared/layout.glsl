@@ -106,6 +106,10 @@ struct SlicePlan {
     uint height; // Rows of a layer.
     uint layers; // Layers.
     uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
+    uint listed; // Voxels of the band whose centre lies in no cell.
+    uint pad0;   // Unused.
+    uint pad1;   // Unused.
+    uint pad2;   // Unused.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.
@@ -114,6 +118,7 @@ struct TouchState {
     uint entry;   // Entries of that leaf already seen.
     uint owner;   // Closest primitive so far, or all ones.
     float square; // Its squared distance.
+    uint voxel;   // Number of the voxel in the band.
 };
 
 // Where the location of a run of voxels stands between two dispatches.
@@ -131,7 +136,7 @@ struct RunState {
 // What has become of a slice.
 struct SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
-    uint touching; // Voxels whose boxes need another round; at least 1 as long as centres do.
+    uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
     uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
     uint inside;   // Voxels with their centre in the mesh; counted once all are done, as the next two.
     uint touched;  // Voxels that the mesh merely touches.

@@ -16,7 +16,7 @@ pub use visible::{cmd_visible, visible_bytes};
 pub use volume::{Drawn, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
-use crate::gpu::BufferRef;
+use crate::gpu::{BufferRef, Groups};
 
 /// A binary tree in device memory: what the LBVH baseline is to the queries.
 #[derive(Clone, Copy, Debug)]
@@ -44,14 +44,31 @@ impl From<&Tree> for Structure {
     }
 }
 
-/// Dispatches the kernel for the octree, with `extra` arguments and constants of its `kind`, or its twin for the binary tree, one invocation per item; both take the structure
-/// and the arguments that follow.
+/// How many invocations a kernel needs: as many as items, or the workgroups that the device knows.
+pub(crate) trait Items {
+    fn groups(self, workgroup: u32) -> Groups;
+}
+
+impl Items for u32 {
+    fn groups(self, workgroup: u32) -> Groups {
+        Groups::Count(self.div_ceil(workgroup))
+    }
+}
+
+impl Items for Groups {
+    fn groups(self, _: u32) -> Groups {
+        self
+    }
+}
+
+/// Dispatches the kernel for the octree, with `extra` arguments and constants of its `kind`, or its twin for the binary tree, one invocation per item;
+/// both take the structure and the arguments that follow.
 macro_rules! dispatch {
     ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
      { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
         let $crate::query::Searched { mesh, structure } = $searched;
         let workgroup = $r.gpu().target().query;
-        let groups = $crate::gpu::Groups::Count($items.div_ceil(workgroup));
+        let groups = $crate::query::Items::groups($items, workgroup);
         match *structure {
             $crate::query::Structure::Octree($crate::build::TreeMemory { grid, masks, co, po, p, flags, .. }) => {
                 let arguments = $octree { grid, masks, co, po, p, flags, $($extra,)* $($name: $value),* };

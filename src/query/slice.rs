@@ -2,8 +2,9 @@
 //!
 //! ```text
 //! plan      the voxels as the kernels need them, over bounds that the device knows
-//! locate    centres, in runs along the rows                                           a round: locate, touch
-//! touch     boxes of the voxels whose centre lies in no cell
+//! locate    centres, in runs along the rows                                           a round: locate, collect, touch
+//! collect   the voxels whose centre lies in no cell
+//! touch     their boxes
 //! values    voxels by kind, values of a field
 //! ```
 
@@ -14,14 +15,15 @@ use super::{Rounds, Searched, dispatch};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
-    LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceLocate, SliceLocateSpec, SlicePlan as PlanKernel,
-    SlicePlanSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec,
+    LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceCollect, SliceCollectSpec, SliceLocate, SliceLocateSpec,
+    SlicePlan as PlanKernel, SlicePlanSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec,
 };
 use crate::layout::{RunState, SlicePlan, SliceStatus, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
-use crate::primitives::Arena;
+use crate::primitives::{Arena, Count};
 use crate::slicing::{Extrapolate, RUN, Rows, VoxelGrid, WALK};
+use std::mem::offset_of;
 
 /// Candidates that a run of voxels may test in one dispatch.
 const LOCATE_BUDGET: u32 = 4096;
@@ -48,7 +50,7 @@ impl SliceInput<'_> {
     }
 }
 
-/// Answers and scratch memory of some rows of voxels: 28 bytes per voxel.
+/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceMemory {
     /// Per voxel, row by row: the owner, plus 2^31 if the voxel is merely touched; all ones: empty.
@@ -60,6 +62,7 @@ pub struct SliceMemory {
     plan: BufferRef,
     runs: BufferRef,
     touches: BufferRef,
+    groups: BufferRef,
 }
 
 impl SliceMemory {
@@ -79,6 +82,7 @@ impl SliceMemory {
             plan: arena.take(size_of::<SlicePlan>() as u64)?,
             runs: arena.take(size_of::<RunState>() as u64 * rows * width.div_ceil(u64::from(RUN)))?,
             touches: arena.take(size_of::<TouchState>() as u64 * width * rows)?,
+            groups: arena.words(3)?,
         })
     }
 }
@@ -114,9 +118,9 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
         r.fill(memory.status, 0);
         r.barrier("slice.clear → slice.locate");
         cmd_locate_voxels(r, searched, memory, input, fresh)?;
-        r.barrier("slice.locate → slice.touch");
-        // Does nothing as long as centres wait to be located.
-        cmd_touch_voxels(r, searched, memory, input, fresh)?;
+        r.barrier("slice.locate → slice.collect");
+        // Nothing is listed as long as centres wait to be located.
+        cmd_touch_voxels(r, searched, memory, input)?;
         r.barrier("slice.touch → next");
     }
     cmd_values(r, searched, memory, input)
@@ -152,21 +156,27 @@ fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMe
     })
 }
 
-fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>, begins: u32) -> Result<()> {
+fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let boundary = arrays.boundary;
+    let (boundary, voxels) = (arrays.boundary, part.count());
+    let workgroup = r.gpu().target().query;
     r.stage("query.slice_touch", |r| {
-        dispatch!(r, part.count(), searched, SliceTouch SliceTouchSpec { boundary } {}, LbvhSliceTouch LbvhSliceTouchSpec, {
+        let SliceMemory { answers, status, plan: plans, touches: states, .. } = *memory;
+        let collect = SliceCollect { answers, status, plans, states, voxels };
+        let spec = SliceCollectSpec { workgroup, ..Default::default() };
+        r.dispatch(&collect, spec, Groups::Count(voxels.div_ceil(32).div_ceil(workgroup)))?;
+        r.barrier("slice.collect → slice.arguments");
+        let listed = Count::device(voxels, plans.part(offset_of!(SlicePlan, listed) as u64, 16));
+        let groups = listed.groups(r, workgroup, memory.groups, "slice.arguments → slice.touch")?;
+        dispatch!(r, groups, searched, SliceTouch SliceTouchSpec { boundary } {}, LbvhSliceTouch LbvhSliceTouchSpec, {
             cells: input.cells,
             vertices: arrays.vertices,
-            plans: memory.plan,
-            states: memory.touches,
-            answers: memory.answers,
-            status: memory.status,
+            plans: plans,
+            states: states,
+            answers: answers,
+            status: status,
             layer: part.rows.layer,
             first: part.rows.first,
-            voxels: part.count(),
-            fresh: begins,
             budget: TOUCH_BUDGET,
         }, {})
     })

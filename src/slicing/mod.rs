@@ -125,6 +125,7 @@ impl VoxelGrid {
             height: self.size[1],
             layers: self.layers,
             refused: if large { 2 } else { u32::from(flat) },
+            ..SlicePlan::default()
         }
     }
 
