@@ -1,4 +1,4 @@
-//! Slices and overlaps recorded behind a build, of a mesh that moves: what the owning forms and the reference find, in one command buffer.
+//! Slices, pictures and overlaps recorded behind a build, of a mesh that moves: what the owning forms and the reference find, in one command buffer.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,18 +9,20 @@ use host::Frame;
 use host::queries::Queries;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
-use olbvh::layout::{OverlapStatus, SliceStatus};
+use olbvh::layout::{Grid, OverlapStatus, RenderPlan, RenderStatus, RenderView, SliceStatus};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    PairMemory, Party, Rounds, Scene, Searched, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs, cmd_slice, overlap, slice,
+    PairMemory, Party, RenderInput, RenderMemory, Rounds, Scene, Searched, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs,
+    cmd_render, cmd_slice, overlap, render, slice,
 };
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{Side, overlap as reference};
 use olbvh::reference::slice::Slicer;
+use olbvh::render::{Bounds, Plan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
 
 /// Pairs that the frames have room for.
@@ -73,6 +75,23 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
     status
 }
 
+/// The picture is that of the owning form, and its plan that of the host; how many samples were found, and skipped.
+fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], device: &DeviceMesh, tree: &Tree, grid: &Grid) -> [u64; 2] {
+    let (plan, picture) = (&queries.plan, &queries.picture);
+    let owned = render(device, tree, plan, (values, On::Points), Some(&queries.normals), &|_, _| {}).unwrap();
+    let found: Vec<[f32; 4]> = read(gpu, queries, picture.colors, owned.colors.len());
+    assert!(found == owned.colors, "colours of the recorded and the owning form");
+    let status: RenderStatus = read(gpu, queries, picture.status, 1)[0];
+    let low = [status.samples, status.found, status.skipped].map(|[low, high]| u64::from(low) | u64::from(high) << 32);
+    assert_eq!((low, status.unfinished), ([owned.samples, owned.found_samples, owned.skipped_samples], 0));
+    let at = size_of::<RenderView>() as u64;
+    let made: RenderPlan = read(gpu, queries, picture.frame.part(at, size_of::<RenderPlan>() as u64), 1)[0];
+    let [x, y, z] = interval_slack(grid);
+    assert_eq!((made.slack, made.size), ([x, y, z, 0.0], plan.size));
+    assert_eq!(read::<RenderView>(gpu, queries, picture.frame, 1)[0], plan.view());
+    [low[1], low[2]]
+}
+
 /// All owners of the mesh's points, or as many of them as there was room for; how many there are.
 fn compare_owners(gpu: &Gpu, queries: &Queries, locator: &Locator<'_>, points: &[[f32; 3]]) -> usize {
     let expected: Vec<Vec<u32>> = points.iter().map(|&p| locator.owners(p)).collect();
@@ -98,7 +117,7 @@ fn frames(binding: Binding) {
     let frame = Frame::new(&gpu, &mesh);
     let queries = Queries::new(&gpu, &frame, &values, &other, ROOM as u64);
     let (other_topology, other_tree) = (topology(&other).unwrap(), queries.other_tree.download().unwrap());
-    let (mut listed, mut touched, mut met, mut cut) = (0, 0, 0, 0);
+    let (mut listed, mut touched, mut met, mut cut, mut drawn) = (0, 0, 0, 0, [0; 2]);
     for i in 0..6 {
         let shown = moved(&mesh, i);
         let staging = gpu.upload("olbvh.test.staging", &shown.points).unwrap();
@@ -118,6 +137,8 @@ fn frames(binding: Binding) {
         let slicer = Slicer::new(&shown, &topology, &host, Some(&field), queries.voxels, Extrapolate::Nearest).unwrap();
         listed += compare_owners(&gpu, &queries, &Locator::new(&shown, &topology, &host), &shown.points);
         touched += compare_slice(&gpu, &queries, &slicer, &values, &device, &tree).touched;
+        let seen = compare_picture(&gpu, &queries, &values, &device, &tree, &host.grid);
+        drawn = [drawn[0] + seen[0], drawn[1] + seen[1]];
 
         let (a, b) =
             (Side { mesh: &shown, topology: &topology, tree: &host }, Side { mesh: &other, topology: &other_topology, tree: &other_tree });
@@ -140,6 +161,7 @@ fn frames(binding: Binding) {
         cut += usize::from(pairs.len() > ROOM);
     }
     assert!(listed > 1000 && touched > 1000 && met > 1000 && cut > 0 && cut < 6, "{touched} {met} {cut}");
+    assert!(drawn.iter().all(|&samples| samples > 500), "{drawn:?}");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
@@ -199,6 +221,8 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
     assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
 
+    picture_goes_on(&gpu, &searched);
+
     let scene = Scene::new(&device, &tree);
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
@@ -224,6 +248,46 @@ fn rounds_go_on_where_they_ended() {
         gpu.run("olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::resume(2))).unwrap();
     }
     assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
+}
+
+/// A picture in several recordings is that of one.
+fn picture_goes_on(gpu: &Gpu, searched: &Searched) {
+    let settings = RenderSettings { size: [4, 3], step: Some(0.2), ..RenderSettings::default() };
+    let plan = Plan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();
+    let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
+    let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
+    let field = gpu.upload("olbvh.test.field", &vec![0.9f32; searched.mesh.input.points as usize]).unwrap();
+    let field = (field.all(), On::Points);
+    let input = RenderInput { size: [4, 3], view: view.all(), table: table.all(), field, normals: None, shown: None };
+    let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
+    let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
+    let memory = carve(&mut Arena::new(buffer.all())).unwrap();
+    let draw = |rounds: Rounds| {
+        gpu.run("olbvh.test.round", |r| cmd_render(r, searched, &input, &memory, rounds)).unwrap();
+        let colors: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 12 * 16)).unwrap();
+        (colors, RenderStatus { pad: 0, ..gpu.download::<RenderStatus>(&buffer, memory.status).unwrap()[0] })
+    };
+    let (colors, status) = draw(Rounds::begin(0));
+    assert_eq!((colors, status), (vec![[0.0; 4]; 12], RenderStatus { unfinished: 12, ..Default::default() }));
+    let (mut rounds, mut last) = (0, 12);
+    let (colors, status) = loop {
+        let drawn = draw(Rounds::resume(1));
+        rounds += 1;
+        assert!(drawn.1.unfinished <= last);
+        last = drawn.1.unfinished;
+        if last == 0 {
+            break drawn;
+        }
+    };
+    assert!(rounds > 2 || searched.mesh.input.tets < 1000, "{rounds}");
+    assert!(status.found[0] > 0 && colors.iter().any(|c| c[3] > 0.0));
+    assert!(draw(Rounds::begin(rounds)) == (colors.clone(), status), "all rounds in one recording");
+    assert!(draw(Rounds::begin(rounds + 1)) == (colors, status), "a round more");
+    if rounds > 1 {
+        assert!(draw(Rounds::begin(rounds - 1)).1.unfinished > 0, "a round less");
+    }
+    let more = gpu.run("olbvh.test.round", |r| cmd_render(r, searched, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
+    assert!(more.unwrap_err().to_string().contains("4×4 pixels"));
 }
 
 /// What a recording cannot know beforehand is told by the status: boxes too large for the mesh, and a mesh of nothing.

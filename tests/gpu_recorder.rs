@@ -104,7 +104,7 @@ fn queries() {
     let frame = Frame::new(&gpu, &mesh);
     gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
     let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 100);
-    let barriers = every_barrier_counts(&gpu, "slice, sets, pairs", |r| {
+    let barriers = every_barrier_counts(&gpu, "slice, picture, sets, pairs", |r| {
         queries.record(r)?;
         r.barrier("queries → caller");
         let (slice, sets) = (&queries.slice, &queries.sets);
@@ -120,12 +120,14 @@ fn queries() {
                 sets.status[1],
                 queries.found,
                 queries.owner_lists,
+                queries.picture.colors,
+                queries.picture.status,
             ],
             &sink,
         );
         Ok(())
     });
-    assert!(barriers >= 40, "{barriers}");
+    assert!(barriers >= 70, "{barriers}");
 }
 
 #[test]

@@ -5,22 +5,25 @@
 #include "shared/structure.glsl"
 #include "shared/node.glsl"
 #include "shared/boxes.glsl"
+#include "shared/frame.glsl"
 #include "shared/rays.glsl"
 // Ray intervals (SPEC 3.3): from the first to the last boundary leaf that a ray meets, or in the binary tree the box of a boundary primitive.
 // Where values are transparent the marks of visible nodes stand in for the boundary flags.
 // Twin of src/reference/volume/interval.rs.
 layout(constant_id = 2) const uint STACK = 8;
-ARGUMENTS(5 + STRUCTURE_BUFFERS)
+ARGUMENTS(6 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, cells)    // for the binary tree
 BUFFER16(2, readonly, vec4, vertices)  // for the binary tree
-BUFFER16(3, readonly, RenderPlan, plans)
+BUFFER16(3, readonly, Frame, frames)
 BUFFER16(4, writeonly, RayState, states)
-STRUCTURE(5)
+BUFFER16(5, writeonly, vec4, colors)
+STRUCTURE(6)
 
 Grid g;
+RenderView view;
 RenderPlan plan;
 vec3 origin, inverse_way;
 float first, last;
@@ -103,13 +106,15 @@ bool visit_all() { return traverse(g.level); }
 void main() {
     uint i = item_index();
     if (i >= items) return;
-    plan = plans.at[0];
+    view = frames.at[0].view;
+    plan = frames.at[0].plan;
     uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
-    RayState state = RayState(vec4(0.0), 0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, 0u, 0u);
+    RayState state = RayState(0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, 0u, 0u);
     if (pixel_of(i, size, pixel)) {
+        colors.at[pixel.y * size.x + pixel.x] = vec4(0.0);
         g = grid.at[0];
         vec3 way;
-        make_ray(plan, pixel, origin, way);
+        make_ray(view, pixel, origin, way);
         inverse_way = inverse_of(way);
         first = 3.40282347e38;
         last = -1.0;
@@ -118,8 +123,8 @@ void main() {
         // Too many nodes to visit: all of the bounds, which holds every leaf.
         if (!visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
         if (first <= last) {
-            precise float begin = floor(max(first * plan.inverse_step - 1.5, 0.0));
-            precise float end = floor(max(last * plan.inverse_step + 1.5, 0.0));
+            precise float begin = floor(max(first * view.inverse_step - 1.5, 0.0));
+            precise float end = floor(max(last * view.inverse_step + 1.5, 0.0));
             state.next = uint(begin);
             state.end = uint(end);
         }

@@ -3,6 +3,7 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/structure.glsl"
+#include "shared/frame.glsl"
 #include "shared/rays.glsl"
 // Marching (SPEC 3.3): samples (k + 1/2)·Δ from the ray's origin, front to back, until the ray is opaque or a dispatch's share of work is done.
 // With SKIP the tree is asked for stretches without anything to see as soon as a sample adds nothing. Twin of src/reference/volume/march.rs.
@@ -18,16 +19,18 @@ BUFFER16(2, readonly, vec4, vertices)
 BUFFER16(3, readonly, uvec4, neighbours)
 BUFFER(4, readonly, float, field)
 BUFFER(5, readonly, float, normals) // three per vertex
-BUFFER16(6, readonly, RenderPlan, plans)
-BUFFER16(7, readonly, vec4, table)
-BUFFER16(8, READ_WRITE, RayState, states)
+BUFFER16(6, readonly, Frame, frames)
+BUFFER16(7, READ_WRITE, RayState, states)
+BUFFER16(8, READ_WRITE, vec4, colors) // premultiplied colour and opacity, row by row
 BUFFER(9, READ_WRITE, RenderStatus, status)
 STRUCTURE(10)
 #include "shared/structure_owner.glsl"
+
+RenderView view;
+RenderPlan plan;
 #include "shared/skip.glsl"
 
 const uint WALK = 6u; // steps of a walk across faces before the structure is asked
-const uint TABLE = 1024u;
 
 // The current tetrahedron and what its samples need.
 uint cell;
@@ -48,31 +51,31 @@ void enter(uint t) {
 }
 
 // Colour, and opacity of one step, at a value.
-vec4 lookup(RenderPlan plan, float value) {
-    precise float x = clamp((value - plan.value_lo) * plan.value_scale, 0.0, 1.0) * float(TABLE - 1u);
+vec4 lookup(float value) {
+    precise float x = clamp((value - view.value_lo) * view.value_scale, 0.0, 1.0) * float(TABLE - 1u);
     uint i = min(uint(x), TABLE - 2u);
     precise float t = x - float(i);
-    vec4 a = table.at[i], b = table.at[i + 1u];
+    vec4 a = frames.at[0].table[i], b = frames.at[0].table[i + 1u];
     precise vec4 r = a + (b - a) * t;
     return r;
 }
 
 // Light on a sample: factor and added white of its colour, added opacity. Twin of `Lighting::shade`.
-vec3 shade(RenderPlan plan, vec3 n, vec3 way, vec3 halfway) {
+vec3 shade(vec3 n, vec3 way, vec3 halfway) {
     float square = dot_product(n, n);
     if (square < 1e-8) return vec3(1.0, 0.0, 0.0);
     float r = inverse_sqrt(square);
     precise float m = min(square * r, 1.0);
-    precise float c = abs(dot_product(n, plan.to_light.xyz)) * r;
+    precise float c = abs(dot_product(n, view.to_light.xyz)) * r;
     precise float g = 1.0 - min(abs(dot_product(n, way)) * r, 1.0);
     precise float h = min(abs(dot_product(n, halfway)) * r, 1.0);
     for (int i = 0; i < 5; ++i) {
         precise float hh = h * h;
         h = hh;
     }
-    precise float factor = 1.0 + m * ((plan.strength.x + plan.strength.y * c) - 1.0);
-    precise float added = m * (plan.strength.z * h);
-    precise float rim = m * ((g * g) * (g * g) * plan.strength.w);
+    precise float factor = 1.0 + m * ((view.strength.x + view.strength.y * c) - 1.0);
+    precise float added = m * (view.strength.z * h);
+    precise float rim = m * ((g * g) * (g * g) * view.strength.w);
     return vec3(factor, added, rim);
 }
 
@@ -80,16 +83,19 @@ void main() {
     uint i = item_index();
     uint samples = 0u, found = 0u, skipped = 0u, unfinished = 0u;
     if (i < items && states.at[i].next < states.at[i].end) {
-        RenderPlan plan = plans.at[0];
+        view = frames.at[0].view;
+        plan = frames.at[0].plan;
         Grid g = grid.at[0];
         RayState state = states.at[i];
         uvec2 pixel;
         pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
+        uint place = pixel.y * plan.size[0] + pixel.x;
+        vec4 sum = colors.at[place];
         vec3 origin, way;
-        make_ray(plan, pixel, origin, way);
+        make_ray(view, pixel, origin, way);
         vec3 halfway = vec3(0.0);
         if (SHADING != 0u) {
-            precise vec3 h = plan.to_light.xyz - way;
+            precise vec3 h = view.to_light.xyz - way;
             float square = max(dot_product(h, h), 1e-12);
             precise vec3 unit = h * inverse_sqrt(square);
             halfway = unit;
@@ -102,7 +108,7 @@ void main() {
 #ifndef BINARY_TREE
             if (SKIP != 0u && state.next >= state.check) {
                 bool hidden;
-                uint behind = stretch_end(plan, g, origin, way, inverse_way, state.next, state.end, hidden);
+                uint behind = stretch_end(g, origin, way, inverse_way, state.next, state.end, hidden);
                 if (!hidden) {
                     state.check = behind;
                 } else {
@@ -113,7 +119,7 @@ void main() {
                 }
             }
 #endif
-            vec3 at = sample_at(plan, origin, way, state.next);
+            vec3 at = sample_at(view, origin, way, state.next);
             vec3 x = normalise(g, at);
             Weights w;
             bool inside = false;
@@ -154,21 +160,21 @@ void main() {
             precise float value = (b.x * cell_values.x + b.y * cell_values.y) + (b.z * cell_values.z + b.w * cell_values.w);
             if (ON_CELLS != 0u) value = cell_values.x;
             if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) continue;
-            vec4 color = lookup(plan, value);
+            vec4 color = lookup(value);
             if (color.w <= 0.0) continue;
             if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
             if (SHADING != 0u) {
                 precise vec3 n = (b.x * cell_normals[0] + b.y * cell_normals[1]) + (b.z * cell_normals[2] + b.w * cell_normals[3]);
-                vec3 lit = shade(plan, n, way, halfway);
+                vec3 lit = shade(n, way, halfway);
                 precise vec3 c = color.xyz * lit.x + lit.y;
                 color.xyz = min(c, vec3(1.0));
                 precise float a = color.w + (1.0 - color.w) * lit.z;
                 color.w = a;
             }
-            precise float share = (1.0 - state.color.w) * color.w;
-            precise vec4 sum = state.color + share * vec4(color.xyz, 1.0);
-            state.color = sum;
-            if (sum.w >= plan.termination) {
+            precise float share = (1.0 - sum.w) * color.w;
+            precise vec4 more = sum + share * vec4(color.xyz, 1.0);
+            sum = more;
+            if (sum.w >= view.termination) {
                 state.end = state.next;
                 break;
             }
@@ -176,6 +182,7 @@ void main() {
         state.hint = in_cell ? cell : NONE;
         unfinished = uint(state.next < state.end);
         states.at[i] = state;
+        colors.at[place] = sum;
     }
     samples = subgroupAdd(samples);
     found = subgroupAdd(found);

@@ -41,29 +41,34 @@ struct BuildStatus {
     uint overflow;         // Not 0: a capacity was exceeded; never happens with a planned one.
 };
 
-// What a picture needs besides mesh, tree and field; see src/render.
-struct RenderPlan {
+// What is seen and how, besides mesh, tree and field; see src/render.
+struct RenderView {
     vec4 origin;     // Origin of the ray of pixel (0, 0).
     vec4 origin_x;   // What one pixel to the right adds to it.
     vec4 origin_y;   // What one pixel down adds to it.
     vec4 way;        // Direction of the ray of pixel (0, 0), of any length.
     vec4 way_x;      // What one pixel to the right adds to it.
     vec4 way_y;      // What one pixel down adds to it.
-    vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
     vec4 to_light;   // Unit vector to the light.
     vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
-    uint size[2];    // Width and height in pixels.
     float step_size; // Distance of two samples.
     float inverse_step; // Its reciprocal, rounded on the host.
     float value_lo;  // Value at place 0 of the table.
     float value_scale; // Places per unit of value.
     float termination; // A ray ends once it is this opaque.
+    uint pad[3];     // Unused.
+};
+
+// What is worked out of a view on the device.
+struct RenderPlan {
+    vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
+    uint size[2];    // Width and height in pixels.
     uint visible_at; // Words of the flags before the marks of visible nodes, where there are any.
+    uint pad;        // Unused.
 };
 
 // Where the march of a ray stands between two dispatches.
 struct RayState {
-    vec4 color;     // Gathered colour, premultiplied, and opacity.
     uint next;      // Number of the next sample.
     uint end;       // One past the last sample.
     uint hint;      // Cell of the last sample found, or all ones.
@@ -74,13 +79,13 @@ struct RayState {
     uint check;     // From this sample on the tree is asked whether there is anything to see.
 };
 
-// Counters of a picture, 64 bits each, low word first.
+// Counters of a picture; 64 bits as two words, low first.
 struct RenderStatus {
     uint samples[2]; // Samples taken.
     uint found[2];   // Samples in the mesh.
-    uint unfinished; // Rays that need another dispatch.
-    uint pad;        // Unused.
     uint skipped[2]; // Samples not taken, in nodes where nothing is to be seen.
+    uint unfinished; // Rays that need another round.
+    uint pad;        // Unused.
 };
 
 // A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31

@@ -1,4 +1,4 @@
-// Rays of a picture. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs.
+// Rays of a picture. Needs layout.glsl and tet.glsl. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs.
 
 // 1 / sqrt(x) of a normal x by correctly rounded operations only.
 float inverse_sqrt(float x) {
@@ -13,10 +13,10 @@ float inverse_sqrt(float x) {
     return r;
 }
 
-void make_ray(RenderPlan plan, uvec2 pixel, out vec3 origin, out vec3 direction) {
+void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction) {
     vec2 at = vec2(pixel);
-    precise vec3 o = (plan.origin.xyz + at.x * plan.origin_x.xyz) + at.y * plan.origin_y.xyz;
-    precise vec3 w = (plan.way.xyz + at.x * plan.way_x.xyz) + at.y * plan.way_y.xyz;
+    precise vec3 o = (view.origin.xyz + at.x * view.origin_x.xyz) + at.y * view.origin_y.xyz;
+    precise vec3 w = (view.way.xyz + at.x * view.way_x.xyz) + at.y * view.way_y.xyz;
     float r = inverse_sqrt(dot_product(w, w));
     precise vec3 d = w * r;
     origin = o;
@@ -36,8 +36,8 @@ vec3 inverse_of(vec3 way) {
 }
 
 // Where a sample lies.
-vec3 sample_at(RenderPlan plan, vec3 origin, vec3 way, uint k) {
-    precise float t = (float(k) + 0.5) * plan.step_size;
+vec3 sample_at(RenderView view, vec3 origin, vec3 way, uint k) {
+    precise float t = (float(k) + 0.5) * view.step_size;
     precise vec3 at = origin + way * t;
     return at;
 }

@@ -1,26 +1,26 @@
-// Stretches of a ray where nothing is to be seen. Twin of src/reference/volume/skip.rs. Needs tree.glsl, rays.glsl, and behind the boundary flags, from word
-// `visible_at` of the plan on, the marks of visible nodes.
+// Stretches of a ray where nothing is to be seen. Twin of src/reference/volume/skip.rs. Needs tree.glsl, rays.glsl, a `view` and a `plan`, and behind the
+// boundary flags, from word `visible_at` of the plan on, the marks of visible nodes.
 #ifdef BINARY_TREE
 const uint SKIP = 0u;
 #else
 layout(constant_id = 5) const uint SKIP = 0;
 #include "shared/boxes.glsl"
 
-bool is_visible_node(RenderPlan plan, uint node) { return (flags.at[plan.visible_at + (node >> 5u)] >> (node & 31u) & 1u) != 0u; }
+bool is_visible_node(uint node) { return (flags.at[plan.visible_at + (node >> 5u)] >> (node & 31u) & 1u) != 0u; }
 
 // The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf.
 // Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a node lies in it.
-uint stretch_end(RenderPlan plan, Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, out bool hidden) {
-    uvec3 finest = quantize(g, sample_at(plan, origin, way, k));
+uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, out bool hidden) {
+    uvec3 finest = quantize(g, sample_at(view, origin, way, k));
     uint code = morton(finest), node = 0u, level = 0u;
-    hidden = !is_visible_node(plan, node);
+    hidden = !is_visible_node(node);
     while (!hidden && level < g.level) {
         ++level;
         uint digit = code >> (3u * (MAX_LEVEL - level)) & 7u, mask = child_mask(node);
         hidden = (mask >> digit & 1u) == 0u;
         if (hidden) break;
         node = child_of(node, mask, digit);
-        hidden = !is_visible_node(plan, node);
+        hidden = !is_visible_node(node);
     }
     uint shift = MAX_LEVEL - level;
     uvec3 cell = finest >> shift;
@@ -30,10 +30,10 @@ uint stretch_end(RenderPlan plan, Grid g, vec3 origin, vec3 way, vec3 inverse_wa
         precise float t = (cell_side(g, c, level, cell[c] + uint(inverse_way[c] > 0.0)) - origin[c]) * inverse_way[c];
         leave = min(leave, t);
     }
-    precise float number = floor(leave * plan.inverse_step - 0.5);
+    precise float number = floor(leave * view.inverse_step - 0.5);
     uint last = uint(clamp(number, float(k), float(end - 1u)));
     for (uint i = 0u; i < 2u && last > k; ++i) {
-        if (quantize(g, sample_at(plan, origin, way, last)) >> shift == cell) return last + 1u;
+        if (quantize(g, sample_at(view, origin, way, last)) >> shift == cell) return last + 1u;
         --last;
     }
     return k + 1u;

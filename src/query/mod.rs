@@ -13,7 +13,7 @@ pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub use visible::{cmd_visible, visible_bytes};
-pub use volume::{Drawn, render};
+pub use volume::{Drawn, RenderInput, RenderMemory, Shown, cmd_render, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::gpu::{BufferRef, Groups};

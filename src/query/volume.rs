@@ -1,98 +1,198 @@
-//! Direct volume rendering (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of bounded work.
+//! Direct volume rendering on the device (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of bounded work.
+//!
+//! ```text
+//! visible     nodes that have something to see, where the host wants the others skipped
+//! plan        view and transfer function as the kernels need them, over bounds that the device knows
+//! intervals   the first and the last sample of each ray
+//! march       samples, front to back                                                              a round
+//! ```
 
-use super::{Searched, Structure, cmd_visible, dispatch, visible_bytes};
-use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
+mod picture;
+pub use picture::{Drawn, render};
+
+use super::{Rounds, Searched, Structure, cmd_visible, dispatch, visible_bytes};
+use crate::build::Capacity;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Recorder};
+use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
+    VolumePlan, VolumePlanSpec,
 };
-use crate::layout::{Grid, RayState, RenderPlan, RenderStatus};
+use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::render::Plan;
+use crate::render::TABLE_SIZE;
+use std::mem::offset_of;
 
 /// Candidates that a ray may test in one dispatch.
 const BUDGET: u32 = 1024;
 /// Nodes on the short stack of the traversal.
 const STACK: u32 = 8;
+/// A picture is drawn in blocks of so many pixels along a side.
+const BLOCK: u32 = 8;
 
-/// Memory of one picture on the device.
+/// What is drawn. All parts are the host's, begin at multiples of [`crate::gpu::ALIGNMENT`], and are read by the device, so new contents need no new recording.
 #[derive(Clone, Copy, Debug)]
-struct Canvas {
-    plan: BufferRef,
-    table: BufferRef,
+pub struct RenderInput {
+    /// Width and height in pixels.
+    pub size: [u32; 2],
+    /// [`RenderView`]: rays, light, step, range of values, as [`crate::render::Plan::view`] makes it.
+    pub view: BufferRef,
+    /// The transfer function, [`TABLE_SIZE`] times four floats, as [`crate::render::Plan::table`] has it.
+    pub table: BufferRef,
+    /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
+    pub field: (BufferRef, On),
+    /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes them; without normals nothing is lit.
+    pub normals: Option<BufferRef>,
+    /// What need not be looked at; `None`: every sample in the mesh is taken. The picture is the same. A binary tree skips nothing.
+    pub shown: Option<Shown>,
+}
+
+/// Values that are to be seen: nodes of an octree without any are skipped.
+#[derive(Clone, Copy, Debug)]
+pub struct Shown {
+    /// The field's values in every node, as [`crate::build::cmd_ranges`] records them.
+    pub ranges: BufferRef,
+    /// Ranges outside of which the transfer function is transparent, two floats each, ascending and apart, as [`crate::render::Plan::drawn`] has them.
+    pub drawn: BufferRef,
+    /// How many there are. `[∞, ∞]` shows nothing, so a host whose transfer function changes fills up with it.
+    pub count: u32,
+}
+
+/// The picture, and scratch memory: 48 bytes per pixel and two bits per node.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderMemory {
+    /// Per pixel, row 0 on top, four floats: premultiplied colour and opacity.
+    pub colors: BufferRef,
+    /// [`RenderStatus`]: samples, and whether any rays are left to do.
+    pub status: BufferRef,
+    /// [`RenderView`], [`RenderPlan`], and the transfer function.
+    pub frame: BufferRef,
     states: BufferRef,
-    status: BufferRef,
-    items: u32,
-    /// Nodes without anything to see are skipped.
-    skip: bool,
+    visible: Option<Visible>,
 }
 
-impl Canvas {
-    /// Rays of a picture in whole blocks of 8 × 8.
-    fn items(size: [u32; 2]) -> Result<u32> {
-        let items = u64::from(size[0].div_ceil(8)) * u64::from(size[1].div_ceil(8)) * 64;
-        let items = u32::try_from(items).ok().filter(|&n| n < 1 << 31);
-        items.ok_or_else(|| Error::TooLarge(format!("a picture of {}×{} pixels; draw it in parts", size[0], size[1])))
+/// The boundary flags of a tree, and behind them the marks of its visible nodes.
+#[derive(Clone, Copy, Debug)]
+struct Visible {
+    flags: BufferRef,
+    marks: BufferRef,
+}
+
+impl Visible {
+    fn all(&self) -> BufferRef {
+        let Self { flags, marks } = *self;
+        BufferRef { size: marks.offset + marks.size - flags.offset, ..flags }
     }
 }
 
-/// What the kernels need of a plan.
-fn kernel_plan(plan: &Plan, grid: &Grid, visible_at: u32) -> RenderPlan {
-    let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-    let lighting = plan.lighting.unwrap_or(crate::render::Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
-    let (slack, inverse_step) = crate::render::interval_slack(grid, plan);
-    RenderPlan {
-        origin: pad(plan.rays.origin),
-        origin_x: pad(plan.rays.origin_x),
-        origin_y: pad(plan.rays.origin_y),
-        way: pad(plan.rays.way),
-        way_x: pad(plan.rays.way_x),
-        way_y: pad(plan.rays.way_y),
-        slack: pad(slack),
-        to_light: pad(lighting.to_light),
-        strength: [lighting.strength[0], lighting.strength[1], lighting.strength[2], lighting.rim],
-        size: plan.size,
-        step_size: plan.step,
-        inverse_step,
-        value_lo: plan.value_lo,
-        value_scale: plan.value_scale,
-        termination: plan.termination,
-        visible_at,
+impl RenderMemory {
+    /// For pictures of up to this width and height. `skipping`: the capacity of the tree whose nodes may be skipped.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the arena is too small, [`Error::TooLarge`] for 2^31 pixels and more.
+    pub fn carve(arena: &mut Arena, size: [u32; 2], skipping: Option<&Capacity>) -> Result<Self> {
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
+        let rays = u64::from(rays(size)?);
+        let bits = skipping.map(|capacity| visible_bytes(capacity.nodes));
+        Ok(Self {
+            colors: arena.take(16 * pixels)?,
+            status: arena.take(size_of::<RenderStatus>() as u64)?,
+            frame: arena.take((size_of::<RenderView>() + size_of::<RenderPlan>() + 16 * TABLE_SIZE) as u64)?,
+            states: arena.take(size_of::<RayState>() as u64 * rays)?,
+            visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
+        })
     }
 }
 
-/// What a drawn picture holds.
-#[derive(Clone, Debug, Default)]
-pub struct Drawn {
-    /// Premultiplied colour and opacity, row 0 on top.
-    pub colors: Vec<[f32; 4]>,
-    /// Samples taken.
-    pub samples: u64,
-    /// Samples within the intervals that were not taken: their nodes have nothing to see.
-    pub skipped_samples: u64,
-    /// Samples taken that lie in the mesh.
-    pub found_samples: u64,
-    /// Device time of the field's ranges and of the marks of visible nodes, where values are transparent.
-    pub ranges_ms: f64,
-    /// Device time of the ray intervals.
-    pub interval_ms: f64,
-    /// Device time of the march.
-    pub march_ms: f64,
-    /// Submissions that the march took.
-    pub submissions: u32,
+/// Rays of a picture, in whole blocks.
+fn rays([width, height]: [u32; 2]) -> Result<u32> {
+    let rays = u64::from(width.div_ceil(BLOCK)) * u64::from(height.div_ceil(BLOCK)) * u64::from(BLOCK * BLOCK);
+    let rays = u32::try_from(rays).ok().filter(|&n| n < 1 << 31);
+    rays.ok_or_else(|| Error::TooLarge(format!("a picture of {width}×{height} pixels; draw it in parts")))
 }
 
-fn cmd_intervals(r: &mut Recorder<'_>, searched: &Searched, canvas: &Canvas) -> Result<()> {
+/// Records the drawing of a picture. Nothing is submitted, waited for, allocated or read back.
+///
+/// A round takes so many samples of each ray and no more (1,024, fewer where lists are searched); what is finished is passed over. After the recorded
+/// rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture holds what has been gathered so far. Recorded again with
+/// [`Rounds::resume`] (same input, same memory) it goes on. No round from the beginning merely prepares, and leaves all rays unfinished.
+///
+/// Entry: mesh, structure and input are read by compute shaders, of a structure whose nodes are skipped the flags by transfers as well. First use of
+/// `memory`: transfer and compute writes; of memory that is resumed, a transfer write of the status, and compute reads and writes. Last use: compute
+/// reads and writes; no barrier before or after, so a host puts one from compute shader writes to whatever reads colours and status, and before it resumes
+/// one to transfers and compute shaders.
+///
+/// # Errors
+/// [`Error::Invalid`] for memory of fewer pixels, or without room for what is to be skipped; [`Error::TooLarge`] as [`RenderMemory::carve`].
+pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memory: &RenderMemory, rounds: Rounds) -> Result<()> {
+    let [width, height] = input.size;
+    let rays = rays(input.size)?;
+    if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.states.size
+    {
+        return Err(Error::Invalid(format!("a picture of {width}×{height} pixels in memory of fewer")));
+    }
+    let visible = visible(searched, input, memory)?;
+    let unfinished = memory.status.part(offset_of!(RenderStatus, unfinished) as u64, 4);
+    if !rounds.resume {
+        r.fill(memory.status.part(0, offset_of!(RenderStatus, unfinished) as u64), 0);
+        r.fill(unfinished, width * height);
+        cmd_plan(r, searched, input, memory, visible)?;
+        r.barrier("render.plan → render.intervals");
+        cmd_intervals(r, searched, rays, memory, visible)?;
+    }
+    for round in 0..rounds.count {
+        if round > 0 {
+            r.barrier("render.march → render.clear");
+        }
+        r.fill(unfinished, 0);
+        r.barrier("render.clear → render.march");
+        cmd_march(r, searched, rays, input, memory, visible)?;
+    }
+    Ok(())
+}
+
+/// Where the marks of the nodes lie that are not skipped, if any are.
+fn visible(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
+    let (Some(_), Structure::Octree(tree)) = (input.shown, searched.structure) else { return Ok(None) };
+    let bits = visible_bytes(tree.capacity.nodes);
+    match memory.visible {
+        Some(visible) if bits <= visible.marks.size => Ok(Some(visible)),
+        _ => Err(Error::Invalid(format!("nodes are to be skipped in memory without room for {} of them", tree.capacity.nodes))),
+    }
+}
+
+/// The view as the kernels need it, and which nodes are to be seen.
+fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memory: &RenderMemory, visible: Option<Visible>) -> Result<()> {
+    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.shown, &searched.structure) {
+        let bits = visible_bytes(tree.capacity.nodes);
+        r.copy(tree.flags.part(0, bits), flags);
+        cmd_visible(r, tree, shown.ranges, (shown.drawn, shown.count), marks)?;
+    }
+    let arguments = VolumePlan {
+        grid: searched.mesh.arrays.grid,
+        views: input.view,
+        table: input.table,
+        frames: memory.frame,
+        width: input.size[0],
+        height: input.size[1],
+        visible_at: visible.map_or(0, |v| ((v.marks.offset - v.flags.offset) / 4) as u32),
+    };
+    let workgroup = r.gpu().target().each;
+    r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, Groups::Count((TABLE_SIZE as u32).div_ceil(workgroup)))
+}
+
+fn cmd_intervals(r: &mut Recorder<'_>, searched: &Searched, rays: u32, memory: &RenderMemory, visible: Option<Visible>) -> Result<()> {
+    let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
     let (input, arrays, stack) = (&searched.mesh.input, &searched.mesh.arrays, STACK);
     r.stage("query.intervals", |r| {
-        dispatch!(r, canvas.items, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
+        dispatch!(r, rays, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
             cells: input.cells,
             vertices: arrays.vertices,
-            plans: canvas.plan,
-            states: canvas.states,
-            items: canvas.items,
+            frames: memory.frame,
+            states: memory.states,
+            colors: memory.colors,
+            items: rays,
         }, { stack })
     })
 }
@@ -100,133 +200,28 @@ fn cmd_intervals(r: &mut Recorder<'_>, searched: &Searched, canvas: &Canvas) -> 
 fn cmd_march(
     r: &mut Recorder<'_>,
     searched: &Searched,
-    canvas: &Canvas,
-    field: BufferRef,
-    on: On,
-    normals: Option<BufferRef>,
+    rays: u32,
+    input: &RenderInput,
+    memory: &RenderMemory,
+    visible: Option<Visible>,
 ) -> Result<()> {
-    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let (shading, on_cells, lists) = (u32::from(normals.is_some()), u32::from(on == On::Cells), searched.lists());
-    let (skip, normals) = (u32::from(canvas.skip), normals.unwrap_or_else(|| r.gpu().nothing()));
+    let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.all()));
+    let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
+    let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
+    let (skip, normals) = (u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
     r.stage("query.march", |r| {
-        dispatch!(r, canvas.items, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
-            cells: input.cells,
+        dispatch!(r, rays, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
+            cells: mesh.cells,
             vertices: arrays.vertices,
             neighbours: arrays.neighbours,
             field: field,
             normals: normals,
-            plans: canvas.plan,
-            table: canvas.table,
-            states: canvas.states,
-            status: canvas.status,
-            items: canvas.items,
+            frames: memory.frame,
+            states: memory.states,
+            colors: memory.colors,
+            status: memory.status,
+            items: rays,
             budget: BUDGET,
         }, { shading, on_cells })
     })
-}
-
-/// Which nodes of an octree have something to see, where the plan hides some values.
-struct Visible {
-    /// The boundary flags, and behind them the marks of the visible nodes.
-    flags: BufferRef,
-    marks: BufferRef,
-    milliseconds: f64,
-    _memory: Buffer,
-}
-
-impl Visible {
-    fn new(gpu: &Gpu, searched: &Searched, plan: &Plan, field: (BufferRef, On)) -> Result<Option<Self>> {
-        let Structure::Octree(tree) = searched.structure else { return Ok(None) };
-        let nodes = tree.capacity.nodes;
-        let bits = visible_bytes(nodes);
-        let drawn = gpu.upload("olbvh.query.drawn", &plan.drawn)?;
-        let carve = |a: &mut Arena| Ok((a.take(bits)?, a.take(bits)?, a.take(range_bytes(nodes))?));
-        let memory = gpu.buffer("olbvh.query.visible", Arena::measure(carve)?)?;
-        let (flags, marks, ranges) = carve(&mut Arena::new(memory.all()))?;
-        let ((), time) = gpu.run("olbvh.query.visible", |r| {
-            r.copy(tree.flags.part(0, bits), flags.part(0, bits));
-            cmd_ranges(r, &searched.mesh, &tree, field, ranges)?;
-            cmd_visible(r, &tree, ranges, (drawn.all(), plan.drawn.len() as u32), marks)
-        })?;
-        let milliseconds = time.milliseconds("build.ranges") + time.milliseconds("query.visible");
-        let flags = memory.all().part(flags.offset, marks.offset + bits - flags.offset);
-        Ok(Some(Self { flags, marks, milliseconds, _memory: memory }))
-    }
-
-    /// Where the marks begin, in words of the flags.
-    fn at(&self) -> u32 {
-        ((self.marks.offset - self.flags.offset) / 4) as u32
-    }
-}
-
-/// Draws a plan of a field (values per point or per tetrahedron); `normals`: one per point, for shading. `report` is told how many rays
-/// are done.
-///
-/// # Errors
-/// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field or normals have the wrong length.
-pub fn render(
-    mesh: &DeviceMesh,
-    structure: impl Into<Structure>,
-    plan: &Plan,
-    (values, on): (&[f32], On),
-    normals: Option<&[[f32; 3]]>,
-    report: &dyn Fn(u64, u64),
-) -> Result<Drawn> {
-    let gpu = mesh.gpu();
-    let searched = Searched::new(mesh, structure);
-    let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-    if values.len() != expected as usize || normals.is_some_and(|n| n.len() != mesh.input().points as usize) {
-        return Err(Error::Invalid(format!(
-            "a field of {} values where the mesh has {expected}, or normals for another mesh",
-            values.len()
-        )));
-    }
-    let field = gpu.upload("olbvh.query.field", values)?;
-    let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
-    let table = gpu.upload("olbvh.query.table", &plan.table)?;
-    let visible = if plan.hides(values) { Visible::new(gpu, &searched, plan, (field.all(), on))? } else { None };
-    let (for_intervals, for_march) = match &visible {
-        Some(visible) => (searched.with_flags(visible.marks), searched.with_flags(visible.flags)),
-        None => (searched, searched),
-    };
-    let visible_at = visible.as_ref().map_or(0, Visible::at);
-    let kernel_plan = gpu.upload("olbvh.query.plan", &[kernel_plan(plan, mesh.grid(), visible_at)])?;
-    let items = Canvas::items(plan.size)?;
-    let carve = |a: &mut Arena| Ok((a.take(size_of::<RayState>() as u64 * u64::from(items))?, a.take(size_of::<RenderStatus>() as u64)?));
-    let memory = gpu.buffer("olbvh.query.canvas", Arena::measure(carve)?)?;
-    let (states, status) = carve(&mut Arena::new(memory.all()))?;
-    let canvas = Canvas { plan: kernel_plan.all(), table: table.all(), states, status, items, skip: visible.is_some() };
-    let ((), time) = gpu.run("olbvh.query.intervals", |r| {
-        r.fill(canvas.status, 0);
-        cmd_intervals(r, &for_intervals, &canvas)
-    })?;
-    let ranges_ms = visible.as_ref().map_or(0.0, |visible| visible.milliseconds);
-    let mut drawn = Drawn { ranges_ms, interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
-    let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
-    loop {
-        let ((), time) = gpu.run("olbvh.query.march", |r| {
-            r.fill(canvas.status.part(16, 4), 0);
-            r.barrier("march.clear → march");
-            cmd_march(r, &for_march, &canvas, field.all(), on, normals.as_ref().map(Buffer::all))
-        })?;
-        drawn.march_ms += time.milliseconds("query.march");
-        drawn.submissions += 1;
-        let status = gpu.download::<RenderStatus>(&memory, canvas.status.part(0, size_of::<RenderStatus>() as u64))?;
-        let status = status.first().copied().unwrap_or_default();
-        report(rays.saturating_sub(u64::from(status.unfinished)), rays);
-        if status.unfinished == 0 {
-            let wide = |w: [u32; 2]| u64::from(w[0]) | u64::from(w[1]) << 32;
-            (drawn.samples, drawn.skipped_samples, drawn.found_samples) = (wide(status.samples), wide(status.skipped), wide(status.found));
-            break;
-        }
-    }
-    let states: Vec<RayState> = gpu.download(&memory, canvas.states)?;
-    let across = plan.size[0].div_ceil(8);
-    let state_of = |x: u32, y: u32| {
-        let (dx, dy) = (x % 8, y % 8);
-        let spread = |v: u32| (v & 1) | (v & 2) << 1 | (v & 4) << 2;
-        &states[((y / 8 * across + x / 8) * 64 + (spread(dx) | spread(dy) << 1)) as usize]
-    };
-    drawn.colors = (0..plan.size[1]).flat_map(|y| (0..plan.size[0]).map(move |x| (x, y))).map(|(x, y)| state_of(x, y).color).collect();
-    Ok(drawn)
 }

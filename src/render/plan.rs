@@ -4,8 +4,9 @@ use super::drawn::drawn_values;
 use super::settings::DEFAULT_STEPS;
 use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, shading_normals};
 use crate::error::{Error, Result};
-use crate::layout::Grid;
+use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
+use crate::reference::grid::canonical;
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.
@@ -98,6 +99,29 @@ impl Plan {
         !everything && values.iter().copied().any(is_hidden)
     }
 
+    /// What the kernels need of it besides the table.
+    pub fn view(&self) -> RenderView {
+        let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
+        let Lighting { to_light, strength: [ambient, diffuse, specular], rim } =
+            self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
+        RenderView {
+            origin: wide(self.rays.origin),
+            origin_x: wide(self.rays.origin_x),
+            origin_y: wide(self.rays.origin_y),
+            way: wide(self.rays.way),
+            way_x: wide(self.rays.way_x),
+            way_y: wide(self.rays.way_y),
+            to_light: wide(to_light),
+            strength: [ambient, diffuse, specular, rim],
+            step_size: self.step,
+            inverse_step: self.inverse_step(),
+            value_lo: self.value_lo,
+            value_scale: self.value_scale,
+            termination: self.termination,
+            pad: [0; 3],
+        }
+    }
+
     /// The reciprocal of the step.
     pub fn inverse_step(&self) -> f32 {
         1.0 / self.step
@@ -121,13 +145,12 @@ impl Plan {
 }
 
 /// How much larger than its cell the box of a node is when rays are tested against it, so that rounding of samples, boxes and rays loses
-/// nothing; and the reciprocal of the step. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is four of its last bits.
-pub fn interval_slack(grid: &Grid, plan: &Plan) -> ([f32; 3], f32) {
+/// nothing. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is four of its last bits. Twin of `glsl/query/volume_plan`.
+pub fn interval_slack(grid: &Grid) -> [f32; 3] {
     let (lo, hi) = (grid.lo, grid.hi);
-    let largest = (0..3).map(|c| hi[c] - lo[c]).fold(0.0, f32::max);
+    let largest = (0..3).map(|c| canonical(hi[c] - lo[c])).fold(0.0, f32::max);
     let power = |n: u32| f32::from_bits((127 - n) << 23);
-    let slack = [0, 1, 2].map(|c| largest * power(18) + (lo[c].abs() + hi[c].abs()) * power(21));
-    (slack, plan.inverse_step())
+    [0, 1, 2].map(|c| canonical(largest * power(18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * power(21)))
 }
 
 /// A plan and the normals that its light needs.

@@ -1,15 +1,17 @@
-//! All owners, slicing, and overlap with a second mesh, recorded behind a [`Frame`].
+//! All owners, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
 
 use super::Frame;
-use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
+use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
 use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    LocateOptions, OverlapMemory, OwnersMemory, PairMemory, PointInput, Rounds, Scene, Searched, SliceInput, SliceMemory, Structure,
-    cmd_count_owners, cmd_count_pairs, cmd_list_owners, cmd_list_pairs, cmd_overlap, cmd_slice,
+    LocateOptions, OverlapMemory, OwnersMemory, PairMemory, PointInput, RenderInput, RenderMemory, Rounds, Scene, Searched, Shown,
+    SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_list_owners, cmd_list_pairs, cmd_overlap, cmd_render,
+    cmd_slice,
 };
+use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 
 /// Memory of the queries of a frame, and what they ask.
@@ -25,8 +27,14 @@ pub struct Queries {
     pub sets: OverlapMemory,
     pub pairs: PairMemory,
     pub found: BufferRef,
+    pub plan: Plan,
+    pub normals: Vec<[f32; 3]>,
+    pub picture: RenderMemory,
     pub memory: Buffer,
     field: Buffer,
+    ranges: BufferRef,
+    /// View, transfer function, values that it shows, normals.
+    drawn: [Buffer; 4],
     scene: Scene,
 }
 
@@ -48,18 +56,49 @@ impl Queries {
             layers: 9,
         };
         let rows = Rows { layer: 0, first: 0, count: 29 * 9 };
+        let plan = plan(values);
+        let normals = vec![[0.6, 0.0, 0.7]; values.len()];
         let carve = |a: &mut Arena| {
             let slice = SliceMemory::carve(a, 37, rows.count)?;
             let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
-            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?))
+            let picture = RenderMemory::carve(a, plan.size, Some(&frame.capacity))?;
+            let ranges = a.take(range_bytes(frame.capacity.nodes))?;
+            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, ranges))
         };
         let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
-        let (slice, sets, pairs, found, owners, owner_lists) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (slice, sets, pairs, found, owners, owner_lists, picture, ranges) = carve(&mut Arena::new(memory.all())).unwrap();
         let field = gpu.upload("olbvh.test.field", values).unwrap();
         let points = frame.points;
-        Self { points, owners, owner_lists, voxels, rows, slice, other, other_tree, sets, pairs, found, memory, field, scene }
+        let drawn = [
+            gpu.upload("olbvh.test.view", &[plan.view()]).unwrap(),
+            gpu.upload("olbvh.test.table", &plan.table).unwrap(),
+            // One more than there are, which shows nothing.
+            gpu.upload("olbvh.test.drawn", &[&plan.drawn[..], &[[f32::INFINITY; 2]]].concat()).unwrap(),
+            gpu.upload("olbvh.test.normals", &normals).unwrap(),
+        ];
+        Self {
+            points,
+            owners,
+            owner_lists,
+            voxels,
+            rows,
+            slice,
+            other,
+            other_tree,
+            sets,
+            pairs,
+            found,
+            plan,
+            normals,
+            picture,
+            memory,
+            field,
+            ranges,
+            drawn,
+            scene,
+        }
     }
 
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
@@ -69,9 +108,23 @@ impl Queries {
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };
         cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
+        let field = (self.field.all(), On::Points);
+        cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
+        let [view, table, drawn, normals] = self.drawn.each_ref().map(Buffer::all);
+        let shown = Some(Shown { ranges: self.ranges, drawn, count: self.plan.drawn.len() as u32 + 1 });
+        let input = RenderInput { size: self.plan.size, view, table, field, normals: Some(normals), shown };
+        cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
         let other = Scene::new(&self.other, &self.other_tree);
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;
         cmd_count_pairs(r, &self.scene, &other, &self.pairs, Rounds::begin(8))?;
         cmd_list_pairs(r, &self.scene, &other, &self.pairs, self.found, Rounds::begin(8))
     }
+}
+
+/// A small picture of values in the middle of their range, seen from beyond where the meshes move to.
+fn plan(values: &[f32]) -> Plan {
+    let transfer = TransferFunction::default().with_opacity(vec![(0.0, 0.0), (0.4, 0.0), (0.5, 0.3), (0.6, 0.0), (1.0, 0.0)]).unwrap();
+    let settings = RenderSettings { size: [37, 30], transfer, ..RenderSettings::default() };
+    let range = values.iter().fold([f32::MAX, f32::MIN], |[lo, hi], &v| [lo.min(v), hi.max(v)]);
+    Plan::new(&settings, &Bounds { lo: [-8.0; 3], hi: [10.0; 3] }, [0.0; 3], Some(range)).unwrap()
 }

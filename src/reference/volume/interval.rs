@@ -22,7 +22,7 @@ type Node = (u32, u32, u32);
 impl<'a> Intervals<'a> {
     /// Prepares the rays of `plan`. `visible`: which nodes have something to see.
     pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &Plan) -> Self {
-        let (slack, inverse_step) = interval_slack(&tree.grid, plan);
+        let (slack, inverse_step) = (interval_slack(&tree.grid), plan.inverse_step());
         Self { tree, nodes: visible.unwrap_or(&tree.boundary), inverse_step, slack }
     }
 

@@ -1,0 +1,38 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/frame.glsl"
+// Volume rendering (SPEC 3.3), before all: the host's view and transfer function, and what follows for bounds that only the device knows.
+// Twin of `interval_slack` in src/render/plan.rs.
+ARGUMENTS(4)
+    uint width;
+    uint height;
+    uint visible_at;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, RenderView, views)
+BUFFER16(2, readonly, vec4, table)
+BUFFER16(3, writeonly, Frame, frames)
+
+void main() {
+    uint i = item_index();
+    if (i < TABLE) frames.at[0].table[i] = table.at[i];
+    if (i > 0u) return;
+    frames.at[0].view = views.at[0];
+    vec3 lo = grid.at[0].lo.xyz, hi = grid.at[0].hi.xyz;
+    float largest = 0.0;
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float extent = hi[c] - lo[c];
+        largest = max(largest, canonical(extent));
+    }
+    RenderPlan plan = RenderPlan(vec4(0.0), uint[2](width, height), visible_at, 0u);
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float of_bounds = largest * two_to(-18);
+        precise float far = abs(lo[c]) + abs(hi[c]);
+        precise float of_place = canonical(far) * two_to(-21);
+        precise float slack = canonical(of_bounds) + canonical(of_place);
+        plan.slack[c] = slack;
+    }
+    frames.at[0].plan = plan;
+}
