@@ -77,7 +77,7 @@ pub fn render(
         }
         cmd_render(r, &searched, &input, &memory, Rounds::begin(0))
     })?;
-    let ranges_ms = time.milliseconds("build.ranges") + time.milliseconds("query.visible");
+    let ranges_ms = skipped.map_or(0.0, |_| time.milliseconds("build.ranges") + time.milliseconds("query.visible"));
     let mut drawn = Drawn { ranges_ms, interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
     let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
     let status = loop {
