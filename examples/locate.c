@@ -12,6 +12,33 @@ static void check(olbvh_status status, const char *what) {
     exit(1);
 }
 
+/* What a renderer does before its first frame: asks how much memory it has to lend, and rehearses what it will record into its command buffers, so that
+ * nothing is made then. A rehearsal never touches the buffers. A frame is the same with a VkCommandBuffer; `olbvh_gpu_from_host` takes its VkDevice. */
+static void rehearse(uint32_t points, uint32_t tets) {
+    olbvh_gpu *gpu = NULL;
+    olbvh_scene *scene = NULL;
+    olbvh_recording *recording = NULL;
+    check(olbvh_gpu_open(NULL, &gpu), "opening a device");
+    olbvh_plan plan = {.points = points, .stride = 3, .tets = tets, .level = 7, .build = olbvh_default_build_options()};
+    olbvh_plan_sizes sizes;
+    check(olbvh_plan_measure(gpu, &plan, &sizes), "measuring");
+    fprintf(stderr, "%llu bytes for mesh and tree, %llu while building\n", (unsigned long long)sizes.memory, (unsigned long long)sizes.scratch);
+    olbvh_buffer positions = {.buffer = 1, .size = 12ull * points}, cells = {.buffer = 2, .size = 16ull * tets};
+    olbvh_buffer memory = {.buffer = 3, .size = sizes.memory}, scratch = {.buffer = 4, .size = sizes.scratch};
+    check(olbvh_scene_place(gpu, &plan, positions, cells, memory, scratch, &scene), "placing");
+    olbvh_location location = {.points = positions, .stride = 3, .count = points, .tolerance = -1.0f};
+    location.owners = (olbvh_buffer){.buffer = 5, .size = 4ull * points};
+    location.barycentrics = (olbvh_buffer){.buffer = 6, .size = 16ull * points};
+    check(olbvh_recording_new(gpu, &recording), "making a recording");
+    check(olbvh_recording_begin(recording, 0, 0, 0), "beginning a rehearsal");
+    check(olbvh_cmd_build(recording, scene), "recording the tree");
+    check(olbvh_cmd_locate(recording, scene, &location), "recording location");
+    check(olbvh_recording_end(recording), "rehearsing");
+    olbvh_recording_free(recording);
+    olbvh_scene_free(scene);
+    olbvh_gpu_free(gpu);
+}
+
 int main(int argc, char **argv) {
     /* The corners of each unit cell along the six paths from its lower to its upper corner. */
     static const int paths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
@@ -57,6 +84,7 @@ int main(int argc, char **argv) {
     if (olbvh_locate(NULL, place, points, -1.0f, owners, NULL) != OLBVH_STATUS_INVALID) return 1;
     fprintf(stderr, "as it should be: %s\n", olbvh_last_error());
     olbvh_tree_free(tree);
+    rehearse((uint32_t)points, (uint32_t)tets);
     free(place), free(cells), free(owners);
     return 0;
 }

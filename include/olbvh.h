@@ -55,6 +55,16 @@ typedef struct olbvh_gpu olbvh_gpu;
 typedef struct olbvh_mesh olbvh_mesh;
 
 /*
+ Commands being recorded, and the descriptor sets they use: one per frame in flight.
+ */
+typedef struct olbvh_recording olbvh_recording;
+
+/*
+ A mesh and its tree in memory of the host's.
+ */
+typedef struct olbvh_scene olbvh_scene;
+
+/*
  A tree over a mesh.
  */
 typedef struct olbvh_tree olbvh_tree;
@@ -169,6 +179,146 @@ typedef struct olbvh_host_device {
   uint32_t debug_utils;
 } olbvh_host_device;
 
+/*
+ What is known of a mesh and its tree before there is memory for them.
+ */
+typedef struct olbvh_plan {
+  /*
+   Points.
+   */
+  uint32_t points;
+  /*
+   32-bit floats from one point to the next, at least 3.
+   */
+  uint32_t stride;
+  /*
+   Tetrahedra.
+   */
+  uint32_t tets;
+  /*
+   Deepest level that the leaves may have, up to 10.
+   */
+  uint32_t level;
+  /*
+   At least the entries of the longest leaf, 0: any number. Location takes a dispatch for every 16,384 of them.
+   */
+  uint32_t longest_leaf;
+  /*
+   How to build. Without a capacity there is room for 24 entries per tetrahedron, or for what the budget allows.
+   */
+  struct olbvh_build_options build;
+} olbvh_plan;
+
+/*
+ What memory a plan wants.
+ */
+typedef struct olbvh_plan_sizes {
+  /*
+   Bytes of mesh and tree, kept as long as the tree is asked.
+   */
+  uint64_t memory;
+  /*
+   Bytes in use while building only; frames in flight on one queue can share them.
+   */
+  uint64_t scratch;
+  /*
+   Offsets of parts are multiples of this.
+   */
+  uint64_t alignment;
+  /*
+   `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
+   */
+  uint32_t usage;
+} olbvh_plan_sizes;
+
+/*
+ A part of a buffer of the host's.
+ */
+typedef struct olbvh_buffer {
+  /*
+   `VkBuffer`.
+   */
+  uint64_t buffer;
+  /*
+   Bytes from its start.
+   */
+  uint64_t offset;
+  /*
+   Bytes.
+   */
+  uint64_t size;
+  /*
+   Device address of the first byte of the part; 0 where buffer addresses are not enabled.
+   */
+  uint64_t address;
+} olbvh_buffer;
+
+/*
+ Where the arrays of a scene are: what olbvh.glsl gets.
+ */
+typedef struct olbvh_scene_arrays_data {
+  /*
+   The content of the buffer whose address `olbvh_open` gets. By descriptors that buffer is the first of the bindings.
+   */
+  uint32_t addresses[22];
+  /*
+   The buffers of the other bindings, in order.
+   */
+  struct olbvh_buffer bindings[10];
+  /*
+   What was built, in words: level of the leaves, level that was asked for, candidates, entries, nodes, internal nodes, leaves, …
+   */
+  struct olbvh_buffer status;
+} olbvh_scene_arrays_data;
+
+/*
+ A stage that was timed.
+ */
+typedef struct olbvh_stage {
+  /*
+   Such as "build.levels".
+   */
+  char name[64];
+  /*
+   Query with the time of its begin.
+   */
+  uint32_t begin;
+  /*
+   Query with the time of its end.
+   */
+  uint32_t end;
+} olbvh_stage;
+
+/*
+ Points to locate, and where the answers go.
+ */
+typedef struct olbvh_location {
+  /*
+   32-bit floats, three of each point.
+   */
+  struct olbvh_buffer points;
+  /*
+   Floats from one point to the next, at least 3.
+   */
+  uint32_t stride;
+  /*
+   Points.
+   */
+  uint32_t count;
+  /*
+   As `olbvh_locate` takes it.
+   */
+  float tolerance;
+  /*
+   A word per point: its owner, or 0xffffffff.
+   */
+  struct olbvh_buffer owners;
+  /*
+   Four floats per point, in the order of the cell's vertices; zeroes without an owner.
+   */
+  struct olbvh_buffer barycentrics;
+} olbvh_location;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -246,6 +396,89 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
  Works on a device of the host's, which outlives everything made from the handle.
  */
 enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host, struct olbvh_gpu **out);
+
+/*
+ Tells what memory a plan wants.
+ */
+enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
+                                     const struct olbvh_plan *plan,
+                                     struct olbvh_plan_sizes *out);
+
+/*
+ A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
+ measured. The host keeps the buffers as long as it records with the scene.
+ */
+enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
+                                    const struct olbvh_plan *plan,
+                                    struct olbvh_buffer positions,
+                                    struct olbvh_buffer cells,
+                                    struct olbvh_buffer memory,
+                                    struct olbvh_buffer scratch,
+                                    struct olbvh_scene **out);
+
+/*
+ Lets a scene go, but not its buffers; null is allowed.
+ */
+void olbvh_scene_free(struct olbvh_scene *scene);
+
+/*
+ Tells where the arrays of a scene are. `field`, a float per point, may be null.
+ */
+enum olbvh_status olbvh_scene_arrays(const struct olbvh_scene *scene,
+                                     const struct olbvh_buffer *field,
+                                     struct olbvh_scene_arrays_data *out);
+
+/*
+ Makes what commands are recorded with: one per frame in flight, used by one thread at a time.
+ */
+enum olbvh_status olbvh_recording_new(const struct olbvh_gpu *gpu, struct olbvh_recording **out);
+
+/*
+ Lets a recording go, when its commands have been executed; null is allowed.
+ */
+void olbvh_recording_free(struct olbvh_recording *recording);
+
+/*
+ Begins anew. `commands` is a `VkCommandBuffer` in the recording state, outside of a render pass; what was recorded before has been executed. 0
+ rehearses: commands compile what they need, and the end makes room for the descriptor sets they would take, so that recording the same later makes
+ nothing. `queries` is a reset `VkQueryPool` for timestamps of that many queries, or 0; stages are timed as long as there are queries left.
+ The recording binds a compute pipeline, push constants, and set 0 where the device has no buffer addresses.
+ */
+enum olbvh_status olbvh_recording_begin(struct olbvh_recording *recording,
+                                        uint64_t commands,
+                                        uint64_t queries,
+                                        uint32_t query_count);
+
+/*
+ Ends the recording, the command buffer stays open. Fails where a barrier is missing between two commands, and names them.
+ */
+enum olbvh_status olbvh_recording_end(struct olbvh_recording *recording);
+
+/*
+ Tells which queries of a recording that has ended have the times of its `index`th stage; fails behind the last.
+ */
+enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
+                                        uint32_t index,
+                                        struct olbvh_stage *out);
+
+/*
+ Records a barrier: what was written so far is visible to the compute shaders, transfers and indirect commands that follow.
+ */
+enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
+
+/*
+ Records the construction of a scene's tree for the positions there are then. Reads positions and cells in compute shaders, uses memory and scratch in
+ compute shaders and transfers, and ends with a barrier as `olbvh_cmd_barrier` records it.
+ */
+enum olbvh_status olbvh_cmd_build(struct olbvh_recording *recording,
+                                  const struct olbvh_scene *scene);
+
+/*
+ Records the location of points: compute shaders read mesh, tree and points, and write the answers. No barrier before or after.
+ */
+enum olbvh_status olbvh_cmd_locate(struct olbvh_recording *recording,
+                                   const struct olbvh_scene *scene,
+                                   const struct olbvh_location *location);
 
 #ifdef __cplusplus
 }  // extern "C"

@@ -34,11 +34,15 @@
 //! extent in [2^40, 2^41) (a power of two away from the [1, 2) of the definition, so that products of three differences neither overflow
 //! nor become denormal, which devices may flush). Quotients that matter go through [`reference::grid::reciprocal`], which uses no division.
 
+// The tests of the C interface share their host with those of `tests/`.
+#[cfg(test)]
+extern crate self as olbvh;
+
 pub mod baseline;
 #[cfg(feature = "cli")]
 pub mod bench;
 pub mod build;
-#[cfg(feature = "capi")]
+#[cfg(any(feature = "capi", test))]
 mod capi;
 pub mod conformance;
 pub mod error;

@@ -2,12 +2,16 @@
 //! `cargo rustc --release --lib --no-default-features --features capi --crate-type cdylib` (or `staticlib`).
 //!
 //! Functions return 0 or the code of an error, whose text [`olbvh_last_error`] gives. No panic crosses the border. A handle keeps what it was made
-//! from alive, so the order of freeing means nothing. One handle may be used by many threads at a time.
+//! from alive, so the order of freeing means nothing. One handle may be used by many threads at a time, a
+//! recording by one.
 //!
 //! Not for Rust, where a pointer cannot be trusted as a C caller's must be: the module is private, and its functions reach C by their names.
 #![allow(unsafe_code, reason = "the border to C")]
 
 mod host;
+mod record;
+#[cfg(test)]
+mod tests;
 
 use crate::build::{BadCells, DeviceMesh, MeshView, Tree};
 use crate::error::{Error, Result};
@@ -69,6 +73,20 @@ pub struct OlbvhBuildOptions {
     pub capacity: u32,
     /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
     pub budget: u64,
+}
+
+impl OlbvhBuildOptions {
+    fn read(&self) -> Result<BuildOptions> {
+        let unknown = |what: &str, n: u32| Error::Invalid(format!("{what} {n} is not known"));
+        Ok(BuildOptions {
+            alpha: self.alpha,
+            assign: Assign::EVERY.into_iter().find(|a| *a as u32 == self.assign).ok_or_else(|| unknown("assign", self.assign))?,
+            lists: Lists::EVERY.into_iter().find(|l| *l as u32 == self.lists).ok_or_else(|| unknown("lists", self.lists))?,
+            boxes: false,
+            capacity: (self.capacity != 0).then_some(self.capacity),
+            budget: (self.budget != 0).then_some(self.budget),
+        })
+    }
 }
 
 /// What was built.
@@ -141,6 +159,18 @@ fn handle<'a, T>(pointer: *const T, what: &str) -> Result<&'a T> {
     unsafe { pointer.as_ref() }.ok_or_else(|| missing(what))
 }
 
+/// As [`handle`], of one that nobody else uses meanwhile.
+fn handle_mut<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut T> {
+    // SAFETY: as above, and the caller vouches for the rest (see each function).
+    unsafe { pointer.as_mut() }.ok_or_else(|| missing(what))
+}
+
+/// Fills a struct of the caller's.
+fn put<T>(out: *mut T, value: T) -> Result<()> {
+    *handle_mut(out, "the place for the result")? = value;
+    Ok(())
+}
+
 /// An array of the caller's; a null pointer is an empty one of no elements.
 fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
     match (pointer.is_null(), count) {
@@ -153,8 +183,7 @@ fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> 
 
 /// Hands a value over to the caller.
 fn give<T>(out: *mut *mut T, value: T) -> Result<()> {
-    // SAFETY: the caller passes null or a place for a pointer.
-    *unsafe { out.as_mut() }.ok_or_else(|| missing("the place for the result"))? = Box::into_raw(Box::new(value));
+    *handle_mut(out, "the place for the result")? = Box::into_raw(Box::new(value));
     Ok(())
 }
 
@@ -237,16 +266,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
     border(|| {
         let mesh = handle(mesh, "mesh")?.0.clone();
         // SAFETY: null, or the caller's options.
-        let asked = unsafe { options.as_ref() }.copied().unwrap_or_else(|| olbvh_default_build_options());
-        let unknown = |what: &str, n: u32| Error::Invalid(format!("{what} {n} is not known"));
-        let options = BuildOptions {
-            alpha: asked.alpha,
-            assign: Assign::EVERY.into_iter().find(|a| *a as u32 == asked.assign).ok_or_else(|| unknown("assign", asked.assign))?,
-            lists: Lists::EVERY.into_iter().find(|l| *l as u32 == asked.lists).ok_or_else(|| unknown("lists", asked.lists))?,
-            boxes: false,
-            capacity: (asked.capacity != 0).then_some(asked.capacity),
-            budget: (asked.budget != 0).then_some(asked.budget),
-        };
+        let options = unsafe { options.as_ref() }.map_or(Ok(BuildOptions::default()), OlbvhBuildOptions::read)?;
         let gpu = mesh.gpu();
         let tree = Tree::build(gpu, &mesh, &options)?;
         let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
@@ -279,9 +299,7 @@ pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInf
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             address: addresses.all().address,
         };
-        // SAFETY: the caller passes null or a place for the struct.
-        *unsafe { out.as_mut() }.ok_or_else(|| missing("out"))? = info;
-        Ok(())
+        put(out, info)
     })
 }
 

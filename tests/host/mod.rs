@@ -2,6 +2,7 @@
 
 #![allow(dead_code, unsafe_code, reason = "each test uses a part; a device is made by hand")]
 
+pub mod counted;
 pub mod queries;
 
 use ash::vk;
@@ -15,7 +16,7 @@ use std::sync::{Arc, Mutex};
 
 /// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses.
 pub struct Host {
-    _entry: ash::Entry,
+    pub entry: ash::Entry,
     pub instance: ash::Instance,
     pub physical: vk::PhysicalDevice,
     pub device: ash::Device,
@@ -46,7 +47,7 @@ impl Host {
             }
             let device = instance.create_device(physical, &info, None).unwrap();
             let (addresses, control) = (needs.buffer_addresses, needs.subgroup_size_control);
-            Self { _entry: entry, instance, physical, device, family, addresses, control }
+            Self { entry, instance, physical, device, family, addresses, control }
         }
     }
 

@@ -1,0 +1,165 @@
+//! The recording functions, called as a C host calls them.
+
+#[path = "../../tests/host/mod.rs"]
+mod host;
+
+use super::host::{OlbvhHostDevice, olbvh_gpu_from_host};
+use super::record::*;
+use super::*;
+use crate::gpu::{BufferRef, HostDevice, Recorder, USAGE};
+use crate::mesh::kuhn_jittered;
+use crate::reference::boundary::topology;
+use crate::reference::build::build;
+use crate::reference::locate::Locator;
+use ash::vk::{self, Handle};
+use host::Host;
+use host::counted::{ARMED, CALLS, counting};
+use std::ptr::{null, null_mut};
+
+/// For fewer stages than a frame has.
+const QUERIES: u32 = 8;
+
+fn message() -> String {
+    // SAFETY: a C string until the next call.
+    unsafe { CStr::from_ptr(olbvh_last_error()) }.to_string_lossy().into_owned()
+}
+
+fn ok(status: OlbvhStatus) {
+    assert_eq!(status, OlbvhStatus::Ok, "{}", message());
+}
+
+/// What a call puts behind its last argument.
+fn made<T>(call: impl FnOnce(*mut T) -> OlbvhStatus) -> T {
+    let mut out = std::mem::MaybeUninit::zeroed();
+    ok(call(out.as_mut_ptr()));
+    // SAFETY: the call went well, so it has been filled.
+    unsafe { out.assume_init() }
+}
+
+/// Three frames on the host's device, of which only what comes before them makes anything.
+fn frames(gpu: *mut OlbvhGpu) {
+    let mesh = kuhn_jittered([5, 4, 3], 0.3, 1).unwrap();
+    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+    let device = &handle(gpu, "gpu").unwrap().0;
+    let (positions, cells) = (device.upload("olbvh.test.positions", &mesh.points), device.upload("olbvh.test.cells", &mesh.tets));
+    let (positions, cells) = (positions.unwrap(), cells.unwrap());
+    let mut plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build: olbvh_default_build_options() };
+    let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
+    assert_eq!((sizes.alignment, sizes.usage), (256, USAGE.as_raw()));
+    let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
+    let (memory, scratch) = (buffer(sizes.memory), buffer(sizes.scratch));
+    let (owners, barycentrics) = (buffer(4 * u64::from(points)), buffer(16 * u64::from(points)));
+    let part = |b: BufferRef| OlbvhBuffer::from(b);
+    let place = |plan: &OlbvhPlan, memory: BufferRef, out| {
+        olbvh_scene_place(gpu, plan, part(positions.all()), part(cells.all()), part(memory), part(scratch.all()), out)
+    };
+    let mut none = null_mut();
+    assert_eq!(place(&plan, memory.all().part(0, sizes.memory / 2), &raw mut none), OlbvhStatus::Invalid);
+    plan.points += 1;
+    assert_eq!(place(&plan, memory.all(), &raw mut none), OlbvhStatus::Invalid);
+    assert!(none.is_null() && message().contains("positions"), "{}", message());
+    plan.points -= 1;
+    let scene: *mut OlbvhScene = made(|out| place(&plan, memory.all(), out));
+    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
+    let (owners_of, weights) = (part(owners.all()), part(barycentrics.all()));
+    let location = OlbvhLocation {
+        points: part(positions.all()),
+        stride: 3,
+        count: points,
+        tolerance: -1.0,
+        owners: owners_of,
+        barycentrics: weights,
+    };
+    let record = |commands: u64, queries: vk::QueryPool, barrier: bool| {
+        ok(olbvh_recording_begin(recording, commands, queries.as_raw(), QUERIES));
+        ok(olbvh_cmd_build(recording, scene));
+        ok(olbvh_cmd_locate(recording, scene, &raw const location));
+        if barrier {
+            ok(olbvh_cmd_barrier(recording));
+        }
+        ok(olbvh_cmd_locate(recording, scene, &raw const location));
+        olbvh_recording_end(recording)
+    };
+    assert_eq!(record(0, vk::QueryPool::null(), false), OlbvhStatus::Invalid);
+    assert!(message().contains("no barrier between them"), "{}", message());
+    assert_eq!(olbvh_cmd_barrier(recording), OlbvhStatus::Invalid, "it has ended");
+    ok(record(0, vk::QueryPool::null(), true));
+
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
+    // SAFETY: plain creation; destroyed below.
+    let queries = unsafe { device.device().create_query_pool(&info, None) }.unwrap();
+    let before = CALLS.get();
+    for _ in 0..3 {
+        let frame = |r: &mut Recorder<'_>| {
+            // SAFETY: no command uses the queries meanwhile.
+            unsafe { device.device().cmd_reset_query_pool(r.commands(), queries, 0, QUERIES) };
+            ARMED.set(true);
+            let status = record(r.commands().as_raw(), queries, true);
+            ARMED.set(false);
+            ok(status);
+            Ok(())
+        };
+        device.run("olbvh.test.frame", frame).unwrap();
+    }
+    assert_eq!(CALLS.get(), before, "calls made while recording");
+    let (mut ticks, flags) = ([0u64; QUERIES as usize], vk::QueryResultFlags::TYPE_64);
+    // SAFETY: `run` has waited, and all queries have been written: there are more stages than that.
+    unsafe {
+        device.device().get_query_pool_results(queries, 0, &mut ticks, flags).unwrap();
+        device.device().destroy_query_pool(queries, None);
+    }
+    let mut used = Vec::new();
+    for i in 0..QUERIES / 2 {
+        let stage: OlbvhStage = made(|out| olbvh_recording_stage(recording, i, out));
+        // SAFETY: it ends with a zero.
+        let name = unsafe { CStr::from_ptr(stage.name.as_ptr()) }.to_str().unwrap();
+        assert!(name.starts_with("mesh.") || name.starts_with("build."), "{name}");
+        assert!(ticks[stage.begin as usize] <= ticks[stage.end as usize], "{name}: {ticks:?}");
+        used.extend([stage.begin, stage.end]);
+    }
+    used.sort_unstable();
+    assert_eq!(used, (0..QUERIES).collect::<Vec<_>>());
+    let mut none = std::mem::MaybeUninit::uninit();
+    assert_eq!(olbvh_recording_stage(recording, QUERIES / 2, none.as_mut_ptr()), OlbvhStatus::Invalid);
+    let (topology, found) = (topology(&mesh).unwrap(), device.download::<u32>(&owners, owners.all()).unwrap());
+    let host = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let locator = Locator::new(&mesh, &topology, &host);
+    assert_eq!(found, mesh.points.iter().map(|&p| locator.locate(p).owner).collect::<Vec<_>>());
+
+    let arrays: OlbvhSceneArrays = made(|out| olbvh_scene_arrays(scene, null(), out));
+    let status: Vec<u32> = device.download(&memory, memory.all().part(arrays.status.offset, 16)).unwrap();
+    assert_eq!((status[0], status[3]), (host.grid.level, host.p.len() as u32));
+    assert!(arrays.bindings.iter().take(6).all(|b| b.buffer == memory.all().buffer.as_raw()));
+    olbvh_recording_free(recording);
+    olbvh_scene_free(scene);
+    olbvh_gpu_free(gpu);
+}
+
+#[test]
+fn a_c_host_records_by_address() {
+    let host = Host::new();
+    let mut lent = OlbvhHostDevice {
+        get_instance_proc_addr: host.entry.static_fn().get_instance_proc_addr as *const _,
+        instance: host.instance.handle().as_raw(),
+        physical_device: host.physical.as_raw(),
+        device: host.device.handle().as_raw(),
+        queue: host.queue().lock().unwrap().as_raw(),
+        queue_family: host.family,
+        buffer_addresses: u32::from(host.addresses),
+        subgroup_size_control: u32::from(host.control),
+        debug_utils: 0,
+    };
+    frames(made(|out| olbvh_gpu_from_host(&raw const lent, out)));
+    lent.queue = 0;
+    let mut none = null_mut();
+    assert_eq!(olbvh_gpu_from_host(&raw const lent, &raw mut none), OlbvhStatus::Invalid);
+}
+
+#[test]
+fn a_c_host_records_by_descriptors_and_makes_nothing() {
+    let host = Host::new();
+    let options = GpuOptions { binding: Some(crate::gpu::Binding::Descriptors), ..GpuOptions::default() };
+    // SAFETY: the host's handles belong together and outlive the frames; the counted functions do what the device's own do.
+    let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
+    frames(Box::into_raw(Box::new(OlbvhGpu(gpu))));
+}
