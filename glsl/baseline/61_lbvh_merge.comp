@@ -4,8 +4,8 @@
 // LBVH baseline, hierarchy: every leaf climbs; at each node the first to arrive leaves its half and stops, the second goes on (Apetrei 2014).
 // Nobody waits for anybody, so no forward progress between workgroups is needed. On Mesa 22.3 lavapipe a memory barrier suspends the whole workgroup
 // as a control barrier does, which this loop does not survive: on processors a workgroup is one subgroup.
-ARGUMENTS(8)
-    uint tets; // valid ones
+ARGUMENTS(9)
+    uint tets;
 END_ARGUMENTS
 BUFFER16(0, readonly, vec4, vertices)
 BUFFER16(1, readonly, uvec4, cells)
@@ -15,6 +15,7 @@ BUFFER(4, readonly, uint, ids)
 BUFFER16(5, coherent, LbvhNode, nodes)
 BUFFER(6, coherent, uint, arrivals) // per internal node, filled with all ones: the other end of the half that came first
 BUFFER(7, writeonly, uint, root)    // reference of the root
+BUFFER(8, readonly, MeshStatus, status)
 
 #include "shared/binary_tree.glsl"
 
@@ -27,21 +28,22 @@ bool closer(uint i, uint j) {
 }
 
 void main() {
+    uint valid = tets - status.at[0].bad; // the others are behind them
     uint first = item_index(), last = first, me = first | BINARY_LEAF;
     vec3 lo, hi;
-    bool climbs = first < tets;
+    bool climbs = first < valid;
     if (climbs) {
         box_of(me, lo, hi);
         uint t = ids.at[first];
         if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) me |= BINARY_BOUNDARY;
     }
     for (uint depth = 0u; climbs && depth < BINARY_DEPTH; ++depth) {
-        if (first == 0u && last == tets - 1u) {
+        if (first == 0u && last == valid - 1u) {
             root.at[0] = me;
             climbs = false;
             continue;
         }
-        bool left = first == 0u || (last != tets - 1u && closer(last, first - 1u));
+        bool left = first == 0u || (last != valid - 1u && closer(last, first - 1u));
         uint parent = left ? last : first - 1u;
         if (left) nodes.at[parent].left = me;
         else nodes.at[parent].right = me;

@@ -1,12 +1,12 @@
 //! LBVH over tetrahedra: Morton codes of box centres, agglomerative bottom-up construction (Apetrei 2014).
 
-use crate::build::{DeviceMesh, MeshArrays, MeshInput};
+use crate::build::{DeviceMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Groups, StageTime};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
-use crate::query::{BinaryTree, Located, Structure};
+use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Structure};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
 const CODE_BITS: u32 = 31;
@@ -34,45 +34,130 @@ pub struct LbvhArrays {
     pub ids: Vec<u32>,
 }
 
+impl BinaryTree {
+    /// Takes the arrays of a tree over this many tetrahedra from an arena.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
+        let nodes = arena.take(size_of::<LbvhNode>() as u64 * u64::from(tets.saturating_sub(1)))?;
+        Ok(Self { nodes, ids: arena.words(u64::from(tets))?, root: arena.words(1)? })
+    }
+}
+
+/// Scratch memory of the construction.
+#[derive(Clone, Copy, Debug)]
+pub struct LbvhScratch {
+    codes: BufferRef,
+    arrivals: BufferRef,
+    sort: SortScratch,
+}
+
+impl LbvhScratch {
+    /// For a mesh of this many tetrahedra.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32) -> Result<Self> {
+        let sort = SortScratch::carve(gpu, arena, tets, CODE_BITS)?;
+        Ok(Self { codes: arena.words(u64::from(tets))?, arrivals: arena.words(u64::from(tets))?, sort })
+    }
+}
+
+/// Records the construction of a binary tree over the valid tetrahedra of a mesh: nothing is submitted, waited for, allocated or read back.
+///
+/// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders. The last use is a compute write, no barrier stands
+/// behind it.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made.
+pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, scratch: &LbvhScratch) -> Result<()> {
+    let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
+    let MeshArrays { grid, bad, boundary, vertices, status, .. } = mesh.arrays;
+    let (BinaryTree { nodes, root, ids }, LbvhScratch { codes, arrivals, sort }) = (*tree, *scratch);
+    r.stage("lbvh.codes", |r| {
+        r.fill(arrivals, u32::MAX);
+        r.fill(root, u32::MAX);
+        let workgroup = r.gpu().target().each;
+        let spec = LbvhCodesSpec { workgroup, ..Default::default() };
+        let arguments = LbvhCodes { grid, positions, cells, bad, codes, ids, tets, stride };
+        r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup)))
+    })?;
+    r.stage("lbvh.sort", |r| cmd_sort_pairs(r, codes, ids, CODE_BITS, Count::host(tets), &sort))?;
+    r.barrier("lbvh.sort → lbvh.merge");
+    r.stage("lbvh.merge", |r| {
+        // One subgroup on processors: see the kernel.
+        let workgroup = if r.gpu().report().kind == "cpu" { r.gpu().subgroup_size() } else { r.gpu().target().each };
+        let spec = LbvhMergeSpec { workgroup, ..Default::default() };
+        let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, status, tets };
+        r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup)))
+    })
+}
+
+/// Records point location in a binary tree (`stride` and `hints` of the points are not for it: three floats each), going on behind earlier rounds if
+/// asked. Reads mesh, tree and points in compute shaders; writes `output` and `unfinished`, a word that is not 0 if more rounds are needed, in compute
+/// shaders and transfers. Between the fill of `unfinished`, which comes first, and the reads stands a barrier; there is none after.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if the pipeline cannot be made.
+pub fn cmd_locate_lbvh(
+    r: &mut Recorder<'_>,
+    (mesh, tree): (&MeshView, &BinaryTree),
+    (points, count): (BufferRef, u32),
+    output: &LocateOutput,
+    unfinished: BufferRef,
+    tolerance: f32,
+    rounds: Rounds,
+) -> Result<()> {
+    let (MeshArrays { grid, boundary, vertices, .. }, cells) = (mesh.arrays, mesh.input.cells);
+    let (BinaryTree { nodes, root, ids }, LocateOutput { owners, barycentrics }) = (*tree, *output);
+    let workgroup = r.gpu().target().query;
+    for round in 0..rounds.count {
+        if round > 0 {
+            r.barrier("lbvh.locate → lbvh.clear");
+        }
+        r.fill(unfinished, 0);
+        r.barrier("lbvh.clear → lbvh.locate");
+        let fresh = u32::from(round == 0 && !rounds.resume);
+        let arguments = LbvhLocate {
+            grid,
+            nodes,
+            root,
+            ids,
+            boundary,
+            cells,
+            vertices,
+            points,
+            owners,
+            barycentrics,
+            unfinished,
+            count,
+            fresh,
+            budget: BUDGET,
+            tolerance,
+        };
+        let spec = LbvhLocateSpec { workgroup, ..Default::default() };
+        r.stage("lbvh.locate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))?;
+    }
+    Ok(())
+}
+
 impl Lbvh {
     /// Builds the tree in one submission.
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh) -> Result<Self> {
-        let MeshInput { positions, stride, cells, tets, .. } = *mesh.input();
-        let MeshArrays { grid, bad, boundary, vertices, .. } = *mesh.arrays();
-        let valid = tets - mesh.status().bad;
-        let carve = |a: &mut Arena| {
-            let nodes = a.take(size_of::<LbvhNode>() as u64 * u64::from(valid.saturating_sub(1)))?;
-            Ok((nodes, a.words(u64::from(tets))?, a.words(1)?))
-        };
+        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let tets = view.input.tets;
+        let carve = |a: &mut Arena| BinaryTree::carve(a, tets);
         let memory = gpu.buffer("olbvh.lbvh.tree", Arena::measure(carve)?)?;
-        let (nodes, ids, root) = carve(&mut Arena::new(memory.all()))?;
-        let carve =
-            |a: &mut Arena| Ok((a.words(u64::from(tets))?, a.words(u64::from(tets))?, SortScratch::carve(gpu, a, tets, CODE_BITS)?));
-        let scratch = gpu.buffer("olbvh.lbvh.scratch", Arena::measure(carve)?)?;
-        let (codes, arrivals, sort) = carve(&mut Arena::new(scratch.all()))?;
-        let ((), time) = gpu.run("olbvh.lbvh.build", |r| {
-            r.stage("lbvh.codes", |r| {
-                r.fill(arrivals, u32::MAX);
-                r.fill(root, u32::MAX);
-                let workgroup = gpu.target().each;
-                let spec = LbvhCodesSpec { workgroup, ..Default::default() };
-                let groups = Groups::Count(tets.div_ceil(workgroup));
-                r.dispatch(&LbvhCodes { grid, positions, cells, bad, codes, ids, tets, stride }, spec, groups)
-            })?;
-            r.stage("lbvh.sort", |r| cmd_sort_pairs(r, codes, ids, CODE_BITS, Count::host(tets), &sort))?;
-            r.barrier("lbvh.sort → lbvh.merge");
-            r.stage("lbvh.merge", |r| {
-                // One subgroup on processors: see the kernel.
-                let workgroup = if gpu.report().kind == "cpu" { gpu.subgroup_size() } else { gpu.target().each };
-                let spec = LbvhMergeSpec { workgroup, ..Default::default() };
-                let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, tets: valid };
-                r.dispatch(&arguments, spec, Groups::Count(valid.div_ceil(workgroup)))
-            })
-        })?;
-        Ok(Self { gpu: gpu.clone(), tree: BinaryTree { nodes, root, ids }, valid, stages: time.stages, memory })
+        let tree = carve(&mut Arena::new(memory.all()))?;
+        let carve = |a: &mut Arena| LbvhScratch::carve(gpu, a, tets);
+        let buffer = gpu.buffer("olbvh.lbvh.scratch", Arena::measure(carve)?)?;
+        let scratch = carve(&mut Arena::new(buffer.all()))?;
+        let ((), time) = gpu.run("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
+        Ok(Self { gpu: gpu.clone(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per primitive.
@@ -110,36 +195,13 @@ impl Lbvh {
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
         let memory = gpu.buffer("olbvh.lbvh.located", Arena::measure(carve)?)?;
         let (owners, barycentrics, unfinished) = carve(&mut Arena::new(memory.all()))?;
-        let workgroup = gpu.target().query;
-        let count = points.len() as u32;
-        let mut located = Located::default();
-        let mut fresh = 1;
+        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let (asked, output) = ((uploaded.all(), points.len() as u32), LocateOutput { owners, barycentrics });
+        let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {
-            let arguments = LbvhLocate {
-                grid: mesh.arrays().grid,
-                nodes: self.tree.nodes,
-                root: self.tree.root,
-                ids: self.tree.ids,
-                boundary: mesh.arrays().boundary,
-                cells: mesh.input().cells,
-                vertices: mesh.arrays().vertices,
-                points: uploaded.all(),
-                owners,
-                barycentrics,
-                unfinished,
-                count,
-                fresh,
-                budget: BUDGET,
-                tolerance,
-            };
-            let ((), time) = gpu.run("olbvh.lbvh.locate", |r| {
-                r.fill(unfinished, 0);
-                r.barrier("lbvh.clear → lbvh.locate");
-                let spec = LbvhLocateSpec { workgroup, ..Default::default() };
-                r.stage("lbvh.locate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
-            })?;
-            located.stages.extend(time.stages);
-            fresh = 0;
+            let record = |r: &mut Recorder<'_>| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);
+            located.stages.extend(gpu.run("olbvh.lbvh.locate", record)?.1.stages);
+            rounds = Rounds::resume(1);
             if gpu.download::<u32>(&memory, unfinished.part(0, 4))?.first() == Some(&0) {
                 break;
             }

@@ -5,5 +5,5 @@ mod lbvh;
 mod overlap;
 mod rays;
 
-pub use lbvh::{Lbvh, LbvhArrays};
+pub use lbvh::{Lbvh, LbvhArrays, LbvhScratch, cmd_build_lbvh, cmd_locate_lbvh};
 pub use rays::{RayMethod, Rays};
