@@ -1,0 +1,104 @@
+//! The body: a mesh that wgpu moves, with olbvh's arrays beside it, and the pixels of a cut through it.
+
+use anyhow::{Context, Result};
+use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+use olbvh::gpu::{Buffer, Gpu, Recorder};
+use olbvh::mesh::{Mesh, On};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_interpolate, cmd_locate};
+
+/// Pixels; rows are multiples of 256 bytes, as wgpu copies them.
+pub const SIZE: [u32; 2] = [320, 240];
+
+pub struct Body {
+    pub positions: Buffer,
+    pub owners: Buffer,
+    pub values: Buffer,
+    /// The points of the pixels, row by row.
+    pub places: Vec<[f32; 3]>,
+    /// From 0 to 1.
+    pub field: Vec<f32>,
+    pub centre: [f32; 3],
+    pub radius: f32,
+    scene: Scene,
+    mesh_scratch: MeshScratch,
+    build_scratch: BuildScratch,
+    capacity: Capacity,
+    options: BuildOptions,
+    input: PointInput,
+    output: LocateOutput,
+    /// Cells, field, places, and everything that olbvh makes of them.
+    held: [Buffer; 4],
+}
+
+impl Body {
+    pub fn new(gpu: &Gpu, mesh: &Mesh) -> Result<Self> {
+        let field = mesh.fields.first().context("the mesh has no field")?;
+        let [least, most] = field.range().context("no finite value")?;
+        let field: Vec<f32> = field.values.iter().map(|v| (v - least) / (most - least)).collect();
+        let end = |axis: usize, pick: fn(f32, f32) -> f32| mesh.points.iter().map(|p| p[axis]).reduce(pick).unwrap_or_default();
+        let (lo, hi) = ([0, 1, 2].map(|c| end(c, f32::min)), [0, 1, 2].map(|c| end(c, f32::max)));
+        let centre = [0, 1, 2].map(|c| 0.5 * (lo[c] + hi[c]));
+        let radius = [0, 1, 2].map(|c| 0.5 * (hi[c] - lo[c])).iter().map(|h| h * h).sum::<f32>().sqrt();
+        let step = 2.0 * radius / SIZE[0] as f32;
+        let along = |i: u32, n: u32| (i as f32 + 0.5 - 0.5 * n as f32) * step;
+        let places: Vec<[f32; 3]> = (0..SIZE[0] * SIZE[1])
+            .map(|i| [centre[0] + along(i % SIZE[0], SIZE[0]), centre[1], centre[2] - along(i / SIZE[0], SIZE[1])])
+            .collect();
+
+        let (points, tets, pixels) = (mesh.points.len() as u32, mesh.tets.len() as u32, u64::from(SIZE[0] * SIZE[1]));
+        let buffer = |name: &str, bytes: u64| gpu.buffer(&format!("wgpu_frame.{name}"), bytes);
+        let [positions, owners, values] = [("positions", 12 * u64::from(points)), ("owners", 4 * pixels), ("values", 4 * pixels)]
+            .map(|(name, bytes)| buffer(name, bytes));
+        let (positions, owners, values) = (positions?, owners?, values?);
+        let cells = gpu.upload("wgpu_frame.cells", &mesh.tets)?;
+        let asked = gpu.upload("wgpu_frame.places", &places)?;
+        let on_device = gpu.upload("wgpu_frame.field", &field)?;
+
+        // Sizes first: what the largest tree may need. Where the moved body would need more, the device builds a coarser one.
+        let (options, capacity) = (BuildOptions::default(), Capacity::for_entries(24 * tets, 7));
+        let carve = |a: &mut Arena| {
+            let (arrays, tree) = (MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?);
+            let (mesh, build) = (MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
+            Ok((arrays, tree, mesh, build, a.take(16 * pixels)?))
+        };
+        let memory = buffer("memory", Arena::measure(carve)?)?;
+        let (arrays, tree, mesh_scratch, build_scratch, barycentrics) = carve(&mut Arena::new(memory.all()))?;
+        let mesh = MeshView { input: MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets }, arrays };
+        let scene = Scene { mesh, tree, longest_leaf: tets };
+        let input = PointInput { points: asked.all(), stride: 3, count: pixels as u32, hints: None };
+        let output = LocateOutput { owners: owners.all(), barycentrics };
+        let held = [on_device, cells, asked, memory];
+        Ok(Self {
+            positions,
+            owners,
+            values,
+            places,
+            field,
+            centre,
+            radius,
+            scene,
+            mesh_scratch,
+            build_scratch,
+            capacity,
+            options,
+            input,
+            output,
+            held,
+        })
+    }
+
+    /// Records what olbvh does in a frame. Reads the positions and writes owners and values, all in compute shaders.
+    pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        let Self { scene, input, output, .. } = self;
+        // The memory is that of the frame before.
+        r.barrier("frame.before → frame.mesh");
+        cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
+        r.barrier("frame.mesh → frame.tree");
+        cmd_build(r, &scene.mesh, &scene.tree, &self.capacity, &self.options, &self.build_scratch)?;
+        cmd_locate(r, scene, input, output, &LocateOptions::default())?;
+        r.barrier("frame.owners → frame.values");
+        cmd_interpolate(r, scene, self.held[0].all(), On::Points, output, self.values.all(), input.count)
+    }
+}
