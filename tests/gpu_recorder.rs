@@ -19,7 +19,7 @@ use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
-use olbvh::query::{BinaryTree, LocateOutput, Rounds, cmd_visible, visible_bytes};
+use olbvh::query::{BinaryTree, LocateOptions, LocateOutput, Rounds, Scene, cmd_interpolate, cmd_locate, cmd_visible, visible_bytes};
 
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
@@ -129,6 +129,28 @@ fn queries() {
         Ok(())
     });
     assert!(barriers >= 70, "{barriers}");
+}
+
+/// Location that takes several dispatches, since a leaf could be that long, and values at what was located.
+#[test]
+fn location() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([4, 3, 5], 0.3, 1).unwrap();
+    let frame = Frame::new(&gpu, &mesh);
+    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: 40_000 };
+    let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
+    let (values, sink) = (gpu.buffer("olbvh.test.values", 4 * u64::from(frame.points.count)), gpu.buffer("olbvh.test.sink", 64));
+    let (values, sink) = (values.unwrap(), sink.unwrap());
+    let barriers = every_barrier_counts(&gpu, "location", |r| {
+        cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions::default())?;
+        r.barrier("locate → interpolate");
+        cmd_interpolate(r, &scene, field.all(), On::Points, &frame.output, values.all(), frame.points.count)?;
+        r.barrier("interpolate → caller");
+        read(r, &[values.all()], &sink);
+        Ok(())
+    });
+    assert_eq!(barriers, 4);
 }
 
 #[test]
