@@ -57,21 +57,48 @@ impl KernelInfo {
     pub(crate) fn scalar_base(&self, binding: Binding) -> usize {
         if binding == Binding::Address { 8 * self.buffers.len() } else { 0 }
     }
+
+    /// Bytes of push constants.
+    pub(super) fn push_bytes(&self, binding: Binding) -> usize {
+        self.scalar_base(binding) + self.scalar_bytes
+    }
+
+    /// The module.
+    pub(super) fn words(&self, binding: Binding) -> Vec<u32> {
+        let code = if binding == Binding::Address { self.address } else { self.descriptor };
+        code.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
+    }
+}
+
+/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars.
+pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Vec<u8> {
+    let mut push = vec![0u8; K::INFO.push_bytes(binding)];
+    arguments.scalars(K::INFO.scalar_base(binding), &mut push);
+    if binding == Binding::Address {
+        for (place, buffer) in push.chunks_exact_mut(8).zip(arguments.buffers()) {
+            place.copy_from_slice(&buffer.address.to_le_bytes());
+        }
+    }
+    push
+}
+
+/// The ranges that a kernel uses, and whether it writes them.
+pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
+    arguments.buffers().into_iter().zip(K::INFO.buffers).map(|(b, i)| (b, i.access != Access::Read)).collect()
 }
 
 /// Compiles a kernel for a device.
 pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
     let device = gpu.device();
     let binding = gpu.binding();
-    let code = if binding == Binding::Address { info.address } else { info.descriptor };
-    let words: Vec<u32> = code.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+    let words = info.words(binding);
     let bindings: Vec<_> = (0..info.buffers.len() as u32)
         .map(|i| {
             let b = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);
             b.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::COMPUTE)
         })
         .collect();
-    let push_bytes = (info.scalar_base(binding) + info.scalar_bytes) as u32;
+    let push_bytes = info.push_bytes(binding) as u32;
     let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(push_bytes)];
     let entries: Vec<_> = constants
         .iter()

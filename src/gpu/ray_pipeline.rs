@@ -2,7 +2,7 @@
 //! met, one that they met nothing. Buffers go by address, which every such device has.
 
 use super::context::{Binding, Gpu};
-use super::kernel::{Access, Kernel, KernelInfo};
+use super::kernel::{Kernel, KernelInfo, push_constants, uses};
 use super::memory::Buffer;
 use super::recorder::Recorder;
 use super::{debug, failed};
@@ -63,7 +63,7 @@ impl RayPipeline {
         let functions = &extension(gpu)?.functions;
         let device = gpu.device();
         let info = Launch::INFO;
-        let bytes = (info.scalar_base(Binding::Address) + info.scalar_bytes) as u32;
+        let bytes = info.push_bytes(Binding::Address) as u32;
         let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::RAYGEN_KHR).size(bytes)];
         let layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
         // SAFETY: plain creation; destroyed when `made` is dropped.
@@ -137,24 +137,16 @@ impl RayPipeline {
         let (rays, reads) = (vk::PipelineStageFlags::RAY_TRACING_SHADER_KHR, vk::AccessFlags::SHADER_READ);
         let writes = vk::AccessFlags::SHADER_WRITE;
         r.barrier_between("compute → rays", (shader | transfer, writes | vk::AccessFlags::TRANSFER_WRITE), (rays, reads | writes));
-        let buffers = arguments.buffers();
-        let uses: Vec<_> = buffers.iter().zip(self.info.buffers).map(|(b, i)| (*b, i.access != Access::Read)).collect();
-        r.touch(&uses, self.info.name);
+        r.touch(&uses(arguments), self.info.name);
         if !r.is_rehearsal() {
-            let base = self.info.scalar_base(Binding::Address);
-            let mut push = [0u8; 128];
-            arguments.scalars(base, &mut push);
-            for (i, b) in buffers.iter().enumerate() {
-                push[8 * i..8 * i + 8].copy_from_slice(&b.address.to_le_bytes());
-            }
+            let push = push_constants(arguments, Binding::Address);
             let ([launch, miss, hit], callable) = (&self.tables, vk::StridedDeviceAddressRegionKHR::default());
             // SAFETY: pipeline and tables belong together and to this device; push constants fit the layout made from the same numbers; who made
             // the recorder vouches for the command buffer.
             unsafe {
                 let device = self.gpu.device();
                 device.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::RAY_TRACING_KHR, self.handle);
-                let bytes = &push[..base + self.info.scalar_bytes];
-                device.cmd_push_constants(r.commands, self.layout, vk::ShaderStageFlags::RAYGEN_KHR, 0, bytes);
+                device.cmd_push_constants(r.commands, self.layout, vk::ShaderStageFlags::RAYGEN_KHR, 0, &push);
                 functions.cmd_trace_rays(r.commands, launch, miss, hit, &callable, width, height, 1);
             }
         }
@@ -173,7 +165,7 @@ struct Modules<'a> {
 
 impl Modules<'_> {
     fn add(&mut self, kernel: &KernelInfo) -> Result<()> {
-        let words: Vec<u32> = kernel.address.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect();
+        let words = kernel.words(Binding::Address);
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the code is the shader compiler's.
         self.made.push(unsafe { self.device.create_shader_module(&info, None) }.map_err(failed("vkCreateShaderModule"))?);

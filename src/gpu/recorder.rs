@@ -5,7 +5,7 @@
 
 use super::context::{Binding, Gpu};
 use super::descriptors::{DescriptorPools, DescriptorRoom};
-use super::kernel::{Access, Kernel};
+use super::kernel::{Kernel, push_constants, uses};
 use super::memory::BufferRef;
 use crate::error::{Error, Result};
 use ash::vk;
@@ -134,7 +134,7 @@ impl<'a> Recorder<'a> {
         if let Groups::Count(0) = groups {
             return Ok(());
         }
-        let mut uses: Vec<_> = buffers.iter().zip(info.buffers).map(|(b, i)| (*b, i.access != Access::Read)).collect();
+        let mut uses = uses(arguments);
         if let Groups::Indirect(words) = groups {
             uses.push((words, false));
         }
@@ -147,18 +147,12 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         let device = self.gpu.device();
-        let base = info.scalar_base(self.gpu.binding());
-        let mut push = [0u8; 128];
-        arguments.scalars(base, &mut push);
+        let push = push_constants(arguments, self.gpu.binding());
         // SAFETY: pipeline, layouts and sets belong to this device; push constants fit the layout made from the same numbers; the
         // caller of `new` vouches for the command buffer.
         unsafe {
             device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle);
-            if self.gpu.binding() == Binding::Address {
-                for (i, b) in buffers.iter().enumerate() {
-                    push[8 * i..8 * i + 8].copy_from_slice(&b.address.to_le_bytes());
-                }
-            } else if !buffers.is_empty() {
+            if self.gpu.binding() == Binding::Descriptors && !buffers.is_empty() {
                 let pools = match &mut self.pools {
                     Pools::Own(pools) => pools,
                     Pools::Lent(pools) => pools,
@@ -166,8 +160,7 @@ impl<'a> Recorder<'a> {
                 let set = pools.set(pipeline.set_layout, &buffers, info.name)?;
                 device.cmd_bind_descriptor_sets(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &[set], &[]);
             }
-            let bytes = &push[..base + info.scalar_bytes];
-            device.cmd_push_constants(self.commands, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, bytes);
+            device.cmd_push_constants(self.commands, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, &push);
             match groups {
                 Groups::Count(n) => {
                     let [x, y, z] = fold_groups(n);

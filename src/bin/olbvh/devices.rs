@@ -56,7 +56,7 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
         json!({
             "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
             "qualifies": d.requirements.missing.is_empty(), "missing": d.requirements.missing,
-            "ray_query": d.requirements.ray_tracing.queries, "ray_tracing_pipeline": d.requirements.ray_tracing.pipelines,
+            "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines,
             "target": Shapes::of(common, d).map_or(serde_json::Value::Null, |shapes| json!({
                 "name": shapes.target.name,
                 "profile": if let Origin::Profile(path) | Origin::File(path) = shapes.origin { Some(path.display().to_string()) } else { None },
