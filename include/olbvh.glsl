@@ -407,7 +407,8 @@ uint olbvh_outermost(vec4 own) {
 
 // What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
 struct olbvh_Sides {
-    vec4 w;     // as in Weights, opposite to the vertices in the caller's order
+    vec4 w;     // as in Weights, opposite to the vertices in their order here
+    float sum;  // of them
     bool clear; // as in Weights
 };
 
@@ -418,11 +419,19 @@ olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
     precise float sum = (w.x + w.y) + (w.z + w.w);
     olbvh_Sides r;
     r.w = sum < 0.0 ? -w : w;
+    r.sum = abs(sum);
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
     precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
     r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
     return r;
+}
+
+// Barycentric coordinates in the order of the vertices.
+vec4 olbvh_barycentric(olbvh_Sides r) {
+    float k = r.sum <= 0.0 ? 0.0 : olbvh_reciprocal(r.sum);
+    precise vec4 b = r.w * k;
+    return b;
 }
 
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
@@ -553,48 +562,84 @@ const uint olbvh_DETOURS = 8u;   // points to go by
 const uint olbvh_ARRIVALS = 2u;  // stars that part 1 looks at
 const float olbvh_GAP = -7.62939453125e-6; // -2^-17
 
-// The hot part of a walk (SPEC 2.6). Twin of `stride_to` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
+// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
 
-// The tetrahedron that a stride stands in.
+// The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
 struct olbvh_Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
-    uvec4 ids;  // and as held here
-    vec3 v0, v1, v2, v3;
+    uvec4 ids;  // and ascending
+    vec4 x, y, z;
 };
 
+// How a step changes what is held per corner.
+struct olbvh_Exchange {
+    uint fresh;   // the vertex that comes in
+    bvec3 beyond; // whether the corner left behind is that of place 0; at most 1; at most 2
+    bvec3 before; // whether the fresh one comes before each of the corners kept
+};
+
+olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
+
 olbvh_Stand olbvh_stand_in(uint t) {
-    uvec4 ids = olbvh_cells.at[t];
-    return olbvh_Stand(t, ids, ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
+    olbvh_Stand s;
+    s.t = t;
+    s.cell = olbvh_cells.at[t];
+    uvec4 rank = olbvh_ranks(s.cell);
+    for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
+    vec3 a = olbvh_vertices.at[s.ids.x].xyz, b = olbvh_vertices.at[s.ids.y].xyz, c = olbvh_vertices.at[s.ids.z].xyz, d = olbvh_vertices.at[s.ids.w].xyz;
+    s.x = vec4(a.x, b.x, c.x, d.x);
+    s.y = vec4(a.y, b.y, c.y, d.y);
+    s.z = vec4(a.z, b.z, c.z, d.z);
+    return s;
 }
 
-olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(s.v0, s.v1, s.v2, s.v3, x); }
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) {
+    return olbvh_sides_of(vec3(s.x.x, s.y.x, s.z.x), vec3(s.x.y, s.y.y, s.z.y), vec3(s.x.z, s.y.z, s.z.z), vec3(s.x.w, s.y.w, s.z.w), x);
+}
 
-// As `outermost` in tet.glsl, as a mask: it says which corner a step replaces.
-bvec4 olbvh_outermost_of(vec4 w) {
-    bvec4 least = equal(w, vec4(min(min(w.x, w.y), min(w.z, w.w))));
-    return bvec4(least.x, least.y && !least.x, least.z && !(least.x || least.y), !(least.x || least.y || least.z));
+uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
+
+// What is held of one kind after a step.
+uvec4 olbvh_exchange(uvec4 held, olbvh_Exchange e, uint fresh) {
+    uvec3 k = olbvh_kept(held, e.beyond);
+    return uvec4(e.before.x ? fresh : k.x, e.before.x ? k.x : e.before.y ? fresh : k.y, e.before.y ? k.y : e.before.z ? fresh : k.z,
+                 e.before.z ? k.z : fresh);
+}
+
+vec4 olbvh_exchange(vec4 held, olbvh_Exchange e, float fresh) {
+    return uintBitsToFloat(olbvh_exchange(floatBitsToUint(held), e, floatBitsToUint(fresh)));
 }
 
 uint olbvh_xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
 
 // One step through the face that says outside most; false, and nowhere, if none does or there is nothing behind it.
-bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
-    bvec4 out_most = olbvh_outermost_of(at.w);
-    uint left = olbvh_xor_of(mix(uvec4(0u), s.ids, out_most));
-    if (min(min(at.w.x, at.w.y), min(at.w.z, at.w.w)) >= 0.0) return false;
+bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
+    float least = min(min(at.w.x, at.w.y), min(at.w.z, at.w.w));
+    e.beyond.x = at.w.x == least;
+    e.beyond.y = e.beyond.x || at.w.y == least;
+    e.beyond.z = e.beyond.y || at.w.z == least;
+    e.before = bvec3(false);
+    e.fresh = 0u;
+    if (least >= 0.0) return false;
+    uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
     s.t = olbvh_neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
     if (s.t == olbvh_NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
     s.cell = olbvh_cells.at[s.t];
-    uint fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
-    vec3 v = olbvh_vertices.at[fresh].xyz;
-    s.ids = mix(s.ids, uvec4(fresh), out_most);
-    s.v0 = mix(s.v0, v, bvec3(out_most.x));
-    s.v1 = mix(s.v1, v, bvec3(out_most.y));
-    s.v2 = mix(s.v2, v, bvec3(out_most.z));
-    s.v3 = mix(s.v3, v, bvec3(out_most.w));
+    e.fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
+    vec3 v = olbvh_vertices.at[e.fresh].xyz;
+    e.before = lessThan(uvec3(e.fresh), olbvh_kept(s.ids, e.beyond));
+    s.ids = olbvh_exchange(s.ids, e, e.fresh);
+    s.x = olbvh_exchange(s.x, e, v.x);
+    s.y = olbvh_exchange(s.y, e, v.y);
+    s.z = olbvh_exchange(s.z, e, v.z);
     return true;
+}
+
+bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
+    olbvh_Exchange e;
+    return olbvh_step_on(s, at, e);
 }
 
 // Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.

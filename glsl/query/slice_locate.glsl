@@ -42,7 +42,7 @@ void main() {
         uint line = row * plan.width + begin;
         for (; plan.refused != 0u && state.next < count; ++state.next) answers.at[line + state.next] = NONE;
         bool stands = state.hint != NONE && state.cursor == 0u;
-        Stand stand = Stand(NONE, uvec4(0u), uvec4(0u), vec3(0.0), vec3(0.0), vec3(0.0), vec3(0.0));
+        Stand stand = stand_nowhere();
         if (stands) stand = stand_in(state.hint);
         for (uint work = 0u; state.next < count && work < budget; ++work) {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.

@@ -32,22 +32,47 @@ RenderPlan plan;
 
 const uint WALK = 6u; // steps of a walk across faces before the structure is asked
 
-// The current tetrahedron and what its samples need.
-uint cell;
-Tet tet;
-uvec4 corners;
-vec4 cell_values;
-mat4x3 cell_normals;
+// The ray, and where it stands.
+vec3 origin, way, halfway;
+RayState state;
+vec4 sum;
+uint samples, found, skipped;
+
+// The tetrahedron of the last sample and what is read of it, corner by corner as in the stand.
+Stand stand;
+vec4 held_values;
+vec4 held_normals[3];
 
 vec3 normal_of(uint v) { return vec3(normals.at[3u * v], normals.at[3u * v + 1u], normals.at[3u * v + 2u]); }
 
 void enter(uint t) {
-    cell = t;
-    corners = cells.at[t];
-    tet = load_tet(corners);
-    if (ON_CELLS != 0u) cell_values = vec4(field.at[t]);
-    else cell_values = vec4(field.at[corners.x], field.at[corners.y], field.at[corners.z], field.at[corners.w]);
-    if (SHADING != 0u) cell_normals = mat4x3(normal_of(corners.x), normal_of(corners.y), normal_of(corners.z), normal_of(corners.w));
+    stand = stand_in(t);
+    uvec4 ids = stand.ids;
+    if (ON_CELLS != 0u) held_values = vec4(field.at[t]);
+    else held_values = vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
+    if (SHADING != 0u) {
+        vec3 a = normal_of(ids.x), b = normal_of(ids.y), c = normal_of(ids.z), d = normal_of(ids.w);
+        for (uint k = 0u; k < 3u; ++k) held_normals[k] = vec4(a[k], b[k], c[k], d[k]);
+    }
+}
+
+// On to the next tetrahedron; false if there is none.
+bool go_on(Sides at) {
+    Exchange e;
+    if (!step_on(stand, at, e)) return false;
+    if (ON_CELLS != 0u) held_values = vec4(field.at[stand.t]);
+    else held_values = exchange(held_values, e, field.at[e.fresh]);
+    if (SHADING != 0u) {
+        vec3 n = normal_of(e.fresh);
+        for (uint k = 0u; k < 3u; ++k) held_normals[k] = exchange(held_normals[k], e, n[k]);
+    }
+    return true;
+}
+
+// What has these values at the corners, at barycentric coordinates.
+float weighed(vec4 b, vec4 at_corners) {
+    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    return r;
 }
 
 // Colour, and opacity of one step, at a value.
@@ -61,7 +86,7 @@ vec4 lookup(float value) {
 }
 
 // Light on a sample: factor and added white of its colour, added opacity. Twin of `Lighting::shade`.
-vec3 shade(vec3 n, vec3 way, vec3 halfway) {
+vec3 shade(vec3 n) {
     float square = dot_product(n, n);
     if (square < 1e-8) return vec3(1.0, 0.0, 0.0);
     float r = inverse_sqrt(square);
@@ -79,21 +104,45 @@ vec3 shade(vec3 n, vec3 way, vec3 halfway) {
     return vec3(factor, added, rim);
 }
 
+// Adds the next sample, which lies so in the tetrahedron of the stand.
+void take(Sides sides) {
+    ++state.next;
+    ++samples;
+    ++found;
+    vec4 b = barycentric(sides);
+    float value = ON_CELLS != 0u ? held_values.x : weighed(b, held_values);
+    if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
+    vec4 color = lookup(value);
+    if (color.w <= 0.0) return;
+    if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
+    if (SHADING != 0u) {
+        vec3 lit = shade(vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])));
+        precise vec3 c = color.xyz * lit.x + lit.y;
+        color.xyz = min(c, vec3(1.0));
+        precise float a = color.w + (1.0 - color.w) * lit.z;
+        color.w = a;
+    }
+    precise float share = (1.0 - sum.w) * color.w;
+    precise vec4 more = sum + share * vec4(color.xyz, 1.0);
+    sum = more;
+    if (sum.w >= view.termination) state.end = state.next;
+}
+
 void main() {
     uint i = item_index();
-    uint samples = 0u, found = 0u, skipped = 0u, unfinished = 0u;
+    uint unfinished = 0u;
+    samples = found = skipped = 0u;
     if (i < items && states.at[i].next < states.at[i].end) {
         view = frames.at[0].view;
         plan = frames.at[0].plan;
         Grid g = grid.at[0];
-        RayState state = states.at[i];
+        state = states.at[i];
         uvec2 pixel;
         pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
         uint place = pixel.y * plan.size[0] + pixel.x;
-        vec4 sum = colors.at[place];
-        vec3 origin, way;
+        sum = colors.at[place];
         make_ray(view, pixel, origin, way);
-        vec3 halfway = vec3(0.0);
+        halfway = vec3(0.0);
         if (SHADING != 0u) {
             precise vec3 h = view.to_light.xyz - way;
             float square = max(dot_product(h, h), 1e-12);
@@ -101,10 +150,10 @@ void main() {
             halfway = unit;
         }
         vec3 inverse_way = SKIP != 0u ? inverse_of(way) : vec3(0.0);
-        bool in_cell = state.hint != NONE;
-        if (in_cell) enter(state.hint);
-        uint work = 0u;
-        for (; state.next < state.end && work < budget; ++work) {
+        bool stands = state.hint != NONE;
+        if (stands) enter(state.hint);
+        uint misses = 0u; // steps of the walk to the next sample
+        for (uint work = 0u; state.next < state.end && work < budget; ++work) {
 #ifndef BINARY_TREE
             if (SKIP != 0u && state.next >= state.check) {
                 bool hidden;
@@ -112,7 +161,7 @@ void main() {
                 if (!hidden) {
                     state.check = behind;
                 } else {
-                    in_cell = in_cell && behind - state.next < WALK;
+                    stands = stands && behind - state.next < WALK;
                     skipped += behind - state.next;
                     state.next = behind;
                     continue;
@@ -121,22 +170,25 @@ void main() {
 #endif
             vec3 at = sample_at(view, origin, way, state.next);
             vec3 x = normalise(g, at);
-            Weights w;
-            bool inside = false;
-            // The cell of the last sample, or one a short walk across faces away, if it holds the sample clearly.
-            for (uint s = 0u; in_cell && state.cursor == 0u && s < WALK; ++s) {
-                w = weights(tet, x);
-                inside = w.clear;
-                if (inside) break;
-                vec4 own = own_weights(w, tet);
-                uint face = outermost(own);
-                uint next = neighbours.at[cell][face];
-                if (own[face] >= 0.0 || next == NONE) break;
-                enter(next);
-                ++work;
+            // The cell of the last sample, or one a few steps away, if it holds the sample clearly.
+            if (stands && state.cursor == 0u) {
+                Sides sides = sides_of(stand, x);
+                if (!sides.clear) {
+                    stands = ++misses < WALK && go_on(sides);
+                    if (stands) sides = sides_of(stand, x);
+                }
+                if (stands) {
+                    if (sides.clear) {
+                        misses = 0u;
+                        take(sides);
+                    }
+                    continue;
+                }
             }
-            if (!inside) {
-                uint owner;
+            misses = 0u;
+            uint owner = NONE;
+            // Outside of the bounds there is nothing to ask for.
+            if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
                 OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
                 bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
                 state.cursor = search.cursor;
@@ -144,42 +196,17 @@ void main() {
                 state.in_box = best_bits(search.best);
                 state.smallest = search.best.smallest;
                 if (!ended) break;
-                if (owner != NONE) {
-                    enter(owner);
-                    in_cell = inside = true;
-                    w = weights(tet, x);
-                } else {
-                    in_cell = false; // behind a gap the structure is asked first
-                }
             }
-            ++state.next;
-            ++samples;
-            if (!inside) continue;
-            ++found;
-            vec4 b = barycentric(w, tet.rank);
-            precise float value = (b.x * cell_values.x + b.y * cell_values.y) + (b.z * cell_values.z + b.w * cell_values.w);
-            if (ON_CELLS != 0u) value = cell_values.x;
-            if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) continue;
-            vec4 color = lookup(value);
-            if (color.w <= 0.0) continue;
-            if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
-            if (SHADING != 0u) {
-                precise vec3 n = (b.x * cell_normals[0] + b.y * cell_normals[1]) + (b.z * cell_normals[2] + b.w * cell_normals[3]);
-                vec3 lit = shade(n, way, halfway);
-                precise vec3 c = color.xyz * lit.x + lit.y;
-                color.xyz = min(c, vec3(1.0));
-                precise float a = color.w + (1.0 - color.w) * lit.z;
-                color.w = a;
-            }
-            precise float share = (1.0 - sum.w) * color.w;
-            precise vec4 more = sum + share * vec4(color.xyz, 1.0);
-            sum = more;
-            if (sum.w >= view.termination) {
-                state.end = state.next;
-                break;
+            stands = owner != NONE; // behind a gap the structure is asked first
+            if (stands) {
+                enter(owner);
+                take(sides_of(stand, x));
+            } else {
+                ++state.next;
+                ++samples;
             }
         }
-        state.hint = in_cell ? cell : NONE;
+        state.hint = stands ? stand.t : NONE;
         unfinished = uint(state.next < state.end);
         states.at[i] = state;
         colors.at[place] = sum;

@@ -1,45 +1,81 @@
-// The hot part of a walk (SPEC 2.6). Twin of `stride_to` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
+// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
 
-// The tetrahedron that a stride stands in.
+// The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
 struct Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
-    uvec4 ids;  // and as held here
-    vec3 v0, v1, v2, v3;
+    uvec4 ids;  // and ascending
+    vec4 x, y, z;
 };
 
+// How a step changes what is held per corner.
+struct Exchange {
+    uint fresh;   // the vertex that comes in
+    bvec3 beyond; // whether the corner left behind is that of place 0; at most 1; at most 2
+    bvec3 before; // whether the fresh one comes before each of the corners kept
+};
+
+Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
+
 Stand stand_in(uint t) {
-    uvec4 ids = cells.at[t];
-    return Stand(t, ids, ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+    Stand s;
+    s.t = t;
+    s.cell = cells.at[t];
+    uvec4 rank = ranks(s.cell);
+    for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
+    vec3 a = vertices.at[s.ids.x].xyz, b = vertices.at[s.ids.y].xyz, c = vertices.at[s.ids.z].xyz, d = vertices.at[s.ids.w].xyz;
+    s.x = vec4(a.x, b.x, c.x, d.x);
+    s.y = vec4(a.y, b.y, c.y, d.y);
+    s.z = vec4(a.z, b.z, c.z, d.z);
+    return s;
 }
 
-Sides sides_of(Stand s, vec3 x) { return sides_of(s.v0, s.v1, s.v2, s.v3, x); }
+Sides sides_of(Stand s, vec3 x) {
+    return sides_of(vec3(s.x.x, s.y.x, s.z.x), vec3(s.x.y, s.y.y, s.z.y), vec3(s.x.z, s.y.z, s.z.z), vec3(s.x.w, s.y.w, s.z.w), x);
+}
 
-// As `outermost` in tet.glsl, as a mask: it says which corner a step replaces.
-bvec4 outermost_of(vec4 w) {
-    bvec4 least = equal(w, vec4(min(min(w.x, w.y), min(w.z, w.w))));
-    return bvec4(least.x, least.y && !least.x, least.z && !(least.x || least.y), !(least.x || least.y || least.z));
+uvec3 kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
+
+// What is held of one kind after a step.
+uvec4 exchange(uvec4 held, Exchange e, uint fresh) {
+    uvec3 k = kept(held, e.beyond);
+    return uvec4(e.before.x ? fresh : k.x, e.before.x ? k.x : e.before.y ? fresh : k.y, e.before.y ? k.y : e.before.z ? fresh : k.z,
+                 e.before.z ? k.z : fresh);
+}
+
+vec4 exchange(vec4 held, Exchange e, float fresh) {
+    return uintBitsToFloat(exchange(floatBitsToUint(held), e, floatBitsToUint(fresh)));
 }
 
 uint xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
 
 // One step through the face that says outside most; false, and nowhere, if none does or there is nothing behind it.
-bool step_on(inout Stand s, Sides at) {
-    bvec4 out_most = outermost_of(at.w);
-    uint left = xor_of(mix(uvec4(0u), s.ids, out_most));
-    if (min(min(at.w.x, at.w.y), min(at.w.z, at.w.w)) >= 0.0) return false;
+bool step_on(inout Stand s, Sides at, out Exchange e) {
+    float least = min(min(at.w.x, at.w.y), min(at.w.z, at.w.w));
+    e.beyond.x = at.w.x == least;
+    e.beyond.y = e.beyond.x || at.w.y == least;
+    e.beyond.z = e.beyond.y || at.w.z == least;
+    e.before = bvec3(false);
+    e.fresh = 0u;
+    if (least >= 0.0) return false;
+    uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
     s.t = neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
     if (s.t == NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
     s.cell = cells.at[s.t];
-    uint fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
-    vec3 v = vertices.at[fresh].xyz;
-    s.ids = mix(s.ids, uvec4(fresh), out_most);
-    s.v0 = mix(s.v0, v, bvec3(out_most.x));
-    s.v1 = mix(s.v1, v, bvec3(out_most.y));
-    s.v2 = mix(s.v2, v, bvec3(out_most.z));
-    s.v3 = mix(s.v3, v, bvec3(out_most.w));
+    e.fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
+    vec3 v = vertices.at[e.fresh].xyz;
+    e.before = lessThan(uvec3(e.fresh), kept(s.ids, e.beyond));
+    s.ids = exchange(s.ids, e, e.fresh);
+    s.x = exchange(s.x, e, v.x);
+    s.y = exchange(s.y, e, v.y);
+    s.z = exchange(s.z, e, v.z);
     return true;
+}
+
+bool step_on(inout Stand s, Sides at) {
+    Exchange e;
+    return step_on(s, at, e);
 }
 
 // Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.

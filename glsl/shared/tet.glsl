@@ -91,7 +91,8 @@ uint outermost(vec4 own) {
 
 // What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
 struct Sides {
-    vec4 w;     // as in Weights, opposite to the vertices in the caller's order
+    vec4 w;     // as in Weights, opposite to the vertices in their order here
+    float sum;  // of them
     bool clear; // as in Weights
 };
 
@@ -102,11 +103,19 @@ Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
     precise float sum = (w.x + w.y) + (w.z + w.w);
     Sides r;
     r.w = sum < 0.0 ? -w : w;
+    r.sum = abs(sum);
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
     precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
     r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
     return r;
+}
+
+// Barycentric coordinates in the order of the vertices.
+vec4 barycentric(Sides r) {
+    float k = r.sum <= 0.0 ? 0.0 : reciprocal(r.sum);
+    precise vec4 b = r.w * k;
+    return b;
 }
 
 const float SMALLEST_FLOAT = -3.40282347e38;

@@ -138,7 +138,7 @@ impl<'a> Locator<'a> {
         (tet, tet.weights(x))
     }
 
-    fn walker(&self) -> Walker<'_> {
+    pub(super) fn walker(&self) -> Walker<'_> {
         Walker { mesh: self.mesh, neighbours: self.neighbours, normalised: &self.normalised }
     }
 

@@ -56,8 +56,10 @@ pub struct Weights {
 /// What a step of a walk needs: cheaper than [`Weights`], but neighbours may disagree about their face by rounding.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
-    /// As in [`Weights`], opposite to the vertices in the caller's order.
+    /// As in [`Weights`], opposite to the vertices in their order here.
     pub w: [f32; 4],
+    /// Their sum.
+    pub sum: f32,
     /// As in [`Weights`]: rounding is far below the margin here too.
     pub clear: bool,
 }
@@ -67,13 +69,22 @@ pub fn sides_of(v: [Vec3; 4], p: Vec3) -> Sides {
     let [a, b, c, d] = v.map(|v| sub(v, p));
     let (ab, cd) = (cross(a, b), cross(c, d));
     let w = [dot(cd, b), -dot(cd, a), dot(ab, d), -dot(ab, c)];
-    let w = if (w[0] + w[1]) + (w[2] + w[3]) < 0.0 { w.map(|w| -w) } else { w };
+    let sum = (w[0] + w[1]) + (w[2] + w[3]);
+    let w = if sum < 0.0 { w.map(|w| -w) } else { w };
     let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
     let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
     let size = sub(hi, lo);
     let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
     let in_box = (0..3).all(|k| lo[k] <= 0.0 && 0.0 <= hi[k]);
-    Sides { w, clear: in_box && w[0].min(w[1]).min(w[2].min(w[3])) > margin }
+    Sides { w, sum: sum.abs(), clear: in_box && w[0].min(w[1]).min(w[2].min(w[3])) > margin }
+}
+
+impl Sides {
+    /// Barycentric coordinates in the order of the vertices.
+    pub fn barycentric(&self) -> [f32; 4] {
+        let k = if self.sum <= 0.0 { 0.0 } else { reciprocal(self.sum) };
+        self.w.map(|w| w * k)
+    }
 }
 
 impl Tet {

@@ -17,7 +17,6 @@ pub use skip::Skips;
 use super::boundary::Topology;
 use super::locate::Locator;
 use super::ranges::{ranges, visible};
-use super::tet::Vec3;
 use crate::error::{Error, Result};
 use crate::mesh::{Field, Mesh, On};
 use crate::render::{Bounds, Plan, Prepared, RenderSettings};
@@ -51,7 +50,6 @@ pub struct Scene<'a> {
     pub(crate) topology: &'a Topology,
     pub(crate) tree: &'a TreeArrays,
     pub(crate) field: &'a Field,
-    pub(crate) normalised: Vec<Vec3>,
     pub(crate) prepared: Prepared,
     /// Which nodes have something to see; `None` where no value of the field is transparent.
     pub(crate) visible: Option<Vec<u32>>,
@@ -77,12 +75,11 @@ impl<'a> Scene<'a> {
         let bounds = Bounds { lo: [lo[0], lo[1], lo[2]], hi: [hi[0], hi[1], hi[2]] };
         let valid = |tet: usize| topology.is_valid(tet as u32);
         let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
-        let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
         let start = Instant::now();
         let visible = prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.drawn));
         let ranges_ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
         let locator = Locator::new(mesh, topology, tree).with_tolerance(0.0);
-        Ok(Self { mesh, topology, tree, field, normalised, prepared, visible, ranges_ms, locator })
+        Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, locator })
     }
 
     /// The same with every sample in the mesh taken, transparent or not.

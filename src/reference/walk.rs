@@ -15,7 +15,7 @@
 use super::boundary::NONE;
 use super::candidates::Best;
 use super::grid::reciprocal;
-use super::tet::{Tet, Vec3, Weights, sides_of};
+use super::tet::{Sides, Tet, Vec3, Weights, sides_of};
 use crate::mesh::Mesh;
 
 /// Most tetrahedra of a star.
@@ -53,6 +53,25 @@ pub struct Walked {
     pub steps: u32,
     /// Points gone by, 0 if the first part was enough.
     pub detours: u32,
+}
+
+/// The tetrahedron that a stride stands in, its corners in ascending index, so that what is worked out of them does not depend on the way.
+#[derive(Clone, Copy, Debug)]
+pub struct Stand {
+    /// Its number.
+    pub t: u32,
+    /// Its vertices in the caller's order.
+    cell: [u32; 4],
+    /// Its vertices ascending.
+    pub ids: [u32; 4],
+    v: [Vec3; 4],
+}
+
+impl Stand {
+    /// The sides of x on which its faces lie.
+    pub fn sides(&self, x: Vec3) -> Sides {
+        sides_of(self.v, x)
+    }
 }
 
 /// The face that says outside most.
@@ -105,29 +124,37 @@ impl Walker<'_> {
         best.inside || (best.in_box && best.smallest >= GAP)
     }
 
-    /// Goes from `t` to the tetrahedron that holds x clearly, if it is not far.
-    pub fn stride_to(&self, mut t: u32, x: Vec3, most: u32) -> Option<u32> {
-        let mut cell = *self.mesh.tets.get(t as usize)?;
+    /// Stands in a tetrahedron, if there is one of that number.
+    pub fn stand_in(&self, t: u32) -> Option<Stand> {
+        let cell = *self.mesh.tets.get(t as usize)?;
         let mut ids = cell;
-        let mut v = ids.map(|id| self.normalised[id as usize]);
-        let xor = |ids: [u32; 4]| ids.iter().fold(0, |a, b| a ^ b);
+        ids.sort_unstable();
+        Some(Stand { t, cell, ids, v: ids.map(|id| self.normalised[id as usize]) })
+    }
+
+    /// The tetrahedron behind the face that says outside most.
+    fn step_on(&self, from: &Stand, at: &Sides) -> Option<Stand> {
+        let face = outermost(at.w);
+        let place = from.cell.iter().position(|&id| id == from.ids[face])?;
+        (at.w[face] < 0.0).then(|| self.stand_in(self.neighbours[from.t as usize][place])).flatten()
+    }
+
+    /// Goes from `t` to the tetrahedron that holds x clearly, if it is not far.
+    pub fn stride(&self, t: u32, x: Vec3, most: u32) -> Option<(Stand, Sides)> {
+        let mut stand = self.stand_in(t)?;
         for _ in 0..most {
-            let at = sides_of(v, x);
+            let at = stand.sides(x);
             if at.clear {
-                return Some(t);
+                return Some((stand, at));
             }
-            let face = outermost(at.w);
-            let left = ids[face];
-            if at.w[face] >= 0.0 {
-                break;
-            }
-            t = self.neighbours[t as usize][cell.iter().position(|&id| id == left).unwrap_or(3)];
-            // Three corners are shared; the fourth takes the place of the one left behind.
-            cell = *self.mesh.tets.get(t as usize)?;
-            ids[face] = xor(cell) ^ xor(ids) ^ left;
-            v[face] = self.normalised[ids[face] as usize];
+            stand = self.step_on(&stand, &at)?;
         }
         None
+    }
+
+    /// The number of that tetrahedron.
+    pub fn stride_to(&self, t: u32, x: Vec3, most: u32) -> Option<u32> {
+        self.stride(t, x, most).map(|(stand, _)| stand.t)
     }
 
     /// Part 1, from `t`; whether the owner is settled.

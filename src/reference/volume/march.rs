@@ -3,9 +3,7 @@
 use super::Scene;
 use super::skip::{Skips, inverse_of};
 use crate::mesh::On;
-use crate::reference::boundary::NONE;
-use crate::reference::tet::Tet;
-use crate::reference::walk::outermost;
+use crate::reference::walk::Stand;
 use crate::render::Plan;
 
 /// Steps of a walk across faces before the tree is asked.
@@ -15,22 +13,14 @@ const WALK: u32 = 6;
 pub struct Marcher<'a> {
     scene: &'a Scene<'a>,
     plan: &'a Plan,
-    cell: Option<Cell>,
+    /// That of the last sample, if it lay in one: behind a gap the tree is asked first.
+    cell: Option<u32>,
     /// Samples taken so far.
     pub samples: u64,
     /// Samples left out: nothing is to be seen in their nodes.
     pub skipped_samples: u64,
     /// Samples taken that lie in the mesh.
     pub found_samples: u64,
-}
-
-/// A tetrahedron and what its samples need.
-#[derive(Clone, Copy)]
-struct Cell {
-    id: u32,
-    tet: Tet,
-    values: [f32; 4],
-    normals: [[f32; 3]; 4],
 }
 
 impl<'a> Marcher<'a> {
@@ -64,14 +54,12 @@ impl<'a> Marcher<'a> {
             let p = plan.sample(ray, next);
             next += 1;
             self.samples += 1;
-            let Some((cell, b)) = self.locate(p) else {
-                // Behind a gap the tree is asked first.
-                self.cell = None;
-                continue;
-            };
+            let Some((stand, b)) = self.locate(p) else { continue };
             self.found_samples += 1;
-            let v = cell.values;
-            let value = if self.scene.field.on == On::Cells { v[0] } else { (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3]) };
+            let at = |v: [f32; 4]| (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3]);
+            let field = self.scene.field;
+            let value =
+                if field.on == On::Cells { field.values[stand.t as usize] } else { at(stand.ids.map(|i| field.values[i as usize])) };
             if !value.is_finite() {
                 continue;
             }
@@ -82,8 +70,8 @@ impl<'a> Marcher<'a> {
             check = check.max(next + 1);
             let mut color = [red, green, blue];
             if let Some((light, half)) = &light {
-                let m = cell.normals;
-                let n = [0, 1, 2].map(|c| (b[0] * m[0][c] + b[1] * m[1][c]) + (b[2] * m[2][c] + b[3] * m[3][c]));
+                let normals = &self.scene.prepared.normals;
+                let n = [0, 1, 2].map(|c| at(stand.ids.map(|i| normals[i as usize][c])));
                 let shade = light.shade(n, direction, *half);
                 color = color.map(|c| (c * shade.factor + shade.added).min(1.0));
                 a += (1.0 - a) * shade.rim;
@@ -100,41 +88,17 @@ impl<'a> Marcher<'a> {
         sum
     }
 
-    /// Owner and barycentric coordinates of a point: of the last cell or one a short walk across faces away, if that contains the point
-    /// clearly, which makes it the owner in a mesh whose cells do not overlap; or else by the tree.
-    fn locate(&mut self, p: [f32; 3]) -> Option<(Cell, [f32; 4])> {
-        if let Some(mut cell) = self.cell {
-            let x = self.scene.tree.grid.normalise(p);
-            for _ in 0..WALK {
-                let weights = cell.tet.weights(x);
-                if weights.clear {
-                    self.cell = Some(cell);
-                    return Some((cell, weights.barycentric(cell.tet.rank)));
-                }
-                let own = cell.tet.rank.map(|r| weights.w[r]);
-                let face = outermost(own);
-                let next = self.scene.topology.neighbours[cell.id as usize][face];
-                if own[face] >= 0.0 || next == NONE {
-                    break;
-                }
-                cell = self.cell(next);
-            }
-        }
-        let location = self.scene.locator.locate(p);
-        let cell = self.cell(location.found()?);
-        self.cell = Some(cell);
-        Some((cell, location.barycentric))
-    }
-
-    /// Gathers what samples in a tetrahedron (a valid one) need.
-    fn cell(&self, id: u32) -> Cell {
-        let scene = self.scene;
-        let ids = scene.mesh.tets[id as usize];
-        let values = match scene.field.on {
-            On::Points => ids.map(|i| scene.field.values[i as usize]),
-            On::Cells => [scene.field.values[id as usize]; 4],
-        };
-        let normals = ids.map(|i| scene.prepared.normals.get(i as usize).copied().unwrap_or_default());
-        Cell { id, tet: Tet::new(ids, &scene.normalised), values, normals }
+    /// Where a point lies, and its barycentric coordinates: in the last cell or one a short walk across faces away, if that contains the point
+    /// clearly, which makes it the owner in a mesh whose cells do not overlap; or else where the tree says. Outside of the bounds there is nothing to ask for.
+    fn locate(&mut self, p: [f32; 3]) -> Option<(Stand, [f32; 4])> {
+        let (walker, grid) = (self.scene.locator.walker(), &self.scene.tree.grid);
+        let x = grid.normalise(p);
+        let found = self.cell.and_then(|cell| walker.stride(cell, x, WALK)).or_else(|| {
+            (0..3).all(|c| 0.0 <= x[c] && x[c] <= grid.extent[c]).then_some(())?;
+            let stand = walker.stand_in(self.scene.locator.locate(p).found()?)?;
+            Some((stand, stand.sides(x)))
+        });
+        self.cell = found.map(|(stand, _)| stand.t);
+        found.map(|(stand, sides)| (stand, sides.barycentric()))
     }
 }
