@@ -6,6 +6,7 @@ mod host;
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
+use host::baseline::Baseline;
 use host::counted::{ARMED, CALLS, counting};
 use host::queries::Queries;
 use host::{Frame, Host};
@@ -90,16 +91,20 @@ fn one_device_serves_many_threads() {
 }
 
 fn nothing_is_made(binding: Binding) {
-    let host = Host::new();
+    let host = Host::tracing();
     let options = GpuOptions { binding: Some(binding), ..GpuOptions::default() };
     // SAFETY: as above; the counted functions do what the device's own do.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
     let frame = Frame::new(&gpu, &mesh);
     let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 1000);
+    let baseline = Baseline::new(&gpu, &mesh);
+    assert_eq!(baseline.ray_methods(), usize::from(host.rays.queries) + usize::from(host.rays.pipelines));
     let record = |r: &mut Recorder<'_>| {
         frame.record(r)?;
-        queries.record(r)
+        queries.record(r)?;
+        baseline.record_lbvh(r)?;
+        baseline.record_rays(r)
     };
     let mut rehearsal = Recorder::rehearse(&gpu);
     record(&mut rehearsal).unwrap();

@@ -5,9 +5,9 @@
 mod host;
 
 use host::Frame;
+use host::baseline::Baseline;
 use host::queries::Queries;
 use olbvh::Error;
-use olbvh::baseline::{LbvhScratch, cmd_build_lbvh, cmd_locate_lbvh};
 use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
     cmd_ranges, range_bytes,
@@ -19,7 +19,7 @@ use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
-use olbvh::query::{BinaryTree, LocateOptions, LocateOutput, Rounds, Scene, cmd_interpolate, cmd_locate, cmd_visible, visible_bytes};
+use olbvh::query::{LocateOptions, Scene, cmd_interpolate, cmd_locate, cmd_visible, visible_bytes};
 
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
@@ -178,23 +178,13 @@ fn ranges_of_a_field() {
 #[test]
 fn baseline() {
     let mesh = kuhn_jittered([4, 3, 5], 0.3, 1).unwrap();
-    let tets = mesh.tets.len() as u32;
     for gpu in targets(&Gpu::new(&GpuOptions::default()).unwrap()) {
-        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
-        let carve = |a: &mut Arena| {
-            let output = LocateOutput { owners: a.words(u64::from(tets))?, barycentrics: a.words(4 * u64::from(tets))? };
-            Ok((BinaryTree::carve(a, tets)?, LbvhScratch::carve(&gpu, a, tets)?, output, a.words(1)?))
-        };
-        let memory = gpu.buffer("olbvh.test.lbvh", Arena::measure(carve).unwrap()).unwrap();
-        let (tree, scratch, output, unfinished) = carve(&mut Arena::new(memory.all())).unwrap();
-        let (points, sink) = (gpu.upload("olbvh.test.points", &mesh.points).unwrap(), gpu.buffer("olbvh.test.sink", 64).unwrap());
-        let asked = (points.all(), mesh.points.len() as u32);
+        let baseline = Baseline::new(&gpu, &mesh);
+        let sink = gpu.buffer("olbvh.test.sink", 64).unwrap();
         let barriers = every_barrier_counts(&gpu, "lbvh", |r| {
-            cmd_build_lbvh(r, &view, &tree, &scratch)?;
-            cmd_locate_lbvh(r, (&view, &tree), asked, &output, unfinished, 0.0, Rounds::begin(2))?;
+            baseline.record_lbvh(r)?;
             r.barrier("lbvh.locate → caller");
-            read(r, &[output.owners, output.barycentrics, unfinished], &sink);
+            read(r, &[baseline.output.owners, baseline.output.barycentrics, baseline.unfinished], &sink);
             Ok(())
         });
         assert!(barriers >= 10, "{barriers}");

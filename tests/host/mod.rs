@@ -2,19 +2,22 @@
 
 #![allow(dead_code, unsafe_code, reason = "each test uses a part; a device is made by hand")]
 
+pub mod baseline;
 pub mod counted;
 pub mod queries;
 
 use ash::vk;
 use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
-use olbvh::gpu::{Buffer, Enabled, Gpu, HostDevice, Recorder, Requirements};
+use olbvh::gpu::{Buffer, Enabled, Gpu, HostDevice, RayTracing, Recorder, Requirements};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
 use olbvh::primitives::Arena;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate};
+use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 
-/// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses.
+/// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses and, if asked for, rays.
+/// Under a validation layer one message of it fails the test, when the device is destroyed.
 pub struct Host {
     pub entry: ash::Entry,
     pub instance: ash::Instance,
@@ -23,15 +26,56 @@ pub struct Host {
     pub family: u32,
     pub addresses: bool,
     pub control: bool,
+    pub rays: RayTracing,
+    watched: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
+    messages: Box<Messages>,
+}
+
+type Messages = Mutex<Vec<String>>;
+
+unsafe extern "system" fn collect(
+    _: vk::DebugUtilsMessageSeverityFlagsEXT,
+    _: vk::DebugUtilsMessageTypeFlagsEXT,
+    data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
+    user: *mut c_void,
+) -> vk::Bool32 {
+    // SAFETY: the layer's data hold a string; `user` is the box of the host, which outlives the messenger.
+    let (text, messages) = unsafe { ((*data).message_as_c_str(), &*user.cast::<Messages>()) };
+    messages.lock().unwrap().push(text.unwrap_or_default().to_string_lossy().into_owned());
+    vk::FALSE
 }
 
 impl Host {
     pub fn new() -> Self {
+        Self::with(false)
+    }
+
+    /// With everything that rays are traced with, if the device has it.
+    pub fn tracing() -> Self {
+        Self::with(true)
+    }
+
+    fn with(rays: bool) -> Self {
         // SAFETY: plain creation; `drop` destroys device and instance once.
         unsafe {
             let entry = ash::Entry::load().unwrap();
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
-            let instance = entry.create_instance(&vk::InstanceCreateInfo::default().application_info(&application), None).unwrap();
+            let names =
+                if std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { vec![ash::ext::debug_utils::NAME.as_ptr()] } else { vec![] };
+            let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&names);
+            let instance = entry.create_instance(&info, None).unwrap();
+            let messages = Box::<Messages>::default();
+            let watched = (!names.is_empty()).then(|| {
+                let functions = ash::ext::debug_utils::Instance::new(&entry, &instance);
+                let severities = vk::DebugUtilsMessageSeverityFlagsEXT::WARNING | vk::DebugUtilsMessageSeverityFlagsEXT::ERROR;
+                let info = vk::DebugUtilsMessengerCreateInfoEXT::default()
+                    .message_severity(severities)
+                    .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION)
+                    .pfn_user_callback(Some(collect))
+                    .user_data((&raw const *messages).cast_mut().cast());
+                let messenger = functions.create_debug_utils_messenger(&info, None).unwrap();
+                (functions, messenger)
+            });
             let physical = instance.enumerate_physical_devices().unwrap()[0];
             let needs = Requirements::check(&instance, physical);
             assert!(needs.missing.is_empty(), "{:?}", needs.missing);
@@ -40,19 +84,39 @@ impl Host {
             let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(needs.buffer_addresses);
             let mut control =
                 vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
-            let extensions = [ash::ext::subgroup_size_control::NAME.as_ptr()];
-            let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses);
+            let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+            let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+            let mut ray_pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+            let rays = if rays { needs.ray_tracing } else { RayTracing::default() };
+            let extensions: Vec<_> = needs
+                .extensions
+                .iter()
+                .filter(|&&e| rays.any() || e == ash::ext::subgroup_size_control::NAME)
+                .map(|e| e.as_ptr())
+                .collect();
+            let mut info =
+                vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses).enabled_extension_names(&extensions);
             if needs.subgroup_size_control {
-                info = info.push_next(&mut control).enabled_extension_names(&extensions);
+                info = info.push_next(&mut control);
+            }
+            if rays.any() {
+                info = info.push_next(&mut structures);
+            }
+            if rays.queries {
+                info = info.push_next(&mut ray_queries);
+            }
+            if rays.pipelines {
+                info = info.push_next(&mut ray_pipelines);
             }
             let device = instance.create_device(physical, &info, None).unwrap();
             let (addresses, control) = (needs.buffer_addresses, needs.subgroup_size_control);
-            Self { entry, instance, physical, device, family, addresses, control }
+            Self { entry, instance, physical, device, family, addresses, control, rays, watched, messages }
         }
     }
 
     pub fn enabled(&self) -> Enabled {
-        Enabled { buffer_addresses: self.addresses, subgroup_size_control: self.control, ..Enabled::default() }
+        let (buffer_addresses, subgroup_size_control, ray_tracing) = (self.addresses, self.control, self.rays);
+        Enabled { buffer_addresses, subgroup_size_control, ray_tracing, ..Enabled::default() }
     }
 
     pub fn queue(&self) -> Arc<Mutex<vk::Queue>> {
@@ -79,8 +143,13 @@ impl Drop for Host {
         // SAFETY: whatever was made from the device is gone.
         unsafe {
             self.device.destroy_device(None);
+            if let Some((functions, messenger)) = &self.watched {
+                functions.destroy_debug_utils_messenger(*messenger, None);
+            }
             self.instance.destroy_instance(None);
         }
+        let messages = self.messages.lock().unwrap();
+        assert!(messages.is_empty() || std::thread::panicking(), "{messages:#?}");
     }
 }
 

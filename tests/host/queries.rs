@@ -1,4 +1,4 @@
-//! All owners, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
+//! All owners, values at what was located, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
 
 use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
@@ -7,9 +7,9 @@ use olbvh::mesh::{Mesh, On};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    LocateOptions, OverlapMemory, OwnersMemory, PairMemory, PointInput, RenderInput, RenderMemory, Rounds, Scene, Searched, Shown,
-    SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_list_owners, cmd_list_pairs, cmd_overlap, cmd_render,
-    cmd_slice,
+    LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, RenderInput, RenderMemory, Rounds, Scene, Searched,
+    Shown, SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners, cmd_list_pairs,
+    cmd_overlap, cmd_render, cmd_slice,
 };
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -19,6 +19,8 @@ pub struct Queries {
     pub points: PointInput,
     pub owners: OwnersMemory,
     pub owner_lists: BufferRef,
+    located: LocateOutput,
+    values: BufferRef,
     pub voxels: VoxelGrid,
     pub rows: Rows,
     pub slice: SliceMemory,
@@ -39,8 +41,8 @@ pub struct Queries {
 }
 
 impl Queries {
-    /// Behind `frame`, whose mesh has the field `values` on its points, with room for so many pairs.
-    pub fn new(gpu: &Gpu, frame: &Frame, values: &[f32], other: &Mesh, room: u64) -> Self {
+    /// Behind `frame`, whose mesh has those values on its points, with room for so many pairs.
+    pub fn new(gpu: &Gpu, frame: &Frame, field: &[f32], other: &Mesh, room: u64) -> Self {
         let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
         let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
         // Pairs are found by lists.
@@ -56,20 +58,20 @@ impl Queries {
             layers: 9,
         };
         let rows = Rows { layer: 0, first: 0, count: 29 * 9 };
-        let plan = plan(values);
-        let normals = vec![[0.6, 0.0, 0.7]; values.len()];
+        let plan = plan(field);
+        let normals = vec![[0.6, 0.0, 0.7]; field.len()];
         let carve = |a: &mut Arena| {
             let slice = SliceMemory::carve(a, 37, rows.count)?;
             let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
             let picture = RenderMemory::carve(a, plan.size, Some(&frame.capacity))?;
-            let ranges = a.take(range_bytes(frame.capacity.nodes))?;
-            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, ranges))
+            let (ranges, values) = (a.take(range_bytes(frame.capacity.nodes))?, a.words(u64::from(frame.points.count))?);
+            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, ranges, values))
         };
         let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
-        let (slice, sets, pairs, found, owners, owner_lists, picture, ranges) = carve(&mut Arena::new(memory.all())).unwrap();
-        let field = gpu.upload("olbvh.test.field", values).unwrap();
+        let (slice, sets, pairs, found, owners, owner_lists, picture, ranges, values) = carve(&mut Arena::new(memory.all())).unwrap();
+        let field = gpu.upload("olbvh.test.field", field).unwrap();
         let points = frame.points;
         let drawn = [
             gpu.upload("olbvh.test.view", &[plan.view()]).unwrap(),
@@ -82,6 +84,8 @@ impl Queries {
             points,
             owners,
             owner_lists,
+            located: frame.output,
+            values,
             voxels,
             rows,
             slice,
@@ -104,6 +108,8 @@ impl Queries {
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         cmd_count_owners(r, &self.scene, &self.points, &self.owners, &LocateOptions::default())?;
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
+        let count = self.points.count;
+        cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;
         let searched = Searched { mesh: self.scene.mesh, structure: Structure::Octree(self.scene.tree) };
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };

@@ -1,0 +1,58 @@
+//! The baselines' construction and location, recorded.
+
+use olbvh::baseline::{LbvhScratch, RayMethod, Rays, cmd_build_lbvh, cmd_locate_lbvh};
+use olbvh::build::{BadCells, DeviceMesh, MeshView};
+use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
+use olbvh::mesh::Mesh;
+use olbvh::primitives::Arena;
+use olbvh::query::{BinaryTree, LocateOutput, PointInput, Rounds};
+
+/// Memory of both baselines over a mesh, whose points are asked for.
+pub struct Baseline {
+    pub output: LocateOutput,
+    pub unfinished: BufferRef,
+    mesh: DeviceMesh,
+    points: Buffer,
+    tree: BinaryTree,
+    scratch: LbvhScratch,
+    /// Where the device traces rays.
+    rays: Vec<Rays>,
+    _memory: Buffer,
+}
+
+impl Baseline {
+    pub fn new(gpu: &Gpu, mesh: &Mesh) -> Self {
+        let points = gpu.upload("olbvh.test.points", &mesh.points).unwrap();
+        let (asked, mesh) = (mesh.points.len() as u64, DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
+        let tets = mesh.input().tets;
+        let carve = |a: &mut Arena| {
+            let output = LocateOutput { owners: a.words(asked)?, barycentrics: a.words(4 * asked)? };
+            Ok((BinaryTree::carve(a, tets)?, LbvhScratch::carve(gpu, a, tets)?, output, a.words(1)?))
+        };
+        let memory = gpu.buffer("olbvh.test.lbvh", Arena::measure(carve).unwrap()).unwrap();
+        let (tree, scratch, output, unfinished) = carve(&mut Arena::new(memory.all())).unwrap();
+        let rays = RayMethod::ALL.into_iter().filter_map(|method| Rays::build(gpu, &mesh, method).unwrap()).collect();
+        Self { output, unfinished, mesh, points, tree, scratch, rays, _memory: memory }
+    }
+
+    /// How many ways of tracing rays are recorded.
+    pub fn ray_methods(&self) -> usize {
+        self.rays.len()
+    }
+
+    pub fn record_lbvh(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        let view = MeshView { input: *self.mesh.input(), arrays: *self.mesh.arrays() };
+        cmd_build_lbvh(r, &view, &self.tree, &self.scratch)?;
+        let asked = (self.points.all(), self.mesh.input().points);
+        cmd_locate_lbvh(r, (&view, &self.tree), asked, &self.output, self.unfinished, 0.0, Rounds::begin(2))
+    }
+
+    pub fn record_rays(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        let input = PointInput { points: self.points.all(), stride: 3, count: self.mesh.input().points, hints: None };
+        for rays in &self.rays {
+            r.barrier("located → rays.locate");
+            rays.cmd_locate(r, &self.mesh, &input, &self.output)?;
+        }
+        Ok(())
+    }
+}
