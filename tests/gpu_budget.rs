@@ -3,17 +3,18 @@
 
 use olbvh::Error;
 use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, MeshView, Tree, TreeMemory, cmd_build};
-use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
-use olbvh::query::{LocateOptions, locate};
+use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
+use olbvh::reference::locate::Locator;
 use olbvh::reference::vertices::Vertices;
-use olbvh::tree::Memory;
+use olbvh::tree::{Memory, TreeArrays};
 
 /// A mesh that fills little of its bounds, so that a level has far fewer nodes than cells.
 fn diagonal() -> Mesh {
@@ -107,4 +108,106 @@ fn memory_of_a_recorded_build() {
     }
     assert!(levels.is_sorted() && levels[0] < levels[3], "{levels:?}");
     assert!(matches!(Capacity::for_bytes(100, 8, &BuildOptions::default()), Err(Error::TooLarge(_))));
+}
+
+/// A recorded build and what is located in it.
+struct Built {
+    tree: TreeMemory,
+    owners: BufferRef,
+}
+
+fn one<T: bytemuck::AnyBitPattern>(content: &[u32], part: BufferRef) -> T {
+    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&content[part.offset as usize / 4..][..size_of::<T>() / 4]))
+}
+
+/// The part of a tree that was built.
+fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArrays {
+    let words = |part: BufferRef, n: u32| content[part.offset as usize / 4..][..n as usize].to_vec();
+    let (nodes, internal) = (status.nodes, status.internal);
+    TreeArrays {
+        assign: tree.assign,
+        lists: tree.lists,
+        grid: one(content, tree.grid),
+        p: words(tree.p, status.entries),
+        po: words(tree.po, nodes + 1),
+        co: words(tree.co, internal + 1),
+        no: status.levels[..=status.level as usize].to_vec(),
+        boundary: words(tree.flags, nodes.div_ceil(32)),
+        mask: words(tree.masks, internal.div_ceil(4)),
+        boxes: None,
+    }
+}
+
+/// Every capacity from one entry per tetrahedron, which the root may need, to more than the deepest level takes: the deepest tree that fits, within its
+/// memory, and every point is found in it. One entry less is refused before anything is recorded.
+#[test]
+fn every_capacity() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([3, 3, 4], 0.3, 2).unwrap();
+    let topology = topology(&mesh).unwrap();
+    let sizes = measure(&mesh, &topology, &Vertices::new(&mesh, &topology.grid));
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Reject).unwrap();
+    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let (input, tets) = (view.input, view.input.tets);
+    let points = PointInput { points: input.positions, stride: input.stride, count: input.points, hints: None };
+    for lists in Lists::EVERY {
+        let options = BuildOptions { lists, ..BuildOptions::default() };
+        let deepest = sizes.level(&options).unwrap();
+        let entries = |level: u32| sizes.entries[level as usize] as u32;
+        let trees: Vec<_> =
+            (0..=deepest).map(|l| build(&mesh, &topology, &BuildOptions { capacity: Some(entries(l)), ..options }).unwrap()).collect();
+        trees.iter().for_each(|tree| drop(tree.validate(&mesh, &topology).unwrap()));
+        let expected: Vec<u32> = mesh.points.iter().map(|&p| Locator::new(&mesh, &topology, &trees[0]).owners(p)[0]).collect();
+        let plan = |a: &mut Arena, room: u32| BuildScratch::carve(&gpu, a, tets, &Capacity::for_entries(room, deepest + 1), &options);
+        let text = Arena::measure(|a| plan(a, tets - 1)).unwrap_err().to_string();
+        assert!([tets, tets - 1].iter().all(|n| text.contains(&n.to_string())), "{text}");
+
+        // Synchronization does not depend on the capacity, and its validation takes time.
+        let step = if std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { 9 } else { 1 };
+        let rooms: Vec<u32> = (tets..entries(deepest) + 10).step_by(step).collect();
+        let mut built_levels = vec![0; trees.len()];
+        for rooms in rooms.chunks(128) {
+            let carve = |a: &mut Arena| {
+                let one = |&room: &u32| {
+                    let tree = TreeMemory::carve(a, &Capacity::for_entries(room, deepest + 1), &options)?;
+                    Ok(Built { tree, owners: a.words(u64::from(input.points))? })
+                };
+                let built = rooms.iter().map(one).collect::<olbvh::Result<Vec<_>>>()?;
+                Ok((built, a.take(16 * u64::from(input.points))?))
+            };
+            let memory = gpu.upload("olbvh.test.trees", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
+            let (built, barycentrics) = carve(&mut Arena::new(memory.all())).unwrap();
+            let scratch = gpu.buffer("olbvh.test.scratch", Arena::measure(|a| plan(a, rooms[rooms.len() - 1])).unwrap()).unwrap();
+            gpu.run("olbvh.test.sweep", |r| {
+                built.iter().zip(rooms).try_for_each(|(Built { tree, owners }, &room)| {
+                    cmd_build(r, &view, tree, &tree.capacity, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
+                    let scene = Scene { mesh: view, tree: *tree, longest_leaf: tets };
+                    cmd_locate(r, &scene, &points, &LocateOutput { owners: *owners, barycentrics }, &LocateOptions::default())?;
+                    r.barrier("locate → build");
+                    Ok(())
+                })
+            })
+            .unwrap();
+            let content: Vec<u32> = gpu.download(&memory, memory.all()).unwrap();
+            let mut end = 0;
+            for (Built { tree: t, owners }, &room) in built.iter().zip(rooms) {
+                let status: BuildStatus = one(&content, t.status);
+                let level = (0..=deepest).rev().find(|&l| entries(l) <= room).unwrap();
+                assert_eq!((status.overflow, status.level), (0, level), "{lists} {room}");
+                assert!(arrays(&content, t, &status) == trees[level as usize], "{lists} {room}");
+                assert_eq!(content[owners.offset as usize / 4..][..expected.len()], expected, "{lists} {room}");
+                built_levels[level as usize] += 1;
+                for part in [t.status, t.grid, t.p, t.po, t.co, t.flags, t.masks, *owners] {
+                    assert!(
+                        content[end..part.offset as usize / 4].iter().all(|&word| word == 0x5555_5555),
+                        "{lists} {room}: written before {part:?}"
+                    );
+                    end = (part.offset + part.size).div_ceil(4) as usize;
+                }
+            }
+        }
+        assert!(built_levels.len() > 2 && built_levels.iter().all(|&n| n > 0), "{built_levels:?}");
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
 }

@@ -24,7 +24,7 @@ pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use stages::MeshView;
 pub use tree::Tree;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
@@ -39,11 +39,20 @@ pub struct BuildScratch {
 }
 
 impl BuildScratch {
-    /// For a mesh of `tets` tetrahedra within `capacity`.
+    /// For a mesh of `tets` tetrahedra, bad ones included, within `capacity` and that of `options`: with as many entries as tetrahedra or more there is
+    /// a tree whatever the mesh.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`Error::TooLarge`] for a capacity of fewer entries than tetrahedra, [`Error::Invalid`] if the arena is too small.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
+        let room = options.capacity.unwrap_or(u32::MAX).min(capacity.candidates);
+        if room < tets {
+            let level = capacity.level;
+            let bytes = Arena::measure(|a| TreeMemory::carve(a, &Capacity::for_entries(tets, level), options))?;
+            return Err(Error::TooLarge(format!(
+                "the root alone may list {tets} tetrahedra, the capacity is {room} entries; plan for {tets} or more, {bytes} bytes of tree down to level {level}"
+            )));
+        }
         Ok(Self {
             counts: CountScratch::carve(gpu, arena, tets)?,
             filter: FilterScratch::carve(gpu, arena, tets, options, capacity)?,
@@ -53,7 +62,8 @@ impl BuildScratch {
 }
 
 /// Records a whole build within `capacity`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
-/// more entries, a coarser one is built; `tree.status` says what was.
+/// more entries, a coarser one is built, down to the root alone, which every capacity that [`BuildScratch::carve`] took has room for; `tree.status` says
+/// what was, and of a budget that is too small for the root that nothing was.
 ///
 /// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
 /// write, behind it stands a barrier to compute, transfer and indirect reads.

@@ -6,7 +6,7 @@ use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
 
-/// Sizes that bound a build.
+/// Sizes that bound a build. A recorded one wants room for as many candidates as there are tetrahedra: [`super::BuildScratch::carve`] refuses less.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacity {
     /// Cells in the quantized boxes of all tetrahedra, the entries of `Aabb`.

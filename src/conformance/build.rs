@@ -11,7 +11,7 @@ use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::Arena;
-use crate::tree::TreeArrays;
+use crate::tree::{Memory, TreeArrays};
 
 /// Which interface builds, within what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,9 +24,9 @@ pub(crate) enum Way {
     Tight,
     /// [`cmd_build`] with room for one entry less than the heuristic's level needs.
     Clipped,
-    /// [`cmd_build`] with room for level 0 only.
+    /// [`cmd_build`] with as much room as level 0 may need, and no more.
     Root,
-    /// [`cmd_build`] with room for less than level 0: nothing is built, and the status says so.
+    /// [`cmd_build`] within a budget of less than level 0: nothing is built, and the status says so.
     Nothing,
     /// [`cmd_build`] with room for levels 0 to 2 only.
     Shallow,
@@ -61,31 +61,33 @@ pub(crate) struct BuildCase {
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, ..BuildOptions::default() };
     if case.way == Way::Owned {
-        return owned(gpu, device, &options, &Expected::new(twin, &options, u32::MAX, 10)?);
+        return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), 10)?);
     }
     let (capacity, expected) = within(case.way, twin, &options)?;
-    recorded(gpu, device, &options, &capacity, &expected)
+    let budget = (case.way == Way::Nothing).then(|| Memory::most(&twin.sizes.entries, 0, case.boxes).total() - 1);
+    recorded(gpu, device, &BuildOptions { budget, ..options }, &capacity, &expected)
 }
 
 /// The capacity of a way of building, and what is built within it.
 fn within(way: Way, twin: &mut Twin, options: &BuildOptions) -> Verdict<(Capacity, Expected)> {
     let limit = |entries: u64| u32::try_from(entries).unwrap_or(u32::MAX);
     let heuristic = twin.sizes.heuristic(options.alpha_fixed()?);
-    let root = limit(twin.sizes.entries[0]);
-    let room = limit(twin.sizes.entries[heuristic as usize]);
+    // Bad cells are not known when a build is planned.
+    let tets = twin.mesh.tets.len() as u32;
+    let room = limit(twin.sizes.entries[heuristic as usize]).max(tets);
     let (entries, level) = match way {
         // No deeper than need be: marks take a bit per cell of the deepest level.
-        Way::Clipped => (room.saturating_sub(1).max(root), if options.lists == Lists::All { 10 } else { heuristic }),
-        Way::Root => (root, 10),
-        Way::Nothing => (root.saturating_sub(1), 10),
+        Way::Clipped => (room.saturating_sub(1).max(tets), if options.lists == Lists::All { 10 } else { heuristic }),
+        Way::Root | Way::Nothing => (tets, 10),
         Way::Shallow => (room, 2),
         Way::Owned | Way::Recorded | Way::Tight => (room, 10),
     };
     let ample = way == Way::Recorded || way == Way::Tight;
-    let expected = Expected::new(twin, options, if ample { u32::MAX } else { entries }, level)?;
+    let fits = if ample { u32::MAX } else { entries };
+    let expected = Expected::new(twin, options, (way != Way::Nothing).then_some(fits), level)?;
     let capacity = match way {
         Way::Tight => Capacity {
-            candidates: expected.status.candidates,
+            candidates: expected.status.candidates.max(tets),
             entries: expected.status.entries,
             nodes: expected.status.nodes,
             level: expected.status.level,

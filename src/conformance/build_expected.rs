@@ -21,8 +21,8 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// Within `entries` candidates and down to `level` at most.
-    pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, entries: u32, level: u32) -> Verdict<Self> {
+    /// Within `room` candidates, `None`: not even those of the root, and down to `level` at most.
+    pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, room: Option<u32>, level: u32) -> Verdict<Self> {
         let sizes = twin.sizes;
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
         let mut status = BuildStatus { heuristic_level: heuristic, ..BuildStatus::default() };
@@ -32,7 +32,7 @@ impl Expected {
             (status.total[2 * k], status.total[2 * k + 1]) = (*n as u32, (n >> 32) as u32);
         }
         // A capacity of the deepest level that is allowed is a capacity for no deeper one (more entries at each), except where levels tie.
-        let fits = |k: u32| k <= level && sizes.entries[k as usize] <= u64::from(entries);
+        let fits = |k: u32| k <= level && room.is_some_and(|room| sizes.entries[k as usize] <= u64::from(room));
         let Some(chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
             status.overflow = 1;
             return Ok(Self { offsets: Vec::new(), boxes: options.boxes, status, built: None });
