@@ -162,8 +162,9 @@ fn every_capacity() {
         let text = Arena::measure(|a| plan(a, tets - 1)).unwrap_err().to_string();
         assert!([tets, tets - 1].iter().all(|n| text.contains(&n.to_string())), "{text}");
 
-        // Synchronization does not depend on the capacity, and its validation takes time.
-        let step = if std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { 9 } else { 1 };
+        // All of them on the reference driver; where a layer or another driver takes long, some.
+        let other = std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|name| !name.starts_with("lavapipe25"));
+        let step = if other || std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { 13 } else { 1 };
         let rooms: Vec<u32> = (tets..entries(deepest) + 10).step_by(step).collect();
         let mut built_levels = vec![0; trees.len()];
         for rooms in rooms.chunks(128) {
