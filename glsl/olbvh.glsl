@@ -145,7 +145,7 @@ vec3 olbvh_gradient(uint owner) {
 // Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
 //     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
-// olbvh_node_box gives a node's box, olbvh_entries its primitives: ids at olbvh_primitive(i) for i in [x, y).
+// olbvh_node_box gives a node's box, olbvh_entries the primitives of a leaf: ids at olbvh_primitive(i) for i in [x, y).
 #ifdef OLBVH_TRAVERSE
 #ifndef OLBVH_STACK
 #define OLBVH_STACK 8

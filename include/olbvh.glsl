@@ -46,7 +46,8 @@ struct olbvh_Grid {
     vec4 extent;  // Upper corner in normalised coordinates.
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
-    uint pad[2];  // Unused.
+    uint first_leaf; // Node index of the first leaf, n_ni.
+    uint pad;     // Unused.
 };
 
 // What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
@@ -226,7 +227,7 @@ struct olbvh_SceneAddresses {
     uvec2 olbvh_grid;       // Grid with the level of the leaves.
     uvec2 olbvh_masks;      // Child masks.
     uvec2 olbvh_co;         // Child offsets.
-    uvec2 olbvh_po;         // Primitive offsets.
+    uvec2 olbvh_po;         // Primitive offsets of the leaves.
     uvec2 olbvh_p;          // Primitive ids.
     uvec2 olbvh_flags;      // Boundary flags.
     uvec2 olbvh_cells;      // Vertex indices.
@@ -476,10 +477,10 @@ uint olbvh_find_node(uint node, uint from, uint level, uint code) {
 // The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
 uint olbvh_find_leaf(uint level, uvec3 finest) { return olbvh_find_node(0u, 0u, level, olbvh_morton(finest) >> (3u * (olbvh_MAX_LEVEL - level))); }
 
-// First entry of a node and the one behind its last.
-uvec2 olbvh_entry_range(uint node) {
-    uint begin = olbvh_po.at[node], end = olbvh_po.at[node + 1u];
-    return uvec2(begin >= end ? 0u : begin, end);
+// First entry of a leaf and the one behind its last.
+uvec2 olbvh_entry_range(uint leaf) {
+    uint i = leaf - olbvh_grid.at[0].first_leaf;
+    return uvec2(olbvh_po.at[i], olbvh_po.at[i + 1u]);
 }
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
 
@@ -884,7 +885,7 @@ vec3 olbvh_gradient(uint owner) {
 // Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
 //     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
-// olbvh_node_box gives a node's box, olbvh_entries its primitives: ids at olbvh_primitive(i) for i in [x, y).
+// olbvh_node_box gives a node's box, olbvh_entries the primitives of a leaf: ids at olbvh_primitive(i) for i in [x, y).
 #ifdef OLBVH_TRAVERSE
 #ifndef OLBVH_STACK
 #define OLBVH_STACK 8

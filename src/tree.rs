@@ -19,11 +19,12 @@ pub struct TreeArrays {
     pub assign: Assign,
     /// Which primitives a leaf lists.
     pub lists: Lists,
-    /// The grid whose cells the leaves are; its `level` is l.
+    /// The grid whose cells the leaves are; its `level` is l, its `first_leaf` `n_ni`.
     pub grid: Grid,
     /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
     pub p: Vec<u32>,
-    /// `PO[n_n + 1]`: node j ends at entry `po[j + 1]`; see [`TreeArrays::entries`] for where it begins.
+    /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper has offsets for every node; those of the
+    /// other nodes follow from their leaves.
     pub po: Vec<u32>,
     /// `CO[n_ni + 1]`: the children of internal node i are `co[i] + 1 ..= co[i + 1]`.
     pub co: Vec<u32>,
@@ -84,12 +85,14 @@ impl TreeArrays {
         (mask >> digit & 1 != 0).then(|| self.co[node as usize] + 1 + before)
     }
 
-    /// The slots of a node's entries in `p`: from `po[node]`, or from 0 where `po[node] ≥ po[node + 1]`, because the nodes of the next level
-    /// begin anew. The paper has `>` there (Eq. 9); no node is empty, so equality too means a new level: one of a single node, as meshes
-    /// have whose box is a point.
+    /// The slots of a node's entries in `p`: those of its first to its last leaf.
     pub fn entries(&self, node: u32) -> Range<usize> {
-        let (begin, end) = (self.po[node as usize], self.po[node as usize + 1]);
-        if begin >= end { 0..end as usize } else { begin as usize..end as usize }
+        let (mut first, mut last) = (node, node);
+        while first < self.internal_nodes() {
+            (first, last) = (self.co[first as usize] + 1, self.co[last as usize + 1]);
+        }
+        let leaf = |node: u32| (node - self.internal_nodes()) as usize;
+        self.po[leaf(first)] as usize..self.po[leaf(last) + 1] as usize
     }
 
     /// The primitives of a node: ascending and each once for a leaf; for others the lists of their leaves one after the other.

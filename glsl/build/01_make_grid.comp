@@ -57,7 +57,8 @@ void main() {
     uint exponent = floatBitsToUint(largest) >> 23;
     g.scale = uintBitsToFloat((254u - exponent) << 23);
     g.level = MAX_LEVEL;
-    g.pad = uint[2](0u, 0u);
+    g.first_leaf = 0u;
+    g.pad = 0u;
     g.extent = vec4(normalise(g, g.hi.xyz), 0.0);
     grid.at[0] = g;
 }

@@ -28,14 +28,15 @@ uvec2 total(uint level) { return uvec2(status.at[0].total[2u * level], status.at
 
 // The most that a tree of that level can take: P, PO, CO, NO, flags, masks, boxes. A level has no more nodes than entries or cells.
 uvec2 most_words(uint level) {
-    uint nodes = 1u, internal = 0u;
+    uint nodes = 1u, internal = 0u, leaves = 1u;
     for (uint k = 1u; k <= level; ++k) {
         uint cells = 1u << (3u * k);
         uvec2 entries = total(k);
+        leaves = entries.y != 0u ? cells : min(entries.x, cells);
         internal = nodes;
-        nodes += entries.y != 0u ? cells : min(entries.x, cells);
+        nodes += leaves;
     }
-    uvec2 words = plus(plus(total(level), nodes + 1u), internal + 1u);
+    uvec2 words = plus(plus(total(level), leaves + 1u), internal + 1u);
     words = plus(words, level + 1u + (nodes + 31u) / 32u + (internal + 3u) / 4u);
     for (uint i = 0u; i < box_words; ++i) words = plus(words, nodes);
     return words;

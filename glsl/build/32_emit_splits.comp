@@ -2,13 +2,14 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Splits, 2 of 2: node ends by level (PO), in place of a sort by level. Where a node ends, so does its last child on the next
-// level, which is being written at the same moment: CO needs no search (the paper's CI array of n_m words is not needed).
+// Splits, 2 of 2: where leaves end (PO), and node by node on the levels above the last child (CO), in place of a sort by level. Where a node
+// ends, so does its last child on the next level, which is being counted at the same moment: CO needs no search (the paper's CI array of n_m
+// words is not needed).
 ARGUMENTS(7)
     uint capacity;
     uint nodes; // capacity
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
+BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, entries)
 BUFFER(2, readonly, uint, codes)
 BUFFER(3, readonly, uint, places)
@@ -21,7 +22,9 @@ void main() {
     uint n = min(entries.at[0], capacity);
     uint runs = n / ROWS + uint(n % ROWS != 0u);
     uint run = item_index();
+    uint first_leaf = status.at[0].internal;
     if (run == 0u) {
+        grid.at[0].first_leaf = first_leaf;
         po.at[0] = 0u;
         co.at[0] = 0u;
         if (n == 0u) po.at[1] = 0u;
@@ -36,8 +39,8 @@ void main() {
         bool last = i + 1u == n;
         uint next = last ? 0u : codes.at[i + 1u];
         for (uint k = split_level(code, next, level, last); k <= level; ++k) {
-            po.at[node[k] + 1u] = i + 1u;
             if (k < level) co.at[node[k] + 1u] = node[k + 1u];
+            else po.at[node[k] - first_leaf + 1u] = i + 1u;
             node[k] += 1u;
         }
         code = next;

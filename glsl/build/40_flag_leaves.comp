@@ -13,28 +13,30 @@ BUFFER(3, readonly, uint, boundary_cells)
 BUFFER(4, READ_WRITE, BuildStatus, status)
 BUFFER(5, READ_WRITE, uint, flags) // zeroed
 
+void set_flag(uint node) { atomicOr(flags.at[node >> 5u], 1u << (node & 31u)); }
+
 void main() {
     uint n = min(entries.at[0], capacity);
     uint first = first_item();
     if (first >= n || status.at[0].overflow != 0u) return;
     uint end = min(n, first + ROWS);
     // The leaf of the first entry: the first whose end lies behind it.
-    uint lo = status.at[0].internal, hi = status.at[0].nodes - 1u;
+    uint lo = 0u, hi = status.at[0].leaves - 1u;
     while (lo < hi) {
         uint mid = lo + (hi - lo) / 2u;
         if (po.at[mid + 1u] > first) hi = mid;
         else lo = mid + 1u;
     }
-    uint leaf = lo, leaf_end = po.at[leaf + 1u];
+    uint leaf = lo, leaf_end = po.at[leaf + 1u], first_leaf = status.at[0].internal;
     bool flag = false;
     for (uint i = first; i < end; ++i) {
         if (i >= leaf_end) {
-            if (flag) atomicOr(flags.at[leaf >> 5u], 1u << (leaf & 31u));
+            if (flag) set_flag(first_leaf + leaf);
             flag = false;
             leaf_end = po.at[++leaf + 1u];
         }
         uint t = p.at[i];
         flag = flag || (boundary_cells.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
     }
-    if (flag) atomicOr(flags.at[leaf >> 5u], 1u << (leaf & 31u));
+    if (flag) set_flag(first_leaf + leaf);
 }

@@ -43,11 +43,11 @@ void main() {
     uint entries = 0u, flagged = 0u;
     if (i < status.at[0].leaves && status.at[0].overflow == 0u) {
         uint node = status.at[0].internal + i;
-        uint begin = po.at[node], end = po.at[node + 1u];
-        entries = begin >= end ? end : end - begin;
+        uint begin = po.at[i], end = po.at[i + 1u];
+        entries = end - begin;
         flagged = flags.at[node >> 5u] >> (node & 31u) & 1u;
         Grid g = grid.at[0];
-        if (flagged == 0u && entries > 0u && !touched(g, end - entries, end, codes.at[end - 1u])) {
+        if (flagged == 0u && entries > 0u && !touched(g, begin, end, codes.at[end - 1u])) {
             atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
             flagged = 1u;
         }

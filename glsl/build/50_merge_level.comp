@@ -22,11 +22,14 @@ void main() {
     uint node = first + item_index();
     if (level >= status.at[0].level || node >= status.at[0].levels[level] || status.at[0].overflow != 0u) return;
     uint begin = co.at[node] + 1u, end = co.at[node + 1u];
-    uint shift = 3u * (grid.at[0].level - 1u - level);
+    Grid g = grid.at[0];
+    uint shift = 3u * (g.level - 1u - level);
     uint flag = 0u, mask = 0u;
     for (uint child = begin; child <= end; ++child) {
         flag |= flags.at[child >> 5u] >> (child & 31u) & 1u;
-        mask |= 1u << (codes.at[po.at[child + 1u] - 1u] >> shift & 7u);
+        uint leaf = child; // the last one below
+        for (uint k = level + 1u; k < g.level; ++k) leaf = co.at[leaf + 1u];
+        mask |= 1u << (codes.at[po.at[leaf - g.first_leaf + 1u] - 1u] >> shift & 7u);
         if (BOXES != 0u) {
             for (uint c = 0u; c < 3u; ++c) {
                 float lo = boxes.at[6u * child + c], hi = boxes.at[6u * child + 3u + c];

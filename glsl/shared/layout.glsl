@@ -8,7 +8,8 @@ struct Grid {
     vec4 extent;  // Upper corner in normalised coordinates.
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
-    uint pad[2];  // Unused.
+    uint first_leaf; // Node index of the first leaf, n_ni.
+    uint pad;     // Unused.
 };
 
 // What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
@@ -188,7 +189,7 @@ struct SceneAddresses {
     uvec2 grid;       // Grid with the level of the leaves.
     uvec2 masks;      // Child masks.
     uvec2 co;         // Child offsets.
-    uvec2 po;         // Primitive offsets.
+    uvec2 po;         // Primitive offsets of the leaves.
     uvec2 p;          // Primitive ids.
     uvec2 flags;      // Boundary flags.
     uvec2 cells;      // Vertex indices.

@@ -5,8 +5,8 @@
 // The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
 uint find_leaf(uint level, uvec3 finest) { return find_node(0u, 0u, level, morton(finest) >> (3u * (MAX_LEVEL - level))); }
 
-// First entry of a node and the one behind its last.
-uvec2 entry_range(uint node) {
-    uint begin = po.at[node], end = po.at[node + 1u];
-    return uvec2(begin >= end ? 0u : begin, end);
+// First entry of a leaf and the one behind its last.
+uvec2 entry_range(uint leaf) {
+    uint i = leaf - grid.at[0].first_leaf;
+    return uvec2(po.at[i], po.at[i + 1u]);
 }

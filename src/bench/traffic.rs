@@ -17,9 +17,9 @@
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
 //! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
-//! | `build.splits` | codes 4 n, the table of runs, PO 4 N, CO 4 I, cleared flags and masks |
+//! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks |
 //! | `build.leaves` | P 4 n, PO and codes 8 L, boxes 24 L |
-//! | `build.levels` | CO 4 I, masks I, boxes 24 N |
+//! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value.
 
@@ -59,9 +59,9 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
         ("build.emit", cells_and_vertices + 4 * t + if filtered { 8 * shares } else { 0 } + 8 * n),
         ("build.sort", sort),
         ("build.count_splits", 4 * n + (4 + SCAN) * runs),
-        ("build.splits", 4 * n + 4 * runs + 4 * nodes + 4 * internal + nodes / 8 + internal),
+        ("build.splits", 4 * n + 4 * runs + 4 * leaves + 4 * internal + nodes / 8 + internal),
         ("build.leaves", 4 * n + 8 * leaves + boxes(leaves)),
-        ("build.levels", 4 * internal + internal + boxes(nodes)),
+        ("build.levels", 4 * internal + 8 * leaves + internal + boxes(nodes)),
     ];
     stages.into_iter().filter(|(_, bytes)| *bytes > 0).collect()
 }

@@ -59,7 +59,7 @@ pub struct TreeMemory {
     pub grid: BufferRef,
     /// Primitive ids by Morton code.
     pub p: BufferRef,
-    /// Ends of the nodes in `p`.
+    /// Ends of the leaves in `p`.
     pub po: BufferRef,
     /// Last children of the internal nodes.
     pub co: BufferRef,
@@ -96,7 +96,7 @@ impl TreeMemory {
             status,
             grid,
             p: arena.words(u64::from(capacity.entries))?,
-            po: arena.words(nodes + 1)?,
+            po: arena.words(nodes.min(u64::from(capacity.entries.max(1))) + 1)?,
             co: arena.words(internal + 1)?,
             flags: arena.words(nodes.div_ceil(32))?,
             masks: arena.words(internal.div_ceil(4))?,

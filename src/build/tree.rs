@@ -103,7 +103,7 @@ impl Tree {
         // Nodes.
         let carve_nodes = |a: &mut Arena| {
             let (status, grid) = TreeMemory::carve_head(a)?;
-            let (nodes, internal) = (u64::from(planned.nodes), u64::from(planned.internal));
+            let (nodes, internal, leaves) = (u64::from(planned.nodes), u64::from(planned.internal), u64::from(planned.leaves));
             Ok(TreeMemory {
                 assign,
                 capacity,
@@ -111,7 +111,7 @@ impl Tree {
                 status,
                 grid,
                 p: entry_buffer.all(),
-                po: a.words(nodes + 1)?,
+                po: a.words(leaves + 1)?,
                 co: a.words(internal + 1)?,
                 flags: a.words(nodes.div_ceil(32))?,
                 masks: a.words(internal.div_ceil(4))?,
@@ -153,7 +153,7 @@ impl Tree {
             lists: self.options.lists,
             grid: self.grid,
             p: self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?,
-            po: words(self.memory.po, nodes + 1)?,
+            po: words(self.memory.po, u64::from(self.status.leaves) + 1)?,
             co: words(self.memory.co, internal + 1)?,
             no: self.status.levels[..=self.status.level as usize].to_vec(),
             boundary: words(self.memory.flags, nodes.div_ceil(32))?,

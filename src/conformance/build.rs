@@ -106,7 +106,7 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
     let (s, memory) = (&expected.status, tree.memory());
     let size = |name: &str, words: u32, part: BufferRef| compare_one("build.plan", name, &(4 * u64::from(words)).max(16), &part.size);
     size("P (bytes)", s.entries, memory.p)?;
-    size("PO (bytes)", s.nodes + 1, memory.po)?;
+    size("PO (bytes)", s.leaves + 1, memory.po)?;
     size("CO (bytes)", s.internal + 1, memory.co)?;
     size("flags (bytes)", s.nodes.div_ceil(32), memory.flags)?;
     size("masks (bytes)", s.internal.div_ceil(4), memory.masks)?;
@@ -154,7 +154,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
         lists: options.lists,
         grid: one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?,
         p: words(tree.p, n),
-        po: words(tree.po, nodes + 1),
+        po: words(tree.po, nodes - internal + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         boundary: words(tree.flags, nodes.div_ceil(32)),

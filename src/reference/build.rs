@@ -62,6 +62,7 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let mask = levels::masks(&splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
+    let grid = Grid { first_leaf: co.len() as u32 - 1, ..grid };
     let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, po, co, no, boundary, mask, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

@@ -54,10 +54,9 @@ pub fn flag(listed: &[u32], code: u32, mesh: &Mesh, topology: &Topology, vertice
 /// Boundary flag of each leaf.
 pub fn flags(primitives: &[u32], splits: &Splits, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> Vec<bool> {
     let first = first_leaf(&splits.no);
-    // The first leaf begins at 0; see `TreeArrays::entries`.
-    let begin = |j: usize| if splits.po[j] >= splits.po[j + 1] { 0 } else { splits.po[j] as usize };
-    let listed = |j: usize| &primitives[begin(j)..splits.po[j + 1] as usize];
-    (first..splits.codes.len()).into_par_iter().map(|j| flag(listed(j), splits.codes[j], mesh, topology, vertices, grid)).collect()
+    let listed = |i: usize| &primitives[splits.po[i] as usize..splits.po[i + 1] as usize];
+    let flag_of = |(i, &code)| flag(listed(i), code, mesh, topology, vertices, grid);
+    splits.codes[first..].par_iter().enumerate().map(flag_of).collect()
 }
 
 /// Box of each leaf.

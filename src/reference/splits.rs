@@ -10,7 +10,7 @@ const CHUNK: usize = 1 << 16;
 pub struct Splits {
     /// Morton code of each node at its own level.
     pub codes: Vec<u32>,
-    /// `PO`: one more than nodes; node j ends at entry `po[j + 1]`.
+    /// `PO`: one more than leaves; leaf j ends at entry `po[j + 1]`.
     pub po: Vec<u32>,
     /// `CO`: one more than internal nodes; the children of i are `co[i] + 1 ..= co[i + 1]`.
     pub co: Vec<u32>,
@@ -34,11 +34,11 @@ pub fn splits(codes: &[u32], level: u32) -> Splits {
     }
     levels.reverse();
     let mut splits = Splits { po: vec![0], co: vec![0], ..Splits::default() };
+    splits.po.extend(levels[level as usize].iter().map(|e| e.1));
     let mut nodes = 0;
     for (k, ends) in levels.iter().enumerate() {
         nodes += ends.len() as u32;
         splits.no.push(nodes);
-        splits.po.extend(ends.iter().map(|e| e.1));
         splits.codes.extend(ends.iter().map(|e| e.0));
         if let Some(children) = levels.get(k + 1) {
             let last = |(i, pair): (usize, &[End])| (pair[0].0 >> 3 != pair[1].0 >> 3).then_some(nodes + i as u32);

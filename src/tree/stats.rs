@@ -34,7 +34,7 @@ pub struct TreeStats {
 pub struct Memory {
     /// Primitive ids.
     pub p: u64,
-    /// Primitive offsets.
+    /// Primitive offsets of the leaves.
     pub po: u64,
     /// Child offsets.
     pub co: u64,
@@ -53,7 +53,7 @@ impl Memory {
     pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool) -> Self {
         Self {
             p: 4 * entries,
-            po: 4 * (nodes + 1),
+            po: 4 * (nodes - internal + 1),
             co: 4 * (internal + 1),
             no: 4 * (u64::from(level) + 1),
             boundary: 4 * nodes.div_ceil(32),
@@ -72,7 +72,8 @@ impl Memory {
 
     /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, that is P, boxes, a byte per flag, CO, and no PO.
     pub fn paper(&self) -> u64 {
-        self.p + 25 * (self.po / 4 - 1) + (self.co - 4)
+        let (leaves, internal) = (self.po / 4 - 1, self.co / 4 - 1);
+        self.p + 25 * (leaves + internal) + 4 * internal
     }
 
     /// All arrays, by the names of the paper where it has one.

@@ -52,7 +52,7 @@ impl TreeArrays {
         let level = self.grid.level;
         rule(level <= MAX_LEVEL, || format!("grid: level {level} is beyond {MAX_LEVEL}"))?;
         let mut expected = topology.grid;
-        expected.level = level;
+        (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
@@ -61,9 +61,11 @@ impl TreeArrays {
         let (level, nodes) = (self.grid.level as usize, self.nodes() as usize);
         rule(self.no.len() == level + 1, || format!("NO has {} levels, the grid {}", self.no.len(), level + 1))?;
         let internal = if level == 0 { 0 } else { self.no[level - 1] as usize };
+        let first = self.grid.first_leaf;
+        rule(first as usize == internal, || format!("the grid says that node {first} is the first leaf, NO that {internal} is"))?;
         let length =
             |name: &str, is: usize, needs: usize| rule(is == needs, || format!("{name} has {is} elements, {nodes} nodes need {needs}"));
-        length("PO", self.po.len(), nodes + 1)?;
+        length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
         length("CO", self.co.len(), internal + 1)?;
         length("BF", self.boundary.len(), nodes.div_ceil(32))?;
         length("mask", self.mask.len(), internal.div_ceil(4))?;
@@ -119,27 +121,18 @@ impl TreeArrays {
         Ok(codes)
     }
 
-    /// PO: ascending on each level, up to all entries, and a node ends with its last child.
+    /// PO: ascending over the leaves, up to all entries.
     fn check_offsets(&self) -> Rule {
         let n_m = self.p.len() as u64;
         rule(self.po[0] == 0, || format!("PO[0] = {}, entries begin at 0", self.po[0]))?;
-        for level in 0..=self.grid.level {
-            let mut begin = 0;
-            let nodes = self.level_nodes(level);
-            for j in nodes.clone() {
-                let end = self.po[j as usize + 1];
-                let room = end > begin || (n_m == 0 && end == 0 && self.nodes() == 1);
-                rule(room, || format!("PO[{}] = {end}: node {j} on level {level} has no entry, the one before ends at {begin}", j + 1))?;
-                begin = end;
-            }
-            rule(u64::from(begin) == n_m, || format!("PO[{}] = {begin}: level {level} ends there, P has {n_m} entries", nodes.end))?;
+        for (i, pair) in self.po.windows(2).enumerate() {
+            let (begin, end) = (pair[0], pair[1]);
+            let room = end > begin || (n_m == 0 && end == 0 && self.nodes() == 1);
+            let leaf = self.leaves().start + i as u32;
+            rule(room, || format!("PO[{}] = {end}: leaf {leaf} has no entry, the one before ends at {begin}", i + 1))?;
         }
-        for i in 0..self.internal_nodes() as usize {
-            let (end, last) = (self.po[i + 1], self.co[i + 1] as usize);
-            let theirs = self.po[last + 1];
-            rule(end == theirs, || format!("node {i} ends at entry {end}, its last child {last} at {theirs}"))?;
-        }
-        Ok(())
+        let end = self.po[self.po.len() - 1];
+        rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))
     }
 
     /// P: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without

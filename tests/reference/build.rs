@@ -125,7 +125,7 @@ fn an_empty_mesh_is_one_empty_leaf() {
     }
 }
 
-/// A level of a single node needs `≥` in Eq. 9.
+/// Levels of a single node each.
 #[test]
 fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
     let (mesh, topology) = prepared(cases().unwrap().into_iter().find(|c| c.name == "point").unwrap().mesh);

@@ -31,6 +31,7 @@ fn leaf(tree: &TreeArrays, n: usize) -> u32 {
 fn grid() {
     breaks(Assign::Aabb, "grid: level 11", |t| t.grid.level = 11);
     breaks(Assign::Aabb, "is not that of the mesh", |t| t.grid.lo[1] -= 1.0);
+    breaks(Assign::Aabb, "is the first leaf, NO", |t| t.grid.first_leaf += 1);
     breaks(Assign::Aabb, "NO has 4 levels, the grid 3", |t| t.grid.level -= 1);
 }
 
@@ -73,9 +74,7 @@ fn masks() {
 fn offsets() {
     breaks(Assign::Aabb, "PO[0] = 1", |t| t.po[0] = 1);
     breaks(Assign::Aabb, "PO[12]", |t| t.po[12] = t.po[11]);
-    breaks(Assign::Aabb, "level 0 ends there, P has", |t| t.po[1] -= 1);
-    breaks(Assign::Aabb, "level 3 ends there, P has", |t| *t.po.last_mut().unwrap() += 1);
-    breaks(Assign::Aabb, "its last child", |t| t.po[3] += 1);
+    breaks(Assign::Aabb, "the leaves end at entry", |t| *t.po.last_mut().unwrap() += 1);
 }
 
 #[test]
