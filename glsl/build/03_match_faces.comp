@@ -6,10 +6,10 @@
 // Finds the two tetrahedra of every face (SPEC 2.3) through a table with open addressing. A face looks first near the place of its
 // smallest vertex, where its neighbours in the file looked just before (memory that is still close), then anywhere.
 // mates[face] becomes the other face's number and side, or ALONE or CROWDED: the same whichever face came first.
-ARGUMENTS(6)
+ARGUMENTS(7)
     uint tets;
-    uint points;
-    uint slots; // of the table
+    uint slots;      // of the table
+    uint near_slots; // of a vertex
 END_ARGUMENTS
 BUFFER16(0, readonly, vec4, vertices)
 BUFFER16(1, readonly, uvec4, cells)
@@ -17,6 +17,7 @@ BUFFER(2, readonly, uint, bad)
 BUFFER(3, READ_WRITE, uint, table) // faces, or NONE; filled with NONE
 BUFFER(4, READ_WRITE, uint, mates) // filled with NONE, which is ALONE
 BUFFER(5, READ_WRITE, MeshStatus, status)
+BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron without volume, zeroed
 
 const uint CROWDED = 0xfffffffeu;
 const uint SIDE = 0x80000000u;
@@ -51,19 +52,21 @@ void main() {
         uint inversions = uint(r.y < r.x) + uint(r.z < r.x) + uint(r.w < r.x) + uint(r.z < r.y) + uint(r.w < r.y) + uint(r.w < r.z);
         without_volume = uint(vol == 0.0);
         negative = uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
-        uint near_slots = max(slots / points, 1u);
+        if (vol == 0.0) atomicOr(flat_cells.at[t >> 5u], 1u << (t & 31u));
         for (uint f = 0u; f < 4u; ++f) {
             uvec3 face = face_of(ids, f);
             bool positive = (vol >= 0.0) == ((r[f] & 1u) == 1u);
             uint me = (4u * t + f) | (positive ? SIDE : 0u);
             uint h = mix_bits(face.y ^ mix_bits(face.z));
-            uint near_base = min(face.x * near_slots, slots - near_slots);
+            uint near_base = min(face.x * near_slots, slots - near_slots), place, unused;
+            umulExtended(h, near_slots, place, unused);
             uint probe = 0u;
             for (; probe < MAX_PROBES; ++probe) {
                 // Anywhere anew at each probe: where the faces of many vertices crowd, long stretches of the table are full.
                 uint anywhere, low;
                 umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, anywhere, low);
-                uint slot = probe < NEAR_PROBES ? near_base + (h + probe) % near_slots : anywhere;
+                uint slot = probe < NEAR_PROBES ? near_base + place : anywhere;
+                place = place + 1u == near_slots ? 0u : place + 1u;
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
                 uint other_face = other & ~SIDE;

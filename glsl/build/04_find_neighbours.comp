@@ -1,27 +1,21 @@
 #version 460
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
-#include "shared/grid.glsl"
-#include "shared/tet.glsl"
 // From face mates to neighbours and boundary bits (SPEC 2.3).
-ARGUMENTS(7)
+ARGUMENTS(6)
     uint tets;
 END_ARGUMENTS
-BUFFER16(0, readonly, vec4, vertices)
-BUFFER16(1, readonly, uvec4, cells)
-BUFFER(2, readonly, uint, bad)
-BUFFER(3, readonly, uint, mates)
-BUFFER16(4, writeonly, uvec4, neighbours)
-BUFFER(5, READ_WRITE, uint, boundary) // one bit per tetrahedron, zeroed
-BUFFER(6, READ_WRITE, MeshStatus, status)
+BUFFER(0, readonly, uint, bad)
+BUFFER(1, readonly, uint, mates)
+BUFFER(2, readonly, uint, flat_cells) // one bit per tetrahedron without volume
+BUFFER16(3, writeonly, uvec4, neighbours)
+BUFFER(4, READ_WRITE, uint, boundary) // one bit per tetrahedron, zeroed
+BUFFER(5, READ_WRITE, MeshStatus, status)
 
 const uint CROWDED = 0xfffffffeu;
 const uint SIDE = 0x80000000u;
 
-float volume_of(uint t) {
-    uvec4 ids = cells.at[t];
-    return volume(make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz));
-}
+bool is_flat(uint t) { return (flat_cells.at[t >> 5u] >> (t & 31u) & 1u) != 0u; }
 
 void main() {
     uint t = item_index();
@@ -38,9 +32,9 @@ void main() {
                 if (paired) across[f] = (mate & ~SIDE) >> 2;
                 // `back` tells this face's side, `mate` the other one's: equal sides are a fold, unless the other one is flat and has none.
                 bool same_side = paired && ((back ^ mate) & SIDE) == 0u;
-                if (!paired || (same_side && volume_of(across[f]) != 0.0)) on_boundary = 1u;
+                if (!paired || (same_side && !is_flat(across[f]))) on_boundary = 1u;
             }
-            if (on_boundary == 0u && volume_of(t) == 0.0) on_boundary = 1u;
+            if (is_flat(t)) on_boundary = 1u;
             if (on_boundary != 0u) atomicOr(boundary.at[t >> 5u], 1u << (t & 31u));
         }
         neighbours.at[t] = across;

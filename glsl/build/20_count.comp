@@ -2,7 +2,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes, 1 of 2: cells in the quantized box of every tetrahedron, or shares of up to SHARE of them; one more element for the total.
+// Codes, 1 of 2: cells in the quantized box of every tetrahedron, or shares of up to SHARE of them, one at least; one more element for the total.
 layout(constant_id = 2) const uint SHARE = 1;
 ARGUMENTS(5)
     uint tets;
@@ -22,7 +22,7 @@ void main() {
         Grid g = grid.at[0];
         uvec3 size = coarser(finest_box(t), g.level).size;
         n = size.x * size.y * size.z;
-        n = n / SHARE + uint(n % SHARE != 0u);
+        if (SHARE > 1u) n = max(n / SHARE + uint(n % SHARE != 0u), 1u);
     }
     counts.at[t] = n;
 }

@@ -7,9 +7,10 @@
 #include "shared/assign.glsl"
 #include "shared/separate.glsl"
 // Leaves, 2 of 2 (Alg. 1): the box of every leaf where boxes are stored, from the code of its last entry; the flag of
-// leaves outside of the mesh (see src/reference/leaves.rs); statistics.
+// leaves outside of the mesh (see src/reference/leaves.rs); statistics. Where cells are MARKED (Lists::Boundary), that is the flag.
 layout(constant_id = 2) const uint BOXES = 0;
-ARGUMENTS(9)
+layout(constant_id = 3) const uint MARKED = 0;
+ARGUMENTS(10)
     uint unused;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -21,6 +22,8 @@ BUFFER(5, writeonly, float, boxes) // 6 per node: lo, hi
 BUFFER(6, readonly, uint, p)
 BUFFER16(7, readonly, uvec4, cells)
 BUFFER16(8, readonly, vec4, vertices)
+BUFFER(9, readonly, uint, marks)
+#include "shared/marks.glsl"
 
 const uint ASKED = 16u;
 
@@ -45,9 +48,15 @@ void main() {
         uint node = status.at[0].internal + i;
         uint begin = po.at[i], end = po.at[i + 1u];
         entries = end - begin;
-        flagged = flags.at[node >> 5u] >> (node & 31u) & 1u;
         Grid g = grid.at[0];
-        if (flagged == 0u && entries > 0u && !touched(g, begin, end, codes.at[end - 1u])) {
+        bool flag;
+        if (MARKED != 0u) {
+            flag = entries > 0u && is_marked(g.level, unmorton(codes.at[end - 1u]));
+        } else {
+            flagged = flags.at[node >> 5u] >> (node & 31u) & 1u;
+            flag = flagged == 0u && entries > 0u && !touched(g, begin, end, codes.at[end - 1u]);
+        }
+        if (flag) {
             atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
             flagged = 1u;
         }

@@ -1,20 +1,19 @@
-// Who is listed where under Lists::Boundary (SPEC 2.6). Twin of src/reference/marks.rs, which explains it. Needs walk.glsl and marks.
+// The cells that the boundary touches, one bit each, x fastest, so that a row of candidates is a stretch of bits; and who is listed where under
+// Lists::Boundary (SPEC 2.6). Twin of src/reference/marks.rs, which explains it. Needs marks.
 
-bool is_marked(uint code) { return (marks.at[code >> 5u] >> (code & 31u) & 1u) != 0u; }
+uint mark_place(uint level, uvec3 cell) { return (cell.z << level | cell.y) << level | cell.x; }
 
-// Whether t is a seed of an unmarked cell with this centre: it contains it and no lower one does, or it is near and none does.
-bool owns_centre(uint t, Tet tet, vec3 centre) {
-    Weights own = weights(tet, centre);
-    if (own.clear || !own.in_box || !near(own)) return own.clear;
-    uint beaten_below = own.inside ? t : NONE;
-    star[0] = t;
-    star_size = 1u;
-    for (uint i = 0u; i < star_size; ++i) {
-        uint u = star[i];
-        Tet other = load_tet(cells.at[u]);
-        Weights w = weights(other, centre);
-        if (w.inside && u < beaten_below) return false;
-        grow_star(u, other, w, centre);
-    }
-    return true;
+bool is_marked(uint level, uvec3 cell) {
+    uint place = mark_place(level, cell);
+    return (marks.at[place >> 5u] >> (place & 31u) & 1u) != 0u;
+}
+
+uint low_bits(uint n) { return n >= 32u ? NONE : (1u << n) - 1u; }
+
+// The bits of n cells from `cell` on along x.
+uint marked_row(uint level, uvec3 cell, uint n) {
+    uint place = mark_place(level, cell), shift = place & 31u;
+    uint row = marks.at[place >> 5u] >> shift;
+    if (shift + n > 32u) row |= marks.at[(place >> 5u) + 1u] << (32u - shift);
+    return row & low_bits(n);
 }

@@ -10,10 +10,10 @@
 //! | stage | reads and writes |
 //! |---|---|
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p, the fills of the tables 36 t |
-//! | `mesh.boundary` | cells 16 t and vertices 16 p twice, faces 16 t and mates 16 t to and fro, neighbours 16 t |
+//! | `mesh.boundary` | cells 16 t, vertices 16 p, faces 16 t and mates 16 t to and fro, neighbours 16 t |
 //! | `build.depth` | cells 16 t, points 12 p |
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan |
-//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; with marks twice, and 8^l / 8 bytes of marks three times |
+//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; with marks 8^l / 8 bytes three times |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
 //! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
@@ -42,8 +42,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let filtered = options.assign != Assign::Aabb || options.lists != Lists::All;
     let shares = t.max(u64::from(status.candidates) / SHARE);
     let marks = if options.lists == Lists::Boundary { 8u64.pow(level).div_ceil(8) } else { 0 };
-    let dispatches = if options.lists == Lists::Boundary { 2 } else { 1 };
-    let filter = dispatches * (cells_and_vertices + 4 * t) + 8 * shares + SCAN * shares + 3 * marks;
+    let filter = cells_and_vertices + 4 * t + 8 * shares + SCAN * shares + 3 * marks;
     let (passes, digit_bits) = target.sort.passes(3 * level);
     let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
     let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
@@ -52,7 +51,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
     let stages = [
         ("mesh.bounds", 16 * t + 24 * p + 16 * p + 36 * t),
-        ("mesh.boundary", 2 * (16 * t + 16 * p) + 4 * 16 * t + 16 * t),
+        ("mesh.boundary", 16 * t + 16 * p + 4 * 16 * t + 16 * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
         ("build.count", cells_and_vertices + 4 * t + SCAN * t),
         ("build.filter", if filtered { filter } else { 0 }),

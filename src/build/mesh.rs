@@ -66,11 +66,12 @@ impl MeshArrays {
     }
 }
 
-/// Scratch memory of stage 0: 36 bytes per tetrahedron.
+/// Scratch memory of stage 0: 36 bytes and a bit per tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshScratch {
     table: BufferRef,
     mates: BufferRef,
+    flat_cells: BufferRef,
 }
 
 impl MeshScratch {
@@ -79,7 +80,8 @@ impl MeshScratch {
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.
     pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
-        Ok(Self { table: arena.words(5 * u64::from(tets) + 16)?, mates: arena.words(4 * u64::from(tets))? })
+        let tets = u64::from(tets);
+        Ok(Self { table: arena.words(5 * tets + 16)?, mates: arena.words(4 * tets)?, flat_cells: arena.words(tets.div_ceil(32))? })
     }
 }
 
@@ -104,6 +106,7 @@ pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshAr
         r.fill(status, 0);
         r.fill(bad, 0);
         r.fill(boundary, 0);
+        r.fill(scratch.flat_cells, 0);
         r.fill(scratch.table, u32::MAX);
         r.fill(scratch.mates, u32::MAX);
         r.barrier("mesh.clear → mesh.check_cells");
@@ -119,13 +122,14 @@ pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshAr
     })?;
     r.barrier("mesh.normalise_vertices → mesh.match_faces");
     r.stage("mesh.boundary", |r| {
-        let MeshScratch { table, mates } = *scratch;
+        let MeshScratch { table, mates, flat_cells } = *scratch;
         let slots = (table.size / 4) as u32;
+        let near_slots = (slots / points.max(1)).max(1);
         let spec = MatchFacesSpec { workgroup, ..Default::default() };
-        r.dispatch(&MatchFaces { vertices, cells, bad, table, mates, status, tets, points: points.max(1), slots }, spec, all_tets)?;
+        r.dispatch(&MatchFaces { vertices, cells, bad, table, mates, status, flat_cells, tets, slots, near_slots }, spec, all_tets)?;
         r.barrier("mesh.match_faces → mesh.find_neighbours");
         let spec = FindNeighboursSpec { workgroup, ..Default::default() };
-        r.dispatch(&FindNeighbours { vertices, cells, bad, mates, neighbours, boundary, status, tets }, spec, all_tets)
+        r.dispatch(&FindNeighbours { bad, mates, flat_cells, neighbours, boundary, status, tets }, spec, all_tets)
     })
 }
 

@@ -3,7 +3,7 @@
 //! ```text
 //! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits   (once per mesh)
 //! 1 depth    estimate per tetrahedron → level l                                                            Eq. 11–12
-//! 2 codes    count cells per tetrahedron · scan · [mark · filter] · emit (code, primitive) · stable radix sort    Eq. 1–6
+//! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds] · emit (code, primitive) · stable radix sort    Eq. 1–6
 //! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
 //! 4 leaves   boundary flags, boxes                                                                         Alg. 1
 //!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
@@ -88,6 +88,6 @@ pub fn cmd_build(
     let entries = entries(capacity, counts, filter.as_ref());
     cmd_count_splits(r, tree.status, tree.grid, capacity, entries, sorted)?;
     cmd_splits(r, tree, capacity, entries, sorted)?;
-    cmd_leaves(r, mesh, tree, capacity, entries, sorted)?;
+    cmd_leaves(r, mesh, tree, capacity, entries, filter.as_ref(), sorted)?;
     cmd_levels(r, tree, capacity, sorted)
 }

@@ -137,8 +137,8 @@ pub(crate) fn filtered(options: &BuildOptions) -> bool {
     options.assign != Assign::Aabb || options.lists != Lists::All
 }
 
-/// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron, and for `Lists::Boundary` one bit per cell of the level
-/// of the leaves.
+/// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron, and for `Lists::Boundary` another one, and one bit per cell
+/// of the level of the leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterScratch {
     /// Most shares.
@@ -147,7 +147,7 @@ pub struct FilterScratch {
     pub(crate) counts: BufferRef,
     pub(crate) entries: BufferRef,
     pub(crate) arguments: BufferRef,
-    pub(crate) marks: Option<BufferRef>,
+    pub(crate) seeds: Option<SeedScratch>,
     pub(crate) scan: ScanScratch,
 }
 
@@ -162,17 +162,34 @@ impl FilterScratch {
         }
         // All full but the last one of each.
         let most = tets.saturating_add(capacity.candidates / SHARE);
-        let cells = 8u64.pow(capacity.level);
-        let marks = if options.lists == Lists::Boundary { Some(arena.words(cells.div_ceil(32))?) } else { None };
+        let seeds = if options.lists == Lists::Boundary { Some(SeedScratch::carve(arena, most, capacity.level)?) } else { None };
         Ok(Some(Self {
             most,
             hits: arena.words(u64::from(most))?,
             counts: arena.words(u64::from(most))?,
             entries: arena.words(1)?,
             arguments: arena.words(3)?,
-            marks,
+            seeds,
             scan: ScanScratch::carve(gpu, arena, most)?,
         }))
+    }
+}
+
+/// What `Lists::Boundary` takes besides.
+#[derive(Clone, Copy, Debug)]
+pub struct SeedScratch {
+    /// One bit per cell that the boundary touches.
+    pub(crate) marks: BufferRef,
+    /// Shares with centres in doubt, and their number.
+    pub(crate) doubts: BufferRef,
+    pub(crate) doubt_count: BufferRef,
+}
+
+impl SeedScratch {
+    fn carve(arena: &mut Arena, shares: u32, level: u32) -> Result<Self> {
+        // A word more, since rows of bits are read two words at a time.
+        let marks = arena.words(8u64.pow(level).div_ceil(32) + 1)?;
+        Ok(Self { marks, doubts: arena.words(u64::from(shares))?, doubt_count: arena.words(1)? })
     }
 }
 

@@ -1,21 +1,17 @@
 //! The stages of a build as functions that append to a recorder; [`super`] puts them in order.
 
 use super::mesh::{MeshArrays, MeshInput, STRIDED_GROUPS};
-use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SortedScratch, TreeMemory, filtered};
+use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SeedScratch, SortedScratch, TreeMemory, filtered};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     ChooseDepth, ChooseDepthSpec, Count as CountCells, CountSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec,
     EmitSplits, EmitSplitsSpec, EstimateDepth, EstimateDepthSpec, Filter, FilterSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves,
-    FlagLeavesSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
+    FlagLeavesSpec, Mark, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, SettleSeeds, SettleSeedsSpec,
 };
 use crate::layout::{BuildStatus, Grid};
 use crate::options::BuildOptions;
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
-
-/// Steps of the filter's kernel.
-const MARK: u32 = 1;
-const LIST_MARKED: u32 = 2;
 
 /// A mesh as the stages see it.
 #[derive(Clone, Copy, Debug)]
@@ -88,37 +84,71 @@ pub(crate) fn cmd_filter(
 ) -> Result<()> {
     let MeshInput { cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
+    let first = Groups::Count(tets.div_ceil(workgroup));
     r.stage("build.filter", |r| {
-        if let Some(marks) = filter.marks {
-            r.fill(marks, 0);
+        if let Some(seeds) = &filter.seeds {
+            r.fill(seeds.marks, 0);
+            r.fill(seeds.doubt_count, 0);
         }
         let shares = Count::device(filter.most, scratch.total);
-        let groups = shares.groups(r, workgroup, filter.arguments, "filter.shares → codes.filter")?;
+        let later = shares.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
+        let nothing = r.gpu().nothing();
+        let SeedScratch { marks, doubts, doubt_count } =
+            filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
+        let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
+        let (quantized, offsets, shares_word, capacity) = (vertices, scratch.offsets, scratch.total, filter.most);
+        let (hits, counts) = (filter.hits, filter.counts);
+        if filter.seeds.is_some() {
+            let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares: shares_word, marks, boundary, tets, capacity };
+            let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
+            r.dispatch(&mark, spec, Groups::Count(tets.div_ceil(32).div_ceil(workgroup)))?;
+            r.barrier("codes.mark → codes.mark_later");
+            r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
+            r.barrier("codes.mark → codes.filter");
+        }
         let arguments = Filter {
             grid,
-            quantized: mesh.arrays.vertices,
+            quantized,
             cells,
-            bad: mesh.arrays.bad,
-            vertices: mesh.arrays.vertices,
-            offsets: scratch.offsets,
-            shares: scratch.total,
-            hits: filter.hits,
-            counts: filter.counts,
-            marks: filter.marks.unwrap_or_else(|| r.gpu().nothing()),
-            boundary: mesh.arrays.boundary,
-            neighbours: mesh.arrays.neighbours,
+            bad,
+            vertices,
+            offsets,
+            shares: shares_word,
+            hits,
+            counts,
+            marks,
+            boundary,
+            doubts,
+            doubt_count,
             tets,
-            capacity: filter.most,
+            capacity,
         };
-        let spec = FilterSpec { workgroup, assign: options.assign as u32, ..Default::default() };
-        if filter.marks.is_some() {
-            r.dispatch(&arguments, FilterSpec { step: MARK, ..spec }, groups)?;
-            r.barrier("codes.mark → codes.filter");
-            r.dispatch(&arguments, FilterSpec { step: LIST_MARKED, ..spec }, groups)?;
-        } else {
-            r.dispatch(&arguments, spec, groups)?;
+        let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
+        r.dispatch(&arguments, spec, first)?;
+        r.barrier("codes.filter → codes.filter_later");
+        r.dispatch(&arguments, FilterSpec { later: 1, ..spec }, later)?;
+        if filter.seeds.is_some() {
+            r.barrier("codes.filter → codes.doubts");
+            let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
+            let settle = SettleSeeds {
+                grid,
+                quantized,
+                cells,
+                bad,
+                vertices,
+                offsets,
+                hits,
+                counts,
+                marks,
+                neighbours,
+                doubts,
+                doubt_count,
+                tets,
+                capacity,
+            };
+            r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
         }
-        cmd_exclusive_scan(r, filter.counts, filter.counts, filter.entries, shares, &filter.scan)
+        cmd_exclusive_scan(r, counts, counts, filter.entries, shares, &filter.scan)
     })
 }
 
@@ -139,7 +169,7 @@ pub(crate) fn cmd_codes(
     r.stage("build.emit", |r| {
         if let Some(filter) = filter {
             let shares = Count::device(filter.most, counts.total);
-            let groups = shares.groups(r, target.each, filter.arguments, "codes.filter → codes.emit")?;
+            let later = shares.behind(tets).groups(r, target.each, filter.arguments, "codes.filter → codes.emit")?;
             let (hits, places) = (filter.hits, filter.counts);
             let emit = EmitHits {
                 grid,
@@ -156,7 +186,10 @@ pub(crate) fn cmd_codes(
                 capacity: filter.most,
                 room: capacity.entries,
             };
-            r.dispatch(&emit, EmitHitsSpec { workgroup: target.each, ..Default::default() }, groups)?;
+            let spec = EmitHitsSpec { workgroup: target.each, ..Default::default() };
+            r.dispatch(&emit, spec, Groups::Count(tets.div_ceil(target.each)))?;
+            r.barrier("codes.emit → codes.emit_later");
+            r.dispatch(&emit, EmitHitsSpec { later: 1, ..spec }, later)?;
         } else {
             let groups = Count::device(capacity.entries, candidates).groups(
                 r,
@@ -260,10 +293,13 @@ pub(crate) fn cmd_leaves(
     tree: &TreeMemory,
     capacity: &Capacity,
     entries: Count,
+    filter: Option<&FilterScratch>,
     scratch: &SortedScratch,
 ) -> Result<()> {
     let target = r.gpu().target();
     let TreeMemory { status, grid, p, po, flags, .. } = *tree;
+    // Leaves of marked cells are those with boundary primitives.
+    let marks = filter.and_then(|f| f.seeds).map(|s| s.marks);
     r.stage("build.leaves", |r| {
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));
         let flag = FlagLeaves {
@@ -275,12 +311,16 @@ pub(crate) fn cmd_leaves(
             flags,
             capacity: capacity.entries,
         };
-        r.dispatch(&flag, FlagLeavesSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
-        r.barrier("leaves.flag → leaves.finish");
+        if marks.is_none() {
+            r.dispatch(&flag, FlagLeavesSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
+            r.barrier("leaves.flag → leaves.finish");
+        }
         let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
         let (cells, vertices) = (mesh.input.cells, mesh.arrays.vertices);
-        let finish = FinishLeaves { grid, codes: scratch.codes, po, flags, status, boxes, p, cells, vertices, unused: 0 };
-        let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), ..Default::default() };
+        let (codes, marked) = (scratch.codes, u32::from(marks.is_some()));
+        let marks = marks.unwrap_or_else(|| r.gpu().nothing());
+        let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, unused: 0 };
+        let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), marked, ..Default::default() };
         r.dispatch(&finish, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
         r.barrier("leaves.finish → levels");
         Ok(())

@@ -126,7 +126,7 @@ impl Tree {
             r.copy(head_memory.grid.part(0, size_of::<Grid>() as u64), memory.grid);
             r.barrier("head → splits");
             cmd_splits(r, &memory, &capacity, entries, &sorted)?;
-            cmd_leaves(r, &view, &memory, &capacity, entries, &sorted)?;
+            cmd_leaves(r, &view, &memory, &capacity, entries, filter.as_ref(), &sorted)?;
             cmd_levels(r, &memory, &capacity, &sorted)
         })?;
         stages.extend(time.stages);

@@ -45,7 +45,7 @@ impl Expected {
         let candidates = Stage { mesh, topology, vertices, grid: &tree.grid, assign: Assign::Aabb, marks: None };
         let mut offsets = vec![0];
         offsets.extend(candidates.count().iter().scan(0u32, |sum, n: &u32| {
-            *sum += n.div_ceil(share);
+            *sum += if share > 1 { n.div_ceil(share).max(1) } else { *n };
             Some(*sum)
         }));
 

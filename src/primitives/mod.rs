@@ -25,17 +25,25 @@ pub struct Count {
     pub max: u32,
     /// The word with the true number.
     pub live: Option<BufferRef>,
+    /// Items of these that dispatches over them leave out.
+    pub skip: u32,
 }
 
 impl Count {
     /// A number known to the host.
     pub fn host(n: u32) -> Self {
-        Self { max: n, live: None }
+        Self { max: n, live: None, skip: 0 }
     }
 
     /// A number in device memory, at most `max`.
     pub fn device(max: u32, live: BufferRef) -> Self {
-        Self { max, live: Some(live) }
+        Self { max, live: Some(live), skip: 0 }
+    }
+
+    /// All but `skip` of them.
+    #[must_use]
+    pub(crate) fn behind(self, skip: u32) -> Self {
+        Self { skip, ..self }
     }
 
     /// The word that kernels read.
@@ -53,10 +61,10 @@ impl Count {
 
     /// As [`Count::groups`], and leaves the barrier to the caller.
     pub(crate) fn arguments(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef) -> Result<Groups> {
-        let Some(live) = self.live else { return Ok(Groups::Count(self.max.div_ceil(per_group))) };
+        let Some(live) = self.live else { return Ok(Groups::Count(self.max.saturating_sub(self.skip).div_ceil(per_group))) };
         let words = arguments.part(0, 12);
         let spec = DispatchArgsSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
-        r.dispatch(&DispatchArgs { live, groups: words, count: self.max, per_group }, spec, Groups::Count(1))?;
+        r.dispatch(&DispatchArgs { live, groups: words, count: self.max, per_group, skip: self.skip }, spec, Groups::Count(1))?;
         Ok(Groups::Indirect(words))
     }
 }

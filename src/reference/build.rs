@@ -57,7 +57,7 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let splits = super::splits::splits(&entries.codes, level);
 
     // Stage 4: construct the nodes bottom-up.
-    let flags = leaves::flags(&entries.primitives, &splits, mesh, topology, vertices, &grid);
+    let flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
     let boundary = levels::flags(flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let mask = levels::masks(&splits);

@@ -8,6 +8,7 @@ use super::splits::Splits;
 use super::tet::sub;
 use super::vertices::Vertices;
 use crate::mesh::Mesh;
+use crate::options::Lists;
 use rayon::prelude::*;
 
 /// A box as `[lo, hi]`, x y z each.
@@ -39,10 +40,12 @@ pub const ASKED: usize = 16;
 
 /// Boundary flag of a leaf: set if one of its primitives is one; also if none of the first [`ASKED`] primitives touches the cell. The bounding box
 /// of an inner primitive can reach out of the mesh into cells where no boundary primitive is listed, and those are outside as a whole. A cell that
-/// is touched and holds no part of the surface is full of mesh, and only such a leaf's flag is 0 (SPEC 2.3).
-pub fn flag(listed: &[u32], code: u32, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> bool {
-    if listed.iter().any(|&p| bit(&topology.boundary, p)) {
-        return true;
+/// is touched and holds no part of the surface is full of mesh, and only such a leaf's flag is 0 (SPEC 2.3). Under `Lists::Boundary` cells outside
+/// are not listed: only the owners of their centres would be.
+pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> bool {
+    let boundary = listed.iter().any(|&p| bit(&topology.boundary, p));
+    if boundary || lists == Lists::Boundary {
+        return boundary;
     }
     let half = half_cell(grid, grid.level);
     let centre = cell_centre(half, unmorton(code));
@@ -52,10 +55,18 @@ pub fn flag(listed: &[u32], code: u32, mesh: &Mesh, topology: &Topology, vertice
 }
 
 /// Boundary flag of each leaf.
-pub fn flags(primitives: &[u32], splits: &Splits, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> Vec<bool> {
+pub fn flags(
+    primitives: &[u32],
+    splits: &Splits,
+    lists: Lists,
+    mesh: &Mesh,
+    topology: &Topology,
+    vertices: &Vertices,
+    grid: &Grid,
+) -> Vec<bool> {
     let first = first_leaf(&splits.no);
     let listed = |i: usize| &primitives[splits.po[i] as usize..splits.po[i + 1] as usize];
-    let flag_of = |(i, &code)| flag(listed(i), code, mesh, topology, vertices, grid);
+    let flag_of = |(i, &code)| flag(listed(i), code, lists, mesh, topology, vertices, grid);
     splits.codes[first..].par_iter().enumerate().map(flag_of).collect()
 }
 

@@ -1,4 +1,4 @@
-//! The cells that the boundary touches, and who is listed where under `Lists::Boundary` (SPEC 2.6). Twin of `glsl/shared/marks.glsl`.
+//! The cells that the boundary touches, and who is listed where under `Lists::Boundary` (SPEC 2.6). Twin of `glsl/shared/{marks,seeds}.glsl`.
 //!
 //! A cell is marked if a boundary primitive touches it, under the assignment. Any other cell lies inside the mesh as a whole or outside as a
 //! whole: inside if a primitive that is no boundary contains its centre. Rounding may leave the centre in a gap between cells; then those that

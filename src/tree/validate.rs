@@ -169,7 +169,7 @@ impl TreeArrays {
             let expected = if j < internal {
                 self.children(j).any(|c| self.is_boundary(c))
             } else {
-                flag(self.primitives(j), codes[j as usize], mesh, topology, &vertices, &self.grid)
+                flag(self.primitives(j), codes[j as usize], self.lists, mesh, topology, &vertices, &self.grid)
             };
             let what = if j < internal { "children" } else { "primitives" };
             rule(self.is_boundary(j) == expected, || format!("BF[{j}] = {}, its {what} say {expected}", !expected))

@@ -2,7 +2,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes of all but the paper's lists, 2 of 2: the entries of the candidates that were hit.
+// Codes of all but the paper's lists, 3 of 3: the entries of the candidates that were hit.
 ARGUMENTS(10)
     uint tets;
     uint capacity; // shares
@@ -19,24 +19,23 @@ BUFFER(7, readonly, uint, places) // scanned counts of the shares
 BUFFER(8, writeonly, uint, codes)
 BUFFER(9, writeonly, uint, ids)
 #include "shared/cells.glsl"
-#include "shared/owner.glsl"
+#include "shared/shares.glsl"
 
 void main() {
-    uint share = item_index();
-    if (share >= min(shares.at[0], capacity)) return;
-    uint bits = hits.at[share], place = places.at[share];
+    Share share;
+    if (!share_of(item_index(), tets, min(shares.at[0], capacity), share)) return;
+    uint bits = hits.at[share.index], place = places.at[share.index];
     if (bits == 0u) return;
     Grid g = grid.at[0];
-    uint t = owner_of(share, tets);
-    CellBox box = coarser(finest_box(t), g.level);
-    uint first = 32u * (share - offsets.at[t]);
-    uvec3 at = first == 0u ? box.lo : candidate(box, first);
-    for (; bits != 0u && place < room; bits >>= 1) {
-        if ((bits & 1u) != 0u) {
-            codes.at[place] = morton(at);
-            ids.at[place] = t;
-            ++place;
-        }
-        at = next_candidate(box, at);
+    CellBox box = coarser(finest_box(share.t), g.level);
+    uvec3 at = first_candidate(box, share.first);
+    uint i = 0u;
+    for (; bits != 0u && place < room; bits &= bits - 1u) {
+        uint next = uint(findLSB(bits));
+        at = advance(box, at, next - i);
+        i = next;
+        codes.at[place] = morton(at);
+        ids.at[place] = share.t;
+        ++place;
     }
 }

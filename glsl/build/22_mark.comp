@@ -1,0 +1,62 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Lists::Boundary (SPEC 2.6): marks the cells that boundary primitives touch. An invocation takes 32 tetrahedra, of which few or none are on the
+// boundary, the first share of each; LATER one other share.
+layout(constant_id = 2) const uint ASSIGN = 0;
+ARGUMENTS(9)
+    uint tets;
+    uint capacity; // shares
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, quantized)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER16(4, readonly, vec4, vertices)
+BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
+BUFFER(6, readonly, uint, shares)  // their number
+BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves, and a word more; zeroed
+BUFFER(8, readonly, uint, boundary)
+#include "shared/cells.glsl"
+#include "shared/shares.glsl"
+#include "shared/assign.glsl"
+#include "shared/touching.glsl"
+#include "shared/candidates.glsl"
+#include "shared/marks.glsl"
+
+void mark_word(uint word, uint bits) {
+    if ((bits & ~marks.at[word]) != 0u) atomicOr(marks.at[word], bits);
+}
+
+void mark(Grid g, uint t, uint first) {
+    CellBox box = coarser(finest_box(t), g.level);
+    uvec3 at = first_candidate(box, first);
+    Filter cell_filter;
+    if (ASSIGN != 0u) cell_filter = make_filter(load_tet(cells.at[t]), g, g.level, ASSIGN);
+    uint run;
+    for (uint n = candidates_of(box, first); n > 0u; n -= run) {
+        run = min(n, box.lo.x + box.size.x - at.x);
+        uint row = low_bits(run);
+        if (ASSIGN != 0u) row = touching(cell_filter, box, at, row);
+        uint place = mark_place(g.level, at), shift = place & 31u;
+        mark_word(place >> 5u, row << shift);
+        if (shift + run > 32u) mark_word((place >> 5u) + 1u, row >> (32u - shift));
+        at.x += run - 1u;
+        at = next_candidate(box, at);
+    }
+}
+
+void main() {
+    Grid g = grid.at[0];
+    if (LATER != 0u) {
+        Share share;
+        if (!share_of(item_index(), tets, min(shares.at[0], capacity), share)) return;
+        if ((boundary.at[share.t >> 5u] >> (share.t & 31u) & 1u) != 0u) mark(g, share.t, share.first);
+        return;
+    }
+    uint first = 32u * item_index();
+    if (first >= tets) return;
+    for (uint bits = boundary.at[first >> 5u]; bits != 0u; bits &= bits - 1u) mark(g, first + uint(findLSB(bits)), 0u);
+}

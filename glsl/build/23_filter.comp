@@ -1,0 +1,71 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Codes of all but the paper's lists, 1 of 3: which candidates are entries, and how many. An invocation takes a share of 32 candidates of one
+// tetrahedron, a word of answers. With LISTS of all primitives they are those that an assignment keeps (SPEC 2.2); else (2.6) of those what lies in
+// marked cells, and besides the unmarked cells whose centre the tetrahedron clearly holds. What is in doubt about centres is left to the next kernel.
+layout(constant_id = 2) const uint ASSIGN = 1;
+layout(constant_id = 4) const uint LISTS = 0; // 1: marked cells and seeds
+ARGUMENTS(13)
+    uint tets;
+    uint capacity; // shares
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, quantized)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER16(4, readonly, vec4, vertices)
+BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
+BUFFER(6, readonly, uint, shares)  // their number
+BUFFER(7, writeonly, uint, hits)   // one bit per candidate
+BUFFER(8, writeonly, uint, counts) // hits per share
+BUFFER(9, readonly, uint, marks)
+BUFFER(10, readonly, uint, boundary)
+BUFFER(11, writeonly, uint, doubts)       // shares with centres in doubt: tetrahedra, or tets and the number of another share
+BUFFER(12, READ_WRITE, uint, doubt_count) // zeroed
+#include "shared/cells.glsl"
+#include "shared/shares.glsl"
+#include "shared/assign.glsl"
+#include "shared/touching.glsl"
+#include "shared/candidates.glsl"
+#include "shared/marks.glsl"
+#include "shared/seeds.glsl"
+
+void main() {
+    uint item = item_index();
+    Share share;
+    if (!share_of(item, tets, min(shares.at[0], capacity), share)) return;
+    Grid g = grid.at[0];
+    uint t = share.t;
+    CellBox box = coarser(finest_box(t), g.level);
+    uint n = candidates_of(box, share.first);
+    if (n == 0u) { // a bad one
+        hits.at[share.index] = 0u;
+        counts.at[share.index] = 0u;
+        return;
+    }
+    uvec3 at = first_candidate(box, share.first);
+    Tet tet = load_tet(cells.at[t]);
+    vec3 h = half_cell(g, g.level);
+    uint bits = low_bits(n), centres = 0u;
+    if (LISTS != 0u) {
+        sift(g.level, box, at, n, centres_of(tet, h, box), bits, centres);
+        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) centres = 0u;
+    }
+    if (ASSIGN != 0u) bits = touching(make_filter(tet, g, g.level, ASSIGN), box, at, bits);
+    bool doubt = false;
+    uint i = 0u;
+    for (; centres != 0u; centres &= centres - 1u) {
+        uint next = uint(findLSB(centres));
+        at = advance(box, at, next - i);
+        i = next;
+        Weights own = weights(tet, cell_centre(h, at));
+        if (own.clear) bits |= 1u << i;
+        doubt = doubt || in_doubt(own);
+    }
+    hits.at[share.index] = bits;
+    counts.at[share.index] = bitCount(bits);
+    if (doubt) doubts.at[atomicAdd(doubt_count.at[0], 1u)] = LATER == 0u ? item : tets + item;
+}

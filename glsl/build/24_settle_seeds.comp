@@ -1,0 +1,69 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+// Codes of all but the paper's lists, 2 of 3: centres on faces, edges, vertices, or too near to them. There are few, but each takes a star of
+// tetrahedra to decide, which the kernel before would do for as many again as it has lanes.
+ARGUMENTS(12)
+    uint tets;
+    uint capacity; // shares
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER16(1, readonly, uvec4, quantized)
+BUFFER16(2, readonly, uvec4, cells)
+BUFFER(3, readonly, uint, bad)
+BUFFER16(4, readonly, vec4, vertices)
+BUFFER(5, readonly, uint, offsets)
+BUFFER(6, READ_WRITE, uint, hits)
+BUFFER(7, READ_WRITE, uint, counts)
+BUFFER(8, readonly, uint, marks)
+BUFFER16(9, readonly, uvec4, neighbours)
+BUFFER(10, readonly, uint, doubts)
+BUFFER(11, readonly, uint, doubt_count)
+#include "shared/cells.glsl"
+#include "shared/shares.glsl"
+#include "shared/centre.glsl"
+#include "shared/candidates.glsl"
+#include "shared/walk.glsl"
+#include "shared/marks.glsl"
+#include "shared/seeds.glsl"
+
+// Whether t is a seed of an unmarked cell with this centre, which it holds not clearly: no lower one contains it, or it is near and none does.
+bool owns_centre(uint t, Weights own, vec3 centre) {
+    uint beaten_below = own.inside ? t : NONE;
+    star[0] = t;
+    star_size = 1u;
+    for (uint i = 0u; i < star_size; ++i) {
+        uint u = star[i];
+        Tet other = load_tet(cells.at[u]);
+        Weights w = weights(other, centre);
+        if (w.inside && u < beaten_below) return false;
+        grow_star(u, other, w, centre);
+    }
+    return true;
+}
+
+void main() {
+    uint k = item_index();
+    if (k >= min(doubt_count.at[0], capacity)) return;
+    uint item = doubts.at[k];
+    Share share = item < tets ? Share(offsets.at[item], item, 0u) : later_share(item - tets, tets);
+    Grid g = grid.at[0];
+    CellBox box = coarser(finest_box(share.t), g.level);
+    uvec3 at = first_candidate(box, share.first);
+    Tet tet = load_tet(cells.at[share.t]);
+    vec3 h = half_cell(g, g.level);
+    uint marked, centres, bits = hits.at[share.index], i = 0u;
+    sift(g.level, box, at, candidates_of(box, share.first), centres_of(tet, h, box), marked, centres);
+    for (centres &= ~bits; centres != 0u; centres &= centres - 1u) {
+        uint next = uint(findLSB(centres));
+        at = advance(box, at, next - i);
+        i = next;
+        vec3 centre = cell_centre(h, at);
+        Weights own = weights(tet, centre);
+        if (in_doubt(own) && owns_centre(share.t, own, centre)) bits |= 1u << i;
+    }
+    hits.at[share.index] = bits;
+    counts.at[share.index] = bitCount(bits);
+}

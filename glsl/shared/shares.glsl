@@ -1,0 +1,48 @@
+// Candidates are taken in shares of up to 32 of one tetrahedron. Every tetrahedron has one at least; dispatches over the first ones of all need no
+// search, others follow in a second dispatch (LATER), which is empty for most meshes. The including kernel declares offsets, the scanned numbers of
+// shares (tets + 1). Needs cells.glsl.
+layout(constant_id = 3) const uint LATER = 0;
+
+struct Share {
+    uint index; // among all, in the order of the tetrahedra
+    uint t;
+    uint first; // its first candidate
+};
+
+// Share number i of those that are not the first of a tetrahedron.
+Share later_share(uint i, uint tets) {
+    // The last tetrahedron with so many of them before it at most.
+    uint lo = 0u, hi = tets;
+    while (hi - lo > 1u) {
+        uint mid = lo + (hi - lo) / 2u;
+        if (offsets.at[mid] - mid <= i) lo = mid;
+        else hi = mid;
+    }
+    return Share(lo + i + 1u, lo, 32u * (i - (offsets.at[lo] - lo) + 1u));
+}
+
+// What invocation i of a dispatch takes, where there are `all` shares; false: nothing.
+bool share_of(uint i, uint tets, uint all, out Share share) {
+    if (i >= (LATER == 0u ? tets : all - tets)) return false;
+    if (LATER == 0u) share = Share(offsets.at[i], i, 0u);
+    else share = later_share(i, tets);
+    return share.index < all;
+}
+
+// The candidate `by` places behind one, by at most 32: steps instead of the divisions of `candidate`.
+uvec3 advance(CellBox box, uvec3 at, uint by) {
+    uvec3 end = box.lo + box.size;
+    at.x += by;
+    while (at.x >= end.x) {
+        at.x -= box.size.x;
+        at.y += 1u;
+        bool slab = at.y == end.y;
+        at.y = slab ? box.lo.y : at.y;
+        at.z += uint(slab);
+    }
+    return at;
+}
+
+uvec3 first_candidate(CellBox box, uint first) { return LATER == 0u || first == 0u ? box.lo : candidate(box, first); }
+
+uint candidates_of(CellBox box, uint first) { return min(32u, box.size.x * box.size.y * box.size.z - first); }
