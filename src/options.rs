@@ -83,11 +83,22 @@ pub struct BuildOptions {
     /// Store a box per node (24 bytes each). Without, boxes follow from the grid.
     pub boxes: bool,
     /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
-    /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: as many as 32 bits count.
+    /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: [`usual_capacity`].
     pub capacity: Option<u32>,
     /// Most bytes that the arrays of the tree may have together ([`crate::tree::Memory::total`]), α being the finest that is asked for: the tree gets
     /// coarser until it fits. What is held to the budget is [`crate::tree::Memory::most`], which is known before anything is built. `None`: no limit.
     pub budget: Option<u64>,
+}
+
+/// Entries per tetrahedron of the usual capacity; even cells have about 8 at α = 0.
+pub const USUAL_ENTRIES: u32 = 64;
+/// The least usual capacity.
+pub const LEAST_USUAL: u32 = 1 << 20;
+
+/// Most entries of the tree over so many tetrahedra where no capacity is asked for: where cells differ much in size, the mean that α refers to is that of
+/// the small ones, and the large ones would fill hundreds of leaves each.
+pub fn usual_capacity(tets: u32) -> u32 {
+    tets.saturating_mul(USUAL_ENTRIES).max(LEAST_USUAL)
 }
 
 impl Default for BuildOptions {

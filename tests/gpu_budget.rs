@@ -23,6 +23,25 @@ fn diagonal() -> Mesh {
     mesh
 }
 
+/// Points, which call for a deep tree, and cells that fill the bounds.
+fn uneven() -> Mesh {
+    let mut points = vec![[0.5; 3]; 4];
+    points.extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
+    let mut tets = vec![[0, 1, 2, 3]; 600];
+    tets.extend(vec![[4, 5, 6, 7]; 33]);
+    Mesh::new(points, tets)
+}
+
+/// Without a capacity there is the usual one.
+fn usual(gpu: &Gpu) {
+    let mesh = uneven();
+    let topology = topology(&mesh).unwrap();
+    let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
+    assert_eq!((tree.status().heuristic_level, tree.status().level), (9, 4), "33·8^5 entries are more than 2^20");
+    assert_eq!(tree.download().unwrap(), build(&mesh, &topology, &BuildOptions::default()).unwrap());
+}
+
 fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
     let topology = topology(mesh).unwrap();
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
@@ -69,6 +88,7 @@ fn everything(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     check(&gpu, "kuhn", &kuhn([6; 3]).unwrap());
     check(&gpu, "diagonal", &diagonal());
+    usual(&gpu);
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
@@ -129,7 +149,7 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
         lists: tree.lists,
         grid: one(content, tree.grid),
         p: words(tree.p, status.entries),
-        po: words(tree.po, nodes + 1),
+        po: words(tree.po, status.leaves + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         boundary: words(tree.flags, nodes.div_ceil(32)),

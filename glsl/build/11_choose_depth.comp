@@ -8,6 +8,8 @@ ARGUMENTS(4)
     uint tets;
     uint alpha;    // in units of 1/65536
     uint capacity; // most entries
+    uint usual;    // most per valid tetrahedron,
+    uint least;    // but as many as this
     uint deepest;  // most levels
     uint budget[2]; // most words of all arrays, low word first
     uint box_words; // per node
@@ -42,7 +44,9 @@ uvec2 most_words(uint level) {
     return words;
 }
 
-bool fits(uint level) { return less_equal(total(level), uvec2(capacity, 0u)) && less_equal(most_words(level), uvec2(budget[0], budget[1])); }
+bool fits(uint level, uvec2 most) {
+    return less_equal(total(level), uvec2(capacity, 0u)) && less_equal(total(level), most) && less_equal(most_words(level), uvec2(budget[0], budget[1]));
+}
 
 void main() {
     if (item_index() > 0u) return;
@@ -60,8 +64,11 @@ void main() {
     }
     status.at[0].heuristic_level = level;
     level = min(level, deepest);
-    while (level > 0u && !fits(level)) level -= 1u;
-    if (!fits(level)) status.at[0].overflow = 1u;
+    uvec2 most;
+    umulExtended(valid, usual, most.y, most.x);
+    if (less_equal(most, uvec2(least, 0u))) most = uvec2(least, 0u);
+    while (level > 0u && !fits(level, most)) level -= 1u;
+    if (!fits(level, most)) status.at[0].overflow = 1u;
     uint n = status.at[0].overflow != 0u ? 0u : status.at[0].total[2u * level];
     status.at[0].level = level;
     status.at[0].candidates = n;

@@ -10,7 +10,7 @@ use crate::kernels::{
     FlagLeavesSpec, Mark, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, SettleSeeds, SettleSeedsSpec,
 };
 use crate::layout::{BuildStatus, Grid};
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
 
 /// A mesh as the stages see it.
@@ -36,6 +36,7 @@ pub(crate) fn cmd_depth(
     let workgroup = r.gpu().target().each;
     let alpha = options.alpha_fixed()?;
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
+    let (usual, least) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
     let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
     let (budget, box_words) = ([words as u32, (words >> 32) as u32], if options.boxes { 6 } else { 0 });
     r.stage("build.depth", |r| {
@@ -48,7 +49,20 @@ pub(crate) fn cmd_depth(
         r.barrier("depth.estimate → depth.choose");
         let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
         let candidates = scratch.candidates;
-        let choose = ChooseDepth { mesh: mesh.arrays.status, grid, status, candidates, tets, alpha, capacity, deepest, budget, box_words };
+        let choose = ChooseDepth {
+            mesh: mesh.arrays.status,
+            grid,
+            status,
+            candidates,
+            tets,
+            alpha,
+            capacity,
+            usual,
+            least,
+            deepest,
+            budget,
+            box_words,
+        };
         r.dispatch(&choose, once, Groups::Count(1))?;
         r.barrier("depth.choose → codes.count");
         Ok(())

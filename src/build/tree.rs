@@ -204,12 +204,10 @@ impl Tree {
     }
 }
 
-/// A caller who named a limit gets the coarser tree; one who did not gets the figures.
 fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
     let entries: [u64; 11] = std::array::from_fn(|k| u64::from(status.total[2 * k]) | u64::from(status.total[2 * k + 1]) << 32);
-    let unlimited = options.capacity.is_none() && options.budget.is_none();
-    if status.overflow != 0 || (unlimited && status.heuristic_level > status.level) {
-        return Err(too_large(&entries, status.heuristic_level, options));
+    if status.overflow != 0 {
+        return Err(too_large(&entries, options));
     }
     Ok(())
 }

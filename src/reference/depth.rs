@@ -5,7 +5,7 @@ use super::grid::{Grid, MAX_LEVEL, canonical};
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, usual_capacity};
 use crate::tree::Memory;
 use rayon::prelude::*;
 
@@ -69,23 +69,21 @@ impl Sizes {
     /// The level to build: the heuristic's, or the next coarser one that keeps to the capacity and the budget.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits, or, without a limit, if the entries cannot be
-    /// counted in 32 bits.
+    /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits.
     pub fn level(&self, options: &BuildOptions) -> Result<u32> {
         let wanted = self.heuristic(options.alpha_fixed()?);
-        let most = u64::from(options.capacity.unwrap_or(u32::MAX));
+        let valid = u32::try_from(self.histogram.iter().sum::<u64>()).unwrap_or(u32::MAX);
+        let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {
             self.entries[l as usize] <= most
                 && options.budget.is_none_or(|budget| Memory::most(&self.entries, l, options.boxes).total() <= budget)
         };
-        let limited = options.capacity.is_some() || options.budget.is_some();
-        let coarsest = if limited { 0 } else { wanted };
-        (coarsest..=wanted).rev().find(fits).ok_or_else(|| too_large(&self.entries, wanted, options))
+        (0..=wanted).rev().find(fits).ok_or_else(|| too_large(&self.entries, options))
     }
 }
 
 /// Why there is no tree, `entries` being those of every level.
-pub fn too_large(entries: &[u64; LEVELS], wanted: u32, options: &BuildOptions) -> Error {
+pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
     let root = entries[0];
     Error::TooLarge(match (options.capacity, options.budget) {
         (Some(capacity), _) if root > u64::from(capacity) => {
@@ -95,9 +93,6 @@ pub fn too_large(entries: &[u64; LEVELS], wanted: u32, options: &BuildOptions) -
             let bytes = Memory::most(entries, 0, options.boxes).total();
             format!("a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes")
         }
-        _ => {
-            let n = entries[wanted as usize];
-            format!("{n} entries at level {wanted}, 32-bit offsets end at {}; raise alpha or set a capacity or a budget", u32::MAX)
-        }
+        _ => format!("a tree of a single node has {root} entries, more than there is room for"),
     })
 }

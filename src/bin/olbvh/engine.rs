@@ -92,6 +92,8 @@ pub struct Summary {
     pub bounds: Bounds,
     /// Level of the leaves.
     pub level: u32,
+    /// The level that alpha asks for.
+    pub wanted: u32,
     /// Entries.
     pub entries: u64,
     /// Nodes.

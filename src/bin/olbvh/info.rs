@@ -75,7 +75,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
         "tree": {
-            "l": s.level, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
+            "l": s.level, "l_wanted": s.wanted, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
             "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
         },
@@ -134,7 +134,8 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
         args.tree.budget.map(|b| format!(", budget {}", bytes(b))).unwrap_or_default(),
         milliseconds(s.build_ms)
     ));
-    page.row("level of the leaves, l", s.level);
+    let clipped = if s.wanted > s.level { format!(" (alpha asks for {}, which would be too large)", s.wanted) } else { String::new() };
+    page.row("level of the leaves, l", format_args!("{}{clipped}", s.level));
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     page.row("leaves", grouped(s.leaves));

@@ -5,9 +5,11 @@ use olbvh::error::Result;
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::{Topology, topology};
+use olbvh::reference::depth::measure;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{Side, overlap};
 use olbvh::reference::slice::Slicer;
+use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
 use olbvh::render::{Bounds, RenderSettings};
 use olbvh::slicing::{Extrapolate, VoxelGrid, bands};
@@ -48,6 +50,7 @@ impl Engine for Cpu {
             bad: topology.bad.clone(),
             bounds: Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) },
             level: tree.grid.level,
+            wanted: measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
             entries: tree.p.len() as u64,
             nodes: u64::from(tree.nodes()),
             leaves: tree.leaves().len() as u64,
