@@ -31,7 +31,7 @@ fn location(c: &mut Criterion) {
     let buffer = gpu.upload("olbvh.bench.points", &points).expect("memory");
     let owners = gpu.buffer("olbvh.bench.owners", 4 * u64::from(POINTS)).expect("memory");
     let barycentrics = gpu.buffer("olbvh.bench.barycentrics", 16 * u64::from(POINTS)).expect("memory");
-    let input = PointInput { points: buffer.all(), stride: 3, count: POINTS, hints: None };
+    let input = PointInput { points: buffer.all(), stride: 3, count: POINTS, hints: None, order: None };
     let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
     let found = || gpu.download::<u32>(&owners, owners.all()).expect("owners");
     let mut group = c.benchmark_group("locate");

@@ -86,7 +86,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (leaf == NONE) return NONE;
     vec3 x = normalise(g, place);
     uvec2 range = entry_range(leaf);
-    Best best = walked(g, leaf, range, NONE, place, x);
+    Best best = walked(g, leaf, range, place, x);
     if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, x);
     uint owner = decide(best, leaf, tolerance);
     if (owner == NONE) return NONE;
@@ -107,7 +107,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uvec2 range = entry_range(leaf);
     bool by_walk = walks_in(leaf, range);
     if (by_walk) {
-        Best first = walked(g, leaf, range, NONE, place, x), unused = no_best();
+        Best first = walked(g, leaf, range, place, x), unused = no_best();
         arrive(first.owner, x, unused);
         range = uvec2(0u, star_size);
     }

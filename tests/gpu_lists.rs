@@ -93,7 +93,7 @@ impl Subject {
         let count = points.len() as u64;
         let owners = gpu.buffer("olbvh.test.owners", 4 * count).unwrap();
         let barycentrics = gpu.buffer("olbvh.test.barycentrics", 16 * count).unwrap();
-        let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()) };
+        let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()), order: None };
         let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
         let scene = Scene::new(&self.device, &tree);
         gpu.run("olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();

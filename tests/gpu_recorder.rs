@@ -19,7 +19,9 @@ use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
-use olbvh::query::{LocateOptions, Scene, cmd_interpolate, cmd_locate, cmd_visible, visible_bytes};
+use olbvh::query::{
+    LocateOptions, Path, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible, visible_bytes,
+};
 
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
@@ -131,7 +133,7 @@ fn queries() {
     assert!(barriers >= 70, "{barriers}");
 }
 
-/// Location that takes several dispatches, since a leaf could be that long, and values at what was located.
+/// Sorted points, location that takes several dispatches, since a leaf could be that long, and values at what was located.
 #[test]
 fn location() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -142,15 +144,25 @@ fn location() {
     let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
     let (values, sink) = (gpu.buffer("olbvh.test.values", 4 * u64::from(frame.points.count)), gpu.buffer("olbvh.test.sink", 64));
     let (values, sink) = (values.unwrap(), sink.unwrap());
+    let carve = |a: &mut Arena| PointOrder::carve(&gpu, a, frame.points.count);
+    let memory = gpu.buffer("olbvh.test.order", Arena::measure(carve).unwrap()).unwrap();
+    let order = carve(&mut Arena::new(memory.all())).unwrap();
+    let points = PointInput { order: Some(order.order), ..frame.points };
     let barriers = every_barrier_counts(&gpu, "location", |r| {
-        cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions::default())?;
+        cmd_sort_points(r, frame.tree.grid, &points, &order)?;
+        r.barrier("sort_points → locate");
+        cmd_locate(r, &scene, &points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })?;
         r.barrier("locate → interpolate");
         cmd_interpolate(r, &scene, field.all(), On::Points, &frame.output, values.all(), frame.points.count)?;
         r.barrier("interpolate → caller");
         read(r, &[values.all()], &sink);
         Ok(())
     });
-    assert_eq!(barriers, 4);
+    assert!(barriers >= 4 + 5, "{barriers}");
+    let unordered = gpu.run("olbvh.test.unordered", |r| {
+        cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })
+    });
+    assert!(matches!(unordered, Err(Error::Invalid(_))));
 }
 
 #[test]

@@ -3,11 +3,13 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Point location by descent over child masks (SPEC 3.1), then by a list or a walk. Lists are searched in slices of at most SLICE entries per dispatch; between slices
-// the best candidate waits in the outputs.
-layout(constant_id = 2) const uint HINTS = 0;
+// Point location (SPEC 3.1). An invocation takes RUN points, and looks for each first around where it starts: the owner of the one before, or a hint. Where
+// that fails, in the point's leaf, by descent over child masks, then by a list or a walk. Lists are searched in slices of at most SLICE entries per
+// dispatch, those after the first without runs; between slices the best candidate waits in the outputs. Twin of src/reference/locate.rs.
+layout(constant_id = 2) const uint GUIDE = 0; // what `guides` has: nothing, HINTS or ORDER
 layout(constant_id = 3) const uint SLICE = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
+layout(constant_id = 5) const uint RUN = 1;
 ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
@@ -24,7 +26,7 @@ BUFFER(5, readonly, uint, flags)
 BUFFER16(6, readonly, uvec4, cells)
 BUFFER16(7, readonly, vec4, vertices)
 BUFFER(8, readonly, float, points)
-BUFFER(9, readonly, uint, hints)
+BUFFER(9, readonly, uint, guides)
 BUFFER(10, READ_WRITE, uint, owners)
 BUFFER16(11, READ_WRITE, vec4, barycentrics) // between slices: inside, in_box, smallest
 BUFFER16(12, readonly, uvec4, neighbours)
@@ -32,44 +34,86 @@ BUFFER16(12, readonly, uvec4, neighbours)
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
-void main() {
-    uint i = item_index();
-    if (i >= count) return;
-    Grid g = grid.at[0];
+const uint HINTS = 1u; // a tetrahedron per point, or NONE
+const uint ORDER = 2u; // which point is at each place
+
+// A point, in the units of the mesh and in normalised coordinates.
+struct Point {
+    uint i;
+    vec3 at;
+    vec3 x;
+};
+
+Point point_at(Grid g, uint place) {
+    uint i = GUIDE == ORDER ? guides.at[place] : place;
     vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
-    uint leaf = near_bounds(g, at) ? find_leaf(g.level, quantize(g, at)) : NONE;
-    if (leaf == NONE) {
-        owners.at[i] = NONE;
-        barycentrics.at[i] = vec4(0.0);
-        return;
+    return Point(i, at, normalise(g, at));
+}
+
+void main() {
+    uint place = item_index() * RUN;
+    if (place >= count) return;
+    uint end = place + min(RUN, count - place);
+    Grid g = grid.at[0];
+    Point a = point_at(g, place);
+    Stand stand = stand_nowhere();
+    uint left = 0u; // steps that a stride may still take; 0: it has ended
+    bool in_leaf = slice > 0u; // whether it began in the point's leaf
+    if (GUIDE == HINTS && slice == 0u) {
+        uint hint = guides.at[a.i];
+        if (hint != NONE) {
+            stand = stand_in(hint);
+            left = HINTED;
+        }
     }
-    vec3 x = normalise(g, at);
-    Best best = no_best();
-    uint hint = HINTS != 0u && slice == 0u ? hints.at[i] : NONE;
-    if (slice > 0u) {
-        vec4 state = barycentrics.at[i];
-        best = Best(owners.at[i], state.x != 0.0, state.y != 0.0, state.z);
-    } else if (hint != NONE) {
-        Weights w = weights(load_tet(cells.at[hint]), x);
-        if (w.clear) best = Best(hint, true, true, 0.0);
+    while (place < end) {
+        // As far as strides lead: point after point, each pass an answer or a step, so that invocations do not wait for each other.
+        while (left > 0u && place < end) {
+            Sides sides = sides_of(stand, a.x);
+            if (sides.clear) {
+                owners.at[a.i] = stand.t;
+                Tet tet = tet_of(stand);
+                barycentrics.at[a.i] = last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(weights(tet, a.x), tet.rank);
+                if (++place < end) a = point_at(g, place);
+                left = HINTED;
+                in_leaf = false;
+            } else {
+                left = step_on(stand, sides) ? left - 1u : 0u;
+            }
+        }
+        if (place >= end) break;
+        Best best = no_best();
+        if (slice > 0u) {
+            vec4 state = barycentrics.at[a.i];
+            best = Best(owners.at[a.i], state.x != 0.0, state.y != 0.0, state.z);
+        }
+        uint leaf = !best.inside && near_bounds(g, a.at) ? find_leaf(g.level, quantize(g, a.at)) : NONE;
+        uvec2 range = leaf == NONE ? uvec2(0u) : entry_range(leaf);
+        bool walks = walks_in(leaf, range);
+        if (LISTS != 0u && !in_leaf && range.x < range.y) {
+            stand = stand_in(middle_of(range));
+            left = STRIDE;
+            in_leaf = true;
+            continue;
+        }
+        if (walks && slice == 0u) best = walked_through(g, range, a.at, a.x);
+        uint begin = min(range.y, range.x + slice * SLICE), behind = min(range.y, begin + SLICE);
+        if (!walks && !best.inside) search(best, begin, behind, a.x);
+        uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
+        vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
+        if (last != 0u && owner != NONE) {
+            Tet tet = load_tet(cells.at[owner]);
+            b = barycentric(weights(tet, a.x), tet.rank);
+        }
+        owners.at[a.i] = last == 0u ? best.owner : owner;
+        barycentrics.at[a.i] = b;
+        if (++place < end) {
+            a = point_at(g, place);
+            // Where a list goes on in the next slice, the owner is not known yet.
+            bool known = owner != NONE && (walks || range.y - range.x <= SLICE);
+            if (known) stand = stand_in(owner);
+            left = known ? HINTED : 0u;
+            in_leaf = false;
+        }
     }
-    uvec2 range = entry_range(leaf);
-    if (slice == 0u && !best.inside) best = walked(g, leaf, range, hint, at, x);
-    if (!best.inside && !walks_in(leaf, range)) {
-        uint begin = min(range.y, range.x + slice * SLICE);
-        search(best, begin, min(range.y, begin + SLICE), x);
-    }
-    if (last == 0u) {
-        owners.at[i] = best.owner;
-        barycentrics.at[i] = vec4(float(best.inside), float(best.in_box), best.smallest, 0.0);
-        return;
-    }
-    uint owner = decide(best, leaf, tolerance);
-    owners.at[i] = owner;
-    vec4 b = vec4(0.0);
-    if (owner != NONE) {
-        Tet tet = load_tet(cells.at[owner]);
-        b = barycentric(weights(tet, x), tet.rank);
-    }
-    barycentrics.at[i] = b;
 }

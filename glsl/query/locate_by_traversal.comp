@@ -55,7 +55,7 @@ void main() {
     if (leaf_found != NONE) {
         vec3 x = normalise(g, at);
         uvec2 range = entry_range(leaf_found);
-        Best best = walked(g, leaf_found, range, NONE, at, x);
+        Best best = walked(g, leaf_found, range, at, x);
         if (!best.inside && !walks_in(leaf_found, range)) search(best, range.x, min(range.y, range.x + 32000u), x);
         owner = decide(best, leaf_found, tolerance);
         if (owner != NONE) {

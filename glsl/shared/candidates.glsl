@@ -1,10 +1,4 @@
-// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl, and vertices.
-
-// Far outside of the bounds, or not a number: no mesh can be there.
-bool near_bounds(Grid g, vec3 x) {
-    precise vec3 t = from_corner(g, x) * g.scale;
-    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
-}
+// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
 
 Tet load_tet(uvec4 ids) {
     return make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);

@@ -13,6 +13,12 @@ vec3 from_corner(Grid g, vec3 x) {
     return vec3(canonical(d.x), canonical(d.y), canonical(d.z));
 }
 
+// Far outside of the bounds, or not a number: no mesh can be there.
+bool near_bounds(Grid g, vec3 x) {
+    precise vec3 t = from_corner(g, x) * g.scale;
+    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+}
+
 // Cell of the finest grid, clamped into the grid.
 uvec3 quantize(Grid g, vec3 x) {
     precise vec3 q = floor(from_corner(g, x) * g.inv.xyz);

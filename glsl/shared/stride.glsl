@@ -30,9 +30,11 @@ Stand stand_in(uint t) {
     return s;
 }
 
-Sides sides_of(Stand s, vec3 x) {
-    return sides_of(vec3(s.x.x, s.y.x, s.z.x), vec3(s.x.y, s.y.y, s.z.y), vec3(s.x.z, s.y.z, s.z.z), vec3(s.x.w, s.y.w, s.z.w), x);
-}
+vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+
+Tet tet_of(Stand s) { return Tet(vec3[4](corner_of(s, 0u), corner_of(s, 1u), corner_of(s, 2u), corner_of(s, 3u)), ranks(s.cell)); }
+
+Sides sides_of(Stand s, vec3 x) { return sides_of(corner_of(s, 0u), corner_of(s, 1u), corner_of(s, 2u), corner_of(s, 3u), x); }
 
 uvec3 kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 

@@ -16,7 +16,7 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     if (leaf == NONE) return true;
     uvec2 range = entry_range(leaf);
     uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
-    if (s.cursor == 0u) s.best = walked(g, leaf, range, NONE, at, x);
+    if (s.cursor == 0u) s.best = walked(g, leaf, range, at, x);
     if (!s.best.inside && !walks_in(leaf, range)) search(s.best, begin, end, x);
     work += end - begin;
     s.cursor = end - range.x;

@@ -148,7 +148,7 @@ impl Rays {
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
         let memory = self.gpu.buffer("olbvh.rays.located", Arena::measure(carve)?)?;
         let (owners, barycentrics) = carve(&mut Arena::new(memory.all()))?;
-        let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None };
+        let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
         let output = LocateOutput { owners, barycentrics };
         let ((), time) = self.gpu.run("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
         Ok(Located {

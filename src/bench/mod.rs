@@ -111,9 +111,16 @@ fn measure(
     let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
     add(Quantity::Build, Some(repeat(budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
     for ((quantity, points), owners) in subject.points.iter().zip(&answers.owners) {
-        let runs = repeat(budget, || Ok(structure.locate(&subject.device, points)?.stages))?;
         let found = owners.iter().filter(|&&owner| owner != u32::MAX).count();
-        add(*quantity, Some(runs), None, Some(found as u64));
+        let traversed = quantity.traversed().filter(|_| structure.traverses(kind));
+        for quantity in [*quantity].into_iter().chain(traversed) {
+            let locate = || structure.locate(&subject.device, points, quantity);
+            if traversed == Some(quantity) && locate()?.owners != *owners {
+                return Err(Error::Mismatch(format!("{kind}: the traversal finds other owners than the descent")));
+            }
+            let runs = repeat(budget, || Ok(locate()?.stages))?;
+            add(quantity, Some(runs), None, Some(found as u64));
+        }
     }
     if let Some((found, _)) = &answers.picture {
         let drawn =

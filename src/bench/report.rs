@@ -32,11 +32,15 @@ pub enum Quantity {
     LocateCoherent,
     /// Location of the samples of a picture, each by itself.
     LocateSamples,
+    /// Location of points in no order by the paper's traversal.
+    TraverseRandom,
+    /// Location of points along a Z curve by the paper's traversal.
+    TraverseCoherent,
 }
 
 impl Quantity {
     /// All, in the paper's order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 10] = [
         Self::Build,
         Self::Intervals,
         Self::March,
@@ -45,7 +49,18 @@ impl Quantity {
         Self::Overlap,
         Self::LocateRandom,
         Self::LocateCoherent,
+        Self::TraverseRandom,
+        Self::TraverseCoherent,
     ];
+
+    /// The same points, located by the paper's traversal.
+    pub(super) fn traversed(self) -> Option<Self> {
+        match self {
+            Self::LocateRandom => Some(Self::TraverseRandom),
+            Self::LocateCoherent => Some(Self::TraverseCoherent),
+            _ => None,
+        }
+    }
 
     /// Title of a table, with the paper's.
     pub fn title(self) -> &'static str {
@@ -58,6 +73,8 @@ impl Quantity {
             Self::LocateRandom => "Point location, random points",
             Self::LocateCoherent => "Point location, points along a Z curve",
             Self::LocateSamples => "Samples inside the mesh, each located by itself (Fig. 7)",
+            Self::TraverseRandom => "Point location by the paper's traversal, random points",
+            Self::TraverseCoherent => "Point location by the paper's traversal, points along a Z curve",
         }
     }
 
@@ -72,12 +89,14 @@ impl Quantity {
             Self::LocateRandom => "location_random",
             Self::LocateCoherent => "location_coherent",
             Self::LocateSamples => "fig07_samples_located",
+            Self::TraverseRandom => "location_random_traversal",
+            Self::TraverseCoherent => "location_coherent_traversal",
         }
     }
 
     /// Whether it is told in items per second, not in milliseconds.
     pub fn is_rate(self) -> bool {
-        matches!(self, Self::March | Self::LocateRandom | Self::LocateCoherent | Self::LocateSamples)
+        !matches!(self, Self::Build | Self::Intervals | Self::Slice | Self::Overlap)
     }
 }
 

@@ -1,11 +1,12 @@
 //! One structure over one mesh, whichever it is.
 
+use super::Quantity;
 use crate::baseline::{Lbvh, RayMethod, Rays};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateOptions, Located, Overlapped, Party};
+use crate::query::{self, LocateOptions, Located, Overlapped, Party, Path};
 
 /// Which structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -79,6 +80,12 @@ impl Structure {
         })
     }
 
+    /// Whether points are located by the paper's own traversal, too, which cuts longer lists.
+    pub(super) fn traverses(&self, kind: Kind) -> bool {
+        let paper = matches!(kind, Kind::Octree { assign: Assign::Aabb, lists: Lists::All, .. });
+        paper && matches!(self, Self::Octree(tree) if tree.status().longest_leaf <= 32_000)
+    }
+
     /// Device time of the construction.
     pub(super) fn stages(&self) -> &[StageTime] {
         match self {
@@ -97,10 +104,18 @@ impl Structure {
         }
     }
 
-    /// Locates points.
-    pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
+    /// Locates points in the way that is the best for those of `quantity`: where leaves within the mesh have no lists, by runs, points in no order sorted.
+    pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
-            Self::Octree(tree) => query::locate(mesh, tree, points, None, &LocateOptions::default(), &|_, _| {}),
+            Self::Octree(tree) => {
+                let path = match (quantity, tree.memory().lists) {
+                    (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => Path::Traversal(8),
+                    (_, Lists::All) => Path::Descent,
+                    (Quantity::LocateRandom, Lists::Boundary) => Path::Sorted,
+                    (_, Lists::Boundary) => Path::Runs,
+                };
+                query::locate(mesh, tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, &|_, _| {})
+            }
             Self::Lbvh(lbvh) => lbvh.locate(mesh, points, TOLERANCE),
             Self::Rays(rays) => rays.locate(mesh, points),
         }

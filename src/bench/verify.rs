@@ -30,7 +30,7 @@ pub(super) struct Answers {
 impl Answers {
     /// Asks everything once. `moved`: the same kind of structure over the moved mesh.
     pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: Option<&Structure>) -> Result<Self> {
-        let owners = subject.points.iter().map(|(_, points)| structure.locate(&subject.device, points).map(|found| found.owners));
+        let owners = subject.points.iter().map(|(of, points)| structure.locate(&subject.device, points, *of).map(|found| found.owners));
         let owners = owners.collect::<Result<_>>()?;
         let picture = subject.render(structure)?.map(|drawn| (drawn.found_samples, drawn.colors));
         let (mut kinds, mut cells) = (Vec::new(), Vec::new());

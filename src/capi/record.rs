@@ -333,7 +333,7 @@ pub extern "C" fn olbvh_cmd_locate(
     recorded(recording, |r| {
         let scene = &handle(scene, "scene")?.scene;
         let OlbvhLocation { points, stride, count, tolerance, owners, barycentrics } = *handle(location, "location")?;
-        let input = PointInput { points: points.part(), stride, count, hints: None };
+        let input = PointInput { points: points.part(), stride, count, hints: None, order: None };
         let output = LocateOutput { owners: owners.part(), barycentrics: barycentrics.part() };
         let tolerance = if tolerance < 0.0 { TOLERANCE } else { tolerance };
         cmd_locate(r, scene, &input, &output, &LocateOptions { tolerance, ..LocateOptions::default() })

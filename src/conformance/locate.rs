@@ -11,7 +11,7 @@ use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::NONE;
-use crate::reference::locate::{Location, Locator};
+use crate::reference::locate::{Location, Locator, order_of};
 
 /// Meshes with cells turned over, 93 of 10,296 here: they overlap their neighbours' neighbours.
 const OVERLAPPING: [&str; 1] = ["jitter-12x13x11"];
@@ -23,6 +23,10 @@ pub(crate) enum How {
     Descent,
     /// By the paper's traversal with a short stack of that many nodes.
     Traversal(u32),
+    /// By runs in the given order, the convenient way.
+    Runs,
+    /// By runs in sorted order, the convenient way.
+    Sorted,
     /// Recorded, with the right owner, a wrong one or none as a hint.
     Hints,
     /// All owners.
@@ -38,6 +42,8 @@ impl How {
         match self {
             Self::Descent => "descent".into(),
             Self::Traversal(stack) => format!("stack-{stack}"),
+            Self::Runs => "runs".into(),
+            Self::Sorted => "sorted".into(),
             Self::Hints => "hints".into(),
             Self::All => "all-owners".into(),
             Self::Values => "values".into(),
@@ -111,6 +117,13 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
             let path = if let How::Traversal(stack) = case.how { Path::Traversal(stack) } else { Path::Descent };
             let found = locate(device, &tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
             compare_locations(twin.locations(&built), &found.owners, &found.barycentrics, points)
+        }
+        How::Runs | How::Sorted => {
+            let sorted = case.how == How::Sorted;
+            let path = if sorted { Path::Sorted } else { Path::Runs };
+            let order = if sorted { order_of(&built.tree().grid, points) } else { (0..points.len() as u32).collect() };
+            let found = locate(device, &tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
+            compare_locations(&locator.locate_in_runs(points, &order), &found.owners, &found.barycentrics, points)
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
@@ -191,7 +204,7 @@ fn hints(gpu: &Gpu, mesh: &Mesh, device: &DeviceMesh, tree: &Tree, locator: &Loc
     let owners = Guarded::new(gpu, "olbvh.conformance.owners", &[], n)?;
     let barycentrics = Guarded::new(gpu, "olbvh.conformance.barycentrics", &[], 4 * n)?;
     let scene = Scene::new(device, tree);
-    let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: Some(hint_buffer.all()) };
+    let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: Some(hint_buffer.all()), order: None };
     let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
     gpu.run("olbvh.conformance.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default()))?;
     let words = barycentrics.read(gpu, "query.locate")?;

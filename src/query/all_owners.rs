@@ -1,12 +1,13 @@
 //! Every tetrahedron that contains a point (SPEC 3.1): counted, then written within what memory there is.
 
 use super::Scene;
-use super::locate::{CHUNK, LocateOptions, LocateOutput, PointInput, SLICE, cmd_locate};
+use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+use crate::reference::locate::{CHUNK, SLICE};
 
 /// Answers and scratch memory of all owners: 28 bytes per point, and what a scan takes.
 #[derive(Clone, Copy, Debug)]
@@ -127,7 +128,7 @@ pub fn locate_all(
     for chunk in points.chunks(CHUNK) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
-        let input = PointInput { points: asked.all(), stride: 3, count, hints: None };
+        let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
         let carve = |a: &mut Arena| OwnersMemory::carve(gpu, a, count);
         let buffer = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
         let memory = carve(&mut Arena::new(buffer.all()))?;

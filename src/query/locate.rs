@@ -1,17 +1,16 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, values of fields.
 
 use super::Scene;
+use super::order::{PointOrder, cmd_sort_points};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
-
-/// Entries of a list that one dispatch searches.
-pub(super) const SLICE: u32 = 16_384;
-/// Points of one submission of the convenient layer.
-pub(super) const CHUNK: usize = 1 << 20;
+use crate::primitives::Arena;
+use crate::reference::locate::{CHUNK, SLICE};
+use crate::slicing::RUN;
 
 /// How the leaf of a point is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -19,6 +18,11 @@ pub enum Path {
     /// By descent over child masks.
     #[default]
     Descent,
+    /// By runs of [`RUN`] points, each looked for first around the owner of the one before, up to a few cells away; where it is not there, by descent. For
+    /// points of which each is near to the one before. In a mesh whose cells do not overlap, the owners are those of [`Path::Descent`].
+    Runs,
+    /// The same along [`PointInput::order`], such as that of [`super::cmd_sort_points`]; [`locate`] makes it itself. For points in no order.
+    Sorted,
     /// By the paper's traversal with a short stack of that many nodes (at least 1); lists beyond 32,000 entries are cut.
     Traversal(u32),
 }
@@ -47,8 +51,10 @@ pub struct PointInput {
     pub stride: u32,
     /// Number of points.
     pub count: u32,
-    /// A tetrahedron per point (or all ones) to try first, such as the last owner. Valid tetrahedra of this mesh only.
+    /// A tetrahedron per point (or all ones) to begin with, such as the last owner, for [`Path::Descent`]. Valid tetrahedra of this mesh only.
     pub hints: Option<BufferRef>,
+    /// Which point is located at each place, a word each, every point once, for [`Path::Sorted`]. Answers stand where the points do.
+    pub order: Option<BufferRef>,
 }
 
 /// Where answers go.
@@ -60,12 +66,20 @@ pub struct LocateOutput {
     pub barycentrics: BufferRef,
 }
 
+/// What the kernel is given besides the points.
+#[derive(Clone, Copy)]
+enum Guide {
+    Nothing,
+    Hints,
+    Order,
+}
+
 /// Records point location. Reads mesh, tree and points in compute shaders, writes `output` in compute shaders; no barrier before or after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3.
+/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without order.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
-    let PointInput { points, stride, count, hints } = *input;
+    let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
     let tolerance = options.tolerance;
     if stride < 3 {
@@ -74,7 +88,13 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
-    let groups = Groups::Count(count.div_ceil(workgroup));
+    let groups = |run: u32| Groups::Count(count.div_ceil(run).div_ceil(workgroup));
+    let (run, guide, guides) = match options.path {
+        Path::Descent | Path::Traversal(_) => (1, Guide::Hints, hints),
+        Path::Runs => (RUN, Guide::Nothing, None),
+        Path::Sorted if order.is_none() => return Err(Error::Invalid("points to be located in an order that is not given".into())),
+        Path::Sorted => (RUN, Guide::Order, order),
+    };
     r.stage("query.locate", |r| {
         if let Path::Traversal(stack) = options.path {
             let arguments = LocateByTraversal {
@@ -94,11 +114,11 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 stride,
                 tolerance,
             };
-            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() }, groups);
+            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() }, groups(1));
         }
         let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
-        let spec = LocateSpec { workgroup, hints: u32::from(hints.is_some()), slice: SLICE, lists, ..Default::default() };
-        let hints = hints.unwrap_or_else(|| r.gpu().nothing());
+        let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;
+        let guides = guides.unwrap_or_else(|| r.gpu().nothing());
         for slice in 0..slices {
             if slice > 0 {
                 r.barrier("locate.slice → locate.slice");
@@ -114,7 +134,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 cells,
                 vertices,
                 points,
-                hints,
+                guides,
                 owners,
                 barycentrics,
                 neighbours,
@@ -124,7 +144,10 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 last,
                 tolerance,
             };
-            r.dispatch(&arguments, spec, groups)?;
+            // What runs have left to later slices is located point by point.
+            let (run, guide) = if slice == 0 { (run, guide) } else { (1, 0) };
+            let spec = LocateSpec { workgroup, guide, slice: SLICE, lists, run, ..Default::default() };
+            r.dispatch(&arguments, spec, groups(run))?;
         }
         Ok(())
     })
@@ -192,13 +215,21 @@ pub fn locate(
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
     let values = gpu.buffer("olbvh.query.values", 4 * most)?;
+    let sorted = options.path == Path::Sorted;
+    let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
+    let order_memory = gpu.buffer("olbvh.query.order", Arena::measure(carve)?)?;
+    let memory = carve(&mut Arena::new(order_memory.all()))?;
     for chunk in points.chunks(CHUNK) {
         let input = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let n = u64::from(count);
-        let input = PointInput { points: input.all(), stride: 3, count, hints: None };
+        let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: memory.map(|m| m.order) };
         let output = LocateOutput { owners: owners.all().part(0, 4 * n), barycentrics: barycentrics.all().part(0, 16 * n) };
         let ((), time) = gpu.run("olbvh.query.locate", |r| {
+            if let Some(memory) = &memory {
+                cmd_sort_points(r, scene.tree.grid, &input, memory)?;
+                r.barrier("sort_points → locate");
+            }
             cmd_locate(r, &scene, &input, &output, options)?;
             if let Some((field, on)) = &field {
                 r.barrier("locate → interpolate");

@@ -2,6 +2,7 @@
 
 mod all_owners;
 mod locate;
+mod order;
 mod overlap;
 mod slice;
 mod visible;
@@ -9,6 +10,7 @@ mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
+pub use order::{PointOrder, cmd_sort_points};
 pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};

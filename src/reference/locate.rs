@@ -9,12 +9,30 @@ use super::traverse::{Node, traverse_leaves};
 use super::walk::{HINTED, Room, STRIDE, Walked, Walker};
 use crate::mesh::{Field, Mesh, On};
 use crate::options::Lists;
+use crate::slicing::RUN;
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// Default tolerance: how far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
 pub const TOLERANCE: f32 = 1e-5;
+
+/// Entries of a list that one dispatch searches.
+pub const SLICE: u32 = 16_384;
+
+/// Points that are sorted and located together where there are more.
+pub const CHUNK: usize = 1 << 20;
+
+/// Bits of the Morton code that points are sorted by: two passes over them.
+pub const CODE_BITS: u32 = 22;
+
+/// Points along the Morton curve, those where no mesh can be last: the order of [`crate::query::cmd_sort_points`].
+pub fn order_of(grid: &Grid, points: &[[f32; 3]]) -> Vec<u32> {
+    let code = |p: [f32; 3]| place(grid, p).map_or(NONE, |(cell, _)| morton(cell)) >> (3 * MAX_LEVEL - CODE_BITS) & ((1 << CODE_BITS) - 1);
+    let mut order: Vec<u32> = (0..points.len() as u32).collect();
+    order.sort_by_cached_key(|&i| code(points[i as usize]));
+    order
+}
 
 /// Where a point lies.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -70,19 +88,44 @@ impl<'a> Locator<'a> {
     /// leaf only if that coordinate reaches −tolerance. In a leaf without list (SPEC 2.6) a walk finds the same.
     pub fn locate(&self, p: [f32; 3]) -> Location {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
-        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x, NONE))
+        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x))
     }
 
-    /// As [`Locator::locate`], but first looks whether `hint` (any number, such as the owner of the last point) contains the point clearly (see
-    /// [`Weights::clear`]), and if so takes it: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
+    /// As [`Locator::locate`], but first goes a few steps from `hint` (any number, such as the owner of the last point) towards the point, and takes the cell
+    /// that holds it clearly: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
         let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.normalised.len() && !t[..i].contains(&v));
-        let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
         let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };
-        if hint != NONE && self.weights(hint, x).1.clear {
-            return self.location(hint, x);
+        self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
+    }
+
+    /// Points in runs of [`RUN`] along `order`, each with the owner of the one before as its hint. Where that one was looked for in a list longer than
+    /// [`SLICE`], there is none.
+    pub fn locate_in_runs(&self, points: &[[f32; 3]], order: &[u32]) -> Vec<Location> {
+        let run = |places: &[u32]| {
+            let mut hint = NONE;
+            let next = |&i: &u32| {
+                let p = points[i as usize];
+                let strode = self.stride_to(p, hint, HINTED);
+                let location = strode.unwrap_or_else(|| self.locate(p));
+                hint = if strode.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
+                (i, location)
+            };
+            places.iter().map(next).collect::<Vec<_>>()
+        };
+        let mut located = vec![Location::NOWHERE; points.len()];
+        for (i, location) in order.par_chunks(RUN as usize).flat_map_iter(run).collect::<Vec<_>>() {
+            located[i as usize] = location;
         }
-        self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x, hint))
+        located
+    }
+
+    /// Whether [`Locator::locate`] looks for a point in a list that takes more than one dispatch.
+    fn searches_long_list(&self, p: [f32; 3]) -> bool {
+        let leaf = place(&self.tree.grid, p).and_then(|(cell, x)| Some((self.tree.find_leaf(cell)?, x)));
+        leaf.is_some_and(|(leaf, x)| {
+            self.tree.primitives(leaf).len() > SLICE as usize && self.tree.seed(leaf).is_none() && self.strode(leaf, x).is_none()
+        })
     }
 
     /// Every primitive that contains `p`, ascending; if none does, the owner alone.
@@ -91,7 +134,7 @@ impl<'a> Locator<'a> {
         let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };
         let mut owners = Vec::new();
         if self.tree.seed(leaf).is_some() {
-            let owner = self.in_leaf(leaf, cell, x, NONE).owner;
+            let owner = self.in_leaf(leaf, cell, x).owner;
             self.walker().star(owner, x, |t, _, weights| {
                 owners.extend(weights.inside.then_some(t));
                 false
@@ -100,7 +143,7 @@ impl<'a> Locator<'a> {
         } else {
             owners.extend(self.tree.primitives(leaf).iter().filter(|&&t| self.weights(t, x).1.inside));
         }
-        if owners.is_empty() { self.in_leaf(leaf, cell, x, NONE).found().into_iter().collect() } else { owners }
+        if owners.is_empty() { self.in_leaf(leaf, cell, x).found().into_iter().collect() } else { owners }
     }
 
     /// As [`Locator::locate`], through the paper's traversal with a stack of `stack` nodes instead of the descent.
@@ -110,7 +153,7 @@ impl<'a> Locator<'a> {
         let holds = |node: Node| node.code == code >> (3 * (MAX_LEVEL - node.level));
         let mut location = Location::NOWHERE;
         traverse_leaves(self.tree, stack, holds, |leaf| {
-            location = self.in_leaf(leaf.index, cell, x, NONE);
+            location = self.in_leaf(leaf.index, cell, x);
             ControlFlow::Break(())
         });
         location
@@ -168,20 +211,19 @@ impl<'a> Locator<'a> {
     }
 
     /// The owner among the primitives of a leaf, listed or not.
-    fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3, hint: u32) -> Location {
-        let best = self.walked(leaf, finest, x, hint).unwrap_or_else(|| self.listed(leaf, x));
+    fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Location {
+        let walk = |seed| self.walker().walk(seed, &self.room(finest), x).best;
+        let walked = self.strode(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
+        let best = walked.unwrap_or_else(|| self.listed(leaf, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
     }
 
-    /// By a stride from a hint (or [`NONE`]) or from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh.
-    fn walked(&self, leaf: u32, finest: [u32; 3], x: Vec3, hint: u32) -> Option<Best> {
+    /// By a stride from the middle of the list, where leaves within the mesh have none.
+    fn strode(&self, leaf: u32, x: Vec3) -> Option<u32> {
         let list = self.tree.primitives(leaf);
         let middle = *list.get(list.len() / 2).filter(|_| self.tree.lists == Lists::Boundary)?;
-        let walker = self.walker();
-        let strode = walker.stride_to(hint, x, HINTED).or_else(|| walker.stride_to(middle, x, STRIDE));
-        let walk = |seed| walker.walk(seed, &self.room(finest), x).best;
-        strode.map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk))
+        self.walker().stride_to(middle, x, STRIDE)
     }
 
     /// The best of a leaf's list, up to the first that contains x.

@@ -185,7 +185,7 @@ impl Frame {
         let memory = gpu.buffer("olbvh.test.frame", Arena::measure(carve).unwrap()).unwrap();
         let (arrays, mesh_scratch, tree, build_scratch, output) = carve(&mut Arena::new(memory.all())).unwrap();
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
-        let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None };
+        let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None, order: None };
         Self { input, arrays, mesh_scratch, tree, build_scratch, capacity, points: asked, output, memory, held: [cells, positions] }
     }
 

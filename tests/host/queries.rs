@@ -1,4 +1,4 @@
-//! All owners, values at what was located, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
+//! Points in sorted order and all their owners, values at what was located, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
 
 use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
@@ -7,9 +7,9 @@ use olbvh::mesh::{Mesh, On};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, RenderInput, RenderMemory, Rounds, Scene, Searched,
-    Shown, SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners, cmd_list_pairs,
-    cmd_overlap, cmd_render, cmd_slice,
+    LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, Path, PointInput, PointOrder, RenderInput, RenderMemory, Rounds,
+    Scene, Searched, Shown, SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
+    cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -17,6 +17,7 @@ use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 /// Memory of the queries of a frame, and what they ask.
 pub struct Queries {
     pub points: PointInput,
+    pub order: PointOrder,
     pub owners: OwnersMemory,
     pub owner_lists: BufferRef,
     located: LocateOutput,
@@ -67,12 +68,14 @@ impl Queries {
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
             let picture = RenderMemory::carve(a, plan.size, Some(&frame.capacity))?;
             let (ranges, values) = (a.take(range_bytes(frame.capacity.nodes))?, a.words(u64::from(frame.points.count))?);
-            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, ranges, values))
+            let order = PointOrder::carve(gpu, a, frame.points.count)?;
+            Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, (ranges, values, order)))
         };
         let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
-        let (slice, sets, pairs, found, owners, owner_lists, picture, ranges, values) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (slice, sets, pairs, found, owners, owner_lists, picture, rest) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (ranges, values, order) = rest;
         let field = gpu.upload("olbvh.test.field", field).unwrap();
-        let points = frame.points;
+        let points = PointInput { order: Some(order.order), ..frame.points };
         let drawn = [
             gpu.upload("olbvh.test.view", &[plan.view()]).unwrap(),
             gpu.upload("olbvh.test.table", &plan.table).unwrap(),
@@ -82,6 +85,7 @@ impl Queries {
         ];
         Self {
             points,
+            order,
             owners,
             owner_lists,
             located: frame.output,
@@ -106,7 +110,10 @@ impl Queries {
     }
 
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
-        cmd_count_owners(r, &self.scene, &self.points, &self.owners, &LocateOptions::default())?;
+        cmd_sort_points(r, self.scene.tree.grid, &self.points, &self.order)?;
+        r.barrier("sort_points → locate");
+        let options = LocateOptions { path: Path::Sorted, ..LocateOptions::default() };
+        cmd_count_owners(r, &self.scene, &self.points, &self.owners, &options)?;
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
         cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;

@@ -6,7 +6,7 @@ use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::build::build;
-use olbvh::reference::locate::Locator;
+use olbvh::reference::locate::{Locator, order_of};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
@@ -84,6 +84,10 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
         let [all, tree] = both(&mesh, &topology, alpha, assign);
         let (all, walking) = (Locator::new(&mesh, &topology, &all), Locator::new(&mesh, &topology, &tree));
         let some = &points[..if alpha > 1.0 { n / 10 } else { n }];
+        let expected = all.locate_all(some);
+        for order in [order_of(&topology.grid, some), (0..some.len() as u32).rev().collect()] {
+            assert!(all.locate_in_runs(some, &order) == expected && walking.locate_in_runs(some, &order) == expected, "{name} α {alpha} {assign}: runs");
+        }
         let walks = some.par_iter().enumerate().map(|(i, &p)| {
             let what = || format!("{name} α {alpha} {assign} point {i} {p:?}");
             let (expected, found) = (all.locate(p), walking.locate(p));

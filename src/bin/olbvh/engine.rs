@@ -11,6 +11,7 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
+use olbvh::query::LocateOptions;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
@@ -51,7 +52,7 @@ pub trait Built {
     /// What they are like.
     fn summary(&self) -> &Summary;
     /// Owner, barycentric coordinates and value of each point (mesh coordinates).
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>>;
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>>;
     /// Every tetrahedron that contains each point.
     fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>>;
     /// Draws a field.

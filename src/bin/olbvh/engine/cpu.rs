@@ -4,9 +4,10 @@ use super::{Built, Drawn, Engine, Located, Overlapped, Report, Sink, Summary};
 use olbvh::error::Result;
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
+use olbvh::query::{self, LocateOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
-use olbvh::reference::locate::Locator;
+use olbvh::reference::locate::{self, Location, Locator, order_of};
 use olbvh::reference::overlap::{Side, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
@@ -82,14 +83,21 @@ impl Built for CpuTree<'_> {
         &self.summary
     }
 
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>> {
-        let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(tolerance);
-        let one = |p: [f32; 3]| {
-            let location = locator.locate(p);
-            let value = field.map_or(f32::NAN, |field| locator.value(field, &location));
-            Located { owner: location.owner, bary: location.barycentric, value }
-        };
-        Ok(each(points, one, report))
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>> {
+        let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
+        let mut all = Vec::with_capacity(points.len());
+        // As the device does it, so that owners are the same even where cells overlap.
+        for chunk in points.chunks(locate::CHUNK) {
+            let located = match options.path {
+                query::Path::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
+                query::Path::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
+                query::Path::Descent | query::Path::Traversal(_) => locator.locate_all(chunk),
+            };
+            let value = |l: &Location| field.map_or(f32::NAN, |field| locator.value(field, l));
+            all.extend(located.iter().map(|l| Located { owner: l.owner, bary: l.barycentric, value: value(l) }));
+            report(all.len() as u64, points.len() as u64);
+        }
+        Ok(all)
     }
 
     fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {

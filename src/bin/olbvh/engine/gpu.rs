@@ -107,10 +107,9 @@ impl Built for DeviceTree<'_> {
         &self.summary
     }
 
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, tolerance: f32, report: Report<'_>) -> Result<Vec<Located>> {
-        let options = LocateOptions { tolerance, ..LocateOptions::default() };
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>> {
         let values = field.map(|f| (f.values.as_slice(), f.on));
-        let found = query::locate(&self.device, &self.tree, points, values, &options, report)?;
+        let found = query::locate(&self.device, &self.tree, points, values, options, report)?;
         let value = |i: usize| found.values.get(i).copied().unwrap_or(f32::NAN);
         let located = found.owners.iter().zip(&found.barycentrics).enumerate();
         Ok(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect())

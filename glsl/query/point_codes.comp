@@ -1,0 +1,24 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+// What points are sorted by: the Morton code of their cell, as many bits of it as CODE_BITS; those where no mesh can be come last. Twin of `order_of` in
+// src/reference/locate.rs.
+layout(constant_id = 2) const uint CODE_BITS = 22;
+ARGUMENTS(4)
+    uint count;
+    uint stride; // floats from one point to the next
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, float, points)
+BUFFER(2, writeonly, uint, codes)
+BUFFER(3, writeonly, uint, order)
+
+void main() {
+    uint i = item_index();
+    if (i >= count) return;
+    Grid g = grid.at[0];
+    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    codes.at[i] = (near_bounds(g, at) ? morton(quantize(g, at)) : NONE) >> (3u * MAX_LEVEL - CODE_BITS) & (1u << CODE_BITS) - 1u;
+    order.at[i] = i;
+}

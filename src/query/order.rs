@@ -1,0 +1,48 @@
+//! The order in which [`super::Path::Sorted`] locates points: along the Morton curve.
+
+use super::PointInput;
+use crate::error::Result;
+use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::kernels::{PointCodes, PointCodesSpec};
+use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
+use crate::reference::locate::CODE_BITS;
+
+/// An order of points, and scratch memory of the sort: 16 bytes per point, and its tables of counts.
+#[derive(Clone, Copy, Debug)]
+pub struct PointOrder {
+    /// A word per place: the point located there.
+    pub order: BufferRef,
+    codes: BufferRef,
+    sort: SortScratch,
+}
+
+impl PointOrder {
+    /// For up to `count` points.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(gpu: &Gpu, arena: &mut Arena, count: u32) -> Result<Self> {
+        let n = u64::from(count);
+        Ok(Self { order: arena.words(n)?, codes: arena.words(n)?, sort: SortScratch::carve(gpu, arena, count, CODE_BITS)? })
+    }
+}
+
+/// Records the sorting of points along the Morton curve over a mesh's `grid` ([`crate::build::MeshArrays::grid`]): [`PointOrder::order`] is what
+/// [`PointInput::order`] takes. Points of one cell keep their order; those that are far outside or not finite come last. Nothing is submitted, waited for,
+/// allocated or read back.
+///
+/// Entry: grid and points are read by compute shaders. First use of `memory`: compute writes. Last use: compute and transfer writes; no barrier before or
+/// after.
+///
+/// # Errors
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made.
+pub fn cmd_sort_points(r: &mut Recorder<'_>, grid: BufferRef, input: &PointInput, memory: &PointOrder) -> Result<()> {
+    let PointInput { points, stride, count, .. } = *input;
+    let PointOrder { order, codes, ref sort } = *memory;
+    let workgroup = r.gpu().target().query;
+    r.stage("query.sort_points", |r| {
+        let spec = PointCodesSpec { workgroup, code_bits: CODE_BITS, ..Default::default() };
+        r.dispatch(&PointCodes { grid, points, codes, order, count, stride }, spec, Groups::Count(count.div_ceil(workgroup)))?;
+        cmd_sort_pairs(r, codes, order, CODE_BITS, Count::host(count), sort)
+    })
+}
