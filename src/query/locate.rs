@@ -114,7 +114,11 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 stride,
                 tolerance,
             };
-            return r.dispatch(&arguments, LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() }, groups(1));
+            return r.dispatch(
+                &arguments,
+                LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() },
+                groups(1),
+            );
         }
         let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
         let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;

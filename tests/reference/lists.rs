@@ -86,7 +86,10 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
         let some = &points[..if alpha > 1.0 { n / 10 } else { n }];
         let expected = all.locate_all(some);
         for order in [order_of(&topology.grid, some), (0..some.len() as u32).rev().collect()] {
-            assert!(all.locate_in_runs(some, &order) == expected && walking.locate_in_runs(some, &order) == expected, "{name} α {alpha} {assign}: runs");
+            assert!(
+                all.locate_in_runs(some, &order) == expected && walking.locate_in_runs(some, &order) == expected,
+                "{name} α {alpha} {assign}: runs"
+            );
         }
         let walks = some.par_iter().enumerate().map(|(i, &p)| {
             let what = || format!("{name} α {alpha} {assign} point {i} {p:?}");
