@@ -95,7 +95,9 @@ struct olbvh_RenderView {
     float value_lo;  // Value at place 0 of the table.
     float value_scale; // Places per unit of value.
     float termination; // A ray ends once it is this opaque.
-    uint pad[3];     // Unused.
+    uint isos;       // Values of iso-surfaces.
+    uint pad[2];     // Unused.
+    float iso[8];    // Those values, ascending.
 };
 
 // What is worked out of a view on the device.
@@ -114,8 +116,8 @@ struct olbvh_RayState {
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
     uint best;      // Best candidate among them, or all ones.
     float olbvh_smallest; // Its smallest barycentric coordinate.
-    uint in_box;    // Whether its box holds the sample.
-    uint check;     // From this sample on the tree is asked whether there is anything to see.
+    uint last;      // Bits of the value at the last sample, for iso-surfaces; all ones where it has none.
+    uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits tell of the best candidate.
 };
 
 // Counters of a picture; 64 bits as two words, low first.
@@ -264,12 +266,6 @@ float olbvh_canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u
 vec3 olbvh_from_corner(olbvh_Grid g, vec3 x) {
     precise vec3 d = vec3(olbvh_canonical(x.x), olbvh_canonical(x.y), olbvh_canonical(x.z)) - g.lo.xyz;
     return vec3(olbvh_canonical(d.x), olbvh_canonical(d.y), olbvh_canonical(d.z));
-}
-
-// Far outside of the bounds, or not a number: no mesh can be there.
-bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
-    precise vec3 t = olbvh_from_corner(g, x) * g.scale;
-    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
 // Cell of the finest grid, clamped into the grid.
@@ -490,7 +486,13 @@ uvec2 olbvh_entry_range(uint leaf) {
 }
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
 
-// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
+// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl, and vertices.
+
+// Far outside of the bounds, or not a number: no mesh can be there.
+bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
+    precise vec3 t = olbvh_from_corner(g, x) * g.scale;
+    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+}
 
 olbvh_Tet olbvh_load_tet(uvec4 ids) {
     return olbvh_make_tet(ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
@@ -595,11 +597,9 @@ olbvh_Stand olbvh_stand_in(uint t) {
     return s;
 }
 
-vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
-
-olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(vec3[4](olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u)), olbvh_ranks(s.cell)); }
-
-olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u), x); }
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) {
+    return olbvh_sides_of(vec3(s.x.x, s.y.x, s.z.x), vec3(s.x.y, s.y.y, s.z.y), vec3(s.x.z, s.y.z, s.z.z), vec3(s.x.w, s.y.w, s.z.w), x);
+}
 
 uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
@@ -779,24 +779,25 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
 // Whether a leaf is one to walk through: full of mesh, its list left out.
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
-// Where a stride through a leaf with these entries begins.
-uint olbvh_middle_of(uvec2 range) { return olbvh_p.at[range.x + (range.y - range.x) / 2u]; }
-
-// The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
-olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
-    olbvh_Room room;
-    room.half_size = olbvh_half_cell(g, g.level);
-    room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-    return olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
-}
-
-// The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
-// if its list must be searched.
-olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, vec3 at, vec3 x) {
-    if (olbvh_LISTS == 0u || range.x >= range.y) return olbvh_no_best();
-    uint t = olbvh_middle_of(range);
-    if (olbvh_stride_to(t, x, olbvh_STRIDE)) return olbvh_Best(t, true, true, 0.0);
-    return olbvh_is_boundary_node(leaf) ? olbvh_no_best() : olbvh_walked_through(g, range, at, x);
+// The owner of x, the normalised point `at`, in a leaf with these entries: by a stride from a hint (or NONE) or from the middle of the list; where that
+// fails, by a whole walk if the leaf is full of mesh. None, if its list must be searched.
+olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, uint hint, vec3 at, vec3 x) {
+    olbvh_Best best = olbvh_no_best();
+    if (olbvh_LISTS == 0u || range.x >= range.y) return best;
+    uint t = hint;
+    bool found = hint != olbvh_NONE && olbvh_stride_to(t, x, olbvh_HINTED);
+    if (!found) {
+        t = olbvh_p.at[range.x + (range.y - range.x) / 2u];
+        found = olbvh_stride_to(t, x, olbvh_STRIDE);
+    }
+    if (found) best = olbvh_Best(t, true, true, 0.0);
+    if (!found && !olbvh_is_boundary_node(leaf)) {
+        olbvh_Room room;
+        room.half_size = olbvh_half_cell(g, g.level);
+        room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+        best = olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
+    }
+    return best;
 }
 
 // Names the tree that the functions below mean.
@@ -827,7 +828,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (leaf == olbvh_NONE) return olbvh_NONE;
     vec3 x = olbvh_normalise(g, place);
     uvec2 range = olbvh_entry_range(leaf);
-    olbvh_Best best = olbvh_walked(g, leaf, range, place, x);
+    olbvh_Best best = olbvh_walked(g, leaf, range, olbvh_NONE, place, x);
     if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, x);
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
@@ -848,7 +849,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uvec2 range = olbvh_entry_range(leaf);
     bool by_walk = olbvh_walks_in(leaf, range);
     if (by_walk) {
-        olbvh_Best first = olbvh_walked(g, leaf, range, place, x), unused = olbvh_no_best();
+        olbvh_Best first = olbvh_walked(g, leaf, range, olbvh_NONE, place, x), unused = olbvh_no_best();
         olbvh_arrive(first.owner, x, unused);
         range = uvec2(0u, olbvh_star_size);
     }

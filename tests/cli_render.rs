@@ -62,6 +62,7 @@ fn render_takes_every_setting() {
         "--camera -x,ortho,zoom=2",
         "--camera azimuth=-40,elevation=10 --tf t.json",
         "--tf inferno_r --background black --no-shading",
+        "--iso 0.3,-1,0.6 --opacity 0.5",
         "--opacity 0:0,0.5:0.2,1:1 --range -0.5:1.5 --light -1,0,1 --outline 0",
         "--background #ffffff,#aabbcc --opacity 0.2 --opacity-scale 2 --termination 1 --step 0.2",
         "--background transparent --alpha 2 --assign exact --field jet --quiet",
@@ -83,6 +84,8 @@ fn what_nobody_sees_is_skipped() {
     let of = |result: &Value, key: &str| result[key].as_u64().unwrap();
     assert_eq!(of(&opaque, "skipped_samples"), 0);
     assert!(of(&narrow, "skipped_samples") > 0 && of(&narrow, "samples") < of(&opaque, "samples"), "{narrow:#}");
+    let surface = json(folder.path(), &[&picture[..], &["--iso", "0.65"]].concat());
+    assert!(of(&surface, "skipped_samples") > of(&surface, "samples") && surface["iso"].as_array().unwrap().len() == 1, "{surface:#}");
 }
 
 #[test]
@@ -155,6 +158,8 @@ fn wrong_usage_ends_with_2() {
         (&["--tf", "jet"], "viridis"),
         (&["--opacity", "2"], "outside 0 to 1"),
         (&["--step", "0"], "step"),
+        (&["--iso", "0.2,x"], "separated by commas"),
+        (&["--iso", "1,2,3,4,5,6,7,8,9"], "up to 8"),
         (&["--background", "pink"], "pink"),
         (&["--range", "3:1"], "LO:HI"),
         (&["--field", "pressure"], "jet"),

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use olbvh::mesh::{Field, Mesh, On, cases, kuhn_jittered};
+use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
@@ -116,6 +116,77 @@ fn fields_of_cells_and_holes_in_fields_agree_with_brute_force() {
         *v = if i % 3 == 0 { f32::NAN } else { *v };
     }
     assert_as_brute_force("cells with NaN", &mesh, &settings("iso"));
+}
+
+/// A field that is linear in space has planes for iso-surfaces: a pixel shows the one that its ray meets first within the mesh, in the one colour that a
+/// plane has in parallel light, and with one seen through the other both, whatever the tree, and with nothing skipped.
+#[test]
+fn surfaces_of_a_linear_field_are_planes() {
+    let mut mesh = kuhn([9, 8, 10]).unwrap();
+    let (lo, hi) = ([-3.0f32, 11.0, 0.5], [1.5f32, 15.0, 6.5]);
+    mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| lo[c] + p[c] * (hi[c] - lo[c]) / [9.0, 8.0, 10.0][c]));
+    let gradient = [0.6f32, -0.3, 1.0];
+    let value = |p: [f32; 3]| (0..3).map(|c| gradient[c] * p[c]).sum::<f32>();
+    mesh.fields = vec![Field { name: "linear".into(), on: On::Points, values: mesh.points.iter().map(|&p| value(p)).collect() }];
+    let topology = topology(&mesh).unwrap();
+    let isos = [-2.0, 0.5];
+    for (opacity, shading) in [(None, true), (Some(0.5), false)] {
+        let mut transfer = TransferFunction::named("viridis").unwrap();
+        if let Some(opacity) = opacity {
+            transfer = transfer.with_opacity(vec![(0.0, opacity), (1.0, opacity)]).unwrap();
+        }
+        let settings = RenderSettings {
+            transfer,
+            iso: vec![isos[1], isos[0], isos[1]],
+            shading,
+            outline: 0.0,
+            step: Some(0.05),
+            background: Background::Transparent,
+            ..settings("iso,ortho")
+        };
+        let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+        let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+        let picture = render(&scene, &|_, _| ());
+        assert!(picture.skipped_samples > 1000, "{}", picture.skipped_samples);
+        for options in [
+            BuildOptions { alpha: 1.0, assign: Assign::Exact, ..BuildOptions::default() },
+            BuildOptions { alpha: 4.0, ..BuildOptions::default() },
+        ] {
+            assert_eq!(draw(&mesh, &topology, &options, &settings).pixels, picture.pixels, "{options:?}");
+        }
+        let plan = scene.plan();
+        let mut seen = std::collections::BTreeMap::<String, (Vec<u8>, u32)>::new();
+        for (i, pixel) in picture.pixels.chunks(4).enumerate() {
+            let (origin, way) = plan.rays.ray(i as u32 % plan.size[0], i as u32 / plan.size[0]);
+            let rise: f32 = (0..3).map(|c| gradient[c] * way[c]).sum();
+            // Planes that the ray meets, by distance, those near the edge of the mesh aside.
+            let mut hits: Vec<(f32, f32)> = isos.iter().map(|&iso| ((iso - value(origin)) / rise, iso)).collect();
+            hits.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let depth = |t: f32| {
+                (0..3).map(|c| origin[c] + t * way[c]).enumerate().map(|(c, x)| (x - lo[c]).min(hi[c] - x)).fold(f32::MAX, f32::min)
+            };
+            if hits.iter().any(|&(t, _)| depth(t).abs() < 0.06) {
+                continue;
+            }
+            let what = format!(
+                "{:?}",
+                hits.iter().filter(|&&(t, _)| depth(t) > 0.0).map(|h| h.1).take(if opacity.is_none() { 1 } else { 2 }).collect::<Vec<_>>()
+            );
+            let (first, n) = seen.entry(what.clone()).or_insert((pixel.to_vec(), 0));
+            assert!(distance(first, pixel) <= 1, "{what} {opacity:?}: {first:?} {pixel:?}");
+            *n += 1;
+            let covered = if what == "[]" { 0.0 } else { 1.0 - (1.0 - opacity.unwrap_or(1.0)).powi(what.matches(',').count() as i32 + 1) };
+            assert!((f32::from(pixel[3]) - 255.0 * covered).abs() <= 1.0, "{what} {opacity:?}: {pixel:?}");
+        }
+        assert!(seen.len() >= 3 && seen.values().all(|(_, n)| *n > 20), "{seen:?}");
+        let colors: std::collections::BTreeSet<_> = seen.values().map(|(pixel, _)| pixel).collect();
+        assert_eq!(colors.len(), seen.len(), "{seen:?}");
+    }
+    mesh.fields[0] = Field { name: "id".into(), on: On::Cells, values: vec![0.5; mesh.tets.len()] };
+    let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let settings = RenderSettings { iso: vec![0.5], ..RenderSettings::default() };
+    let error = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).err().unwrap().to_string();
+    assert!(error.contains("a field of cells"), "{error}");
 }
 
 #[test]

@@ -6,9 +6,11 @@
 #include "shared/frame.glsl"
 #include "shared/rays.glsl"
 // Marching (SPEC 3.3): samples (k + 1/2)·Δ from the ray's origin, front to back, until the ray is opaque or a dispatch's share of work is done.
-// With SKIP the tree is asked for stretches without anything to see as soon as a sample adds nothing. Twin of src/reference/volume/march.rs.
+// With ISO it is not samples that add to a ray, but the surfaces between two of them. With SKIP the tree is asked for stretches without anything to see
+// as soon as a sample adds nothing. Twin of src/reference/volume/march.rs.
 layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
+layout(constant_id = 6) const uint ISO = 0;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint items;  // pixels in whole blocks
     uint budget; // candidates tested per ray and dispatch, roughly
@@ -37,6 +39,7 @@ vec3 origin, way, halfway;
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
+uint ahead; // samples to the next one that is looked at
 
 // The tetrahedron of the last sample and what is read of it, corner by corner as in the stand.
 Stand stand;
@@ -104,17 +107,8 @@ vec3 shade(vec3 n) {
     return vec3(factor, added, rim);
 }
 
-// Adds the next sample, which lies so in the tetrahedron of the stand.
-void take(Sides sides) {
-    ++state.next;
-    ++samples;
-    ++found;
-    vec4 b = barycentric(sides);
-    float value = ON_CELLS != 0u ? held_values.x : weighed(b, held_values);
-    if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
-    vec4 color = lookup(value);
-    if (color.w <= 0.0) return;
-    if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
+// Adds a colour at these barycentric coordinates of the stand.
+void add(vec4 color, vec4 b) {
     if (SHADING != 0u) {
         vec3 lit = shade(vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])));
         precise vec3 c = color.xyz * lit.x + lit.y;
@@ -126,6 +120,50 @@ void take(Sides sides) {
     precise vec4 more = sum + share * vec4(color.xyz, 1.0);
     sum = more;
     if (sum.w >= view.termination) state.end = state.next;
+}
+
+// Adds the surfaces between sample k, which lies in the stand, and the one before.
+void add_surfaces(uint k, float before, float value) {
+    Grid g = grid.at[0];
+    uint isos = min(view.isos, 8u);
+    for (uint i = 0u; i < isos && sum.w < view.termination; ++i) {
+        float iso = view.iso[before < value ? i : isos - 1u - i];
+        if ((before < iso) == (value < iso)) continue;
+        precise float rise = clamp(value - before, -1e37, 1e37);
+        precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - before) * reciprocal(rise), 0.0, 1.0);
+        precise float s = ((float(k) - 0.5) + part) * view.step_size;
+        precise vec3 at = origin + way * s;
+        vec4 b = max(barycentric(sides_of(stand, normalise(g, at))), vec4(0.0));
+        precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
+        vec4 color = lookup(iso);
+        if (color.w > 0.0) add(color, within);
+    }
+}
+
+void pass_by() {
+    state.last = NONE;
+    state.next += ahead;
+    skipped += ahead - 1u;
+    ++samples;
+}
+
+// Adds the next sample, which lies so in the tetrahedron of the stand.
+void take(Sides sides) {
+    uint k = state.next, before = state.last;
+    pass_by();
+    ++found;
+    vec4 b = barycentric(sides);
+    float value = ON_CELLS != 0u ? held_values.x : weighed(b, held_values);
+    if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
+    if (ISO != 0u) {
+        state.last = floatBitsToUint(value);
+        if (before != NONE) add_surfaces(k, uintBitsToFloat(before), value);
+        return;
+    }
+    vec4 color = lookup(value);
+    if (color.w <= 0.0) return;
+    if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
+    add(color, b);
 }
 
 void main() {
@@ -153,13 +191,19 @@ void main() {
         bool stands = state.hint != NONE;
         if (stands) enter(state.hint);
         uint misses = 0u; // steps of the walk to the next sample
+        uint known = state.check >> 30u; // of the best candidate
+        state.check &= 0x3fffffffu;
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
+            ahead = 1u;
 #ifndef BINARY_TREE
             if (SKIP != 0u && state.next >= state.check) {
                 bool hidden;
                 uint behind = stretch_end(g, origin, way, inverse_way, state.next, state.end, hidden);
                 if (!hidden) {
                     state.check = behind;
+                } else if (ISO != 0u) {
+                    // The stretch is on one side of every surface: its first and its last sample tell all.
+                    ahead = max(behind - state.next, 2u) - 1u;
                 } else {
                     stands = stands && behind - state.next < WALK;
                     skipped += behind - state.next;
@@ -189,11 +233,11 @@ void main() {
             uint owner = NONE;
             // Outside of the bounds there is nothing to ask for.
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
-                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
+                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, known, state.smallest));
                 bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
                 state.cursor = search.cursor;
                 state.best = search.best.owner;
-                state.in_box = best_bits(search.best);
+                known = best_bits(search.best);
                 state.smallest = search.best.smallest;
                 if (!ended) break;
             }
@@ -202,10 +246,10 @@ void main() {
                 enter(owner);
                 take(sides_of(stand, x));
             } else {
-                ++state.next;
-                ++samples;
+                pass_by();
             }
         }
+        state.check |= known << 30u;
         state.hint = stands ? stand.t : NONE;
         unfinished = uint(state.next < state.end);
         states.at[i] = state;

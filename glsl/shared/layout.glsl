@@ -57,7 +57,9 @@ struct RenderView {
     float value_lo;  // Value at place 0 of the table.
     float value_scale; // Places per unit of value.
     float termination; // A ray ends once it is this opaque.
-    uint pad[3];     // Unused.
+    uint isos;       // Values of iso-surfaces.
+    uint pad[2];     // Unused.
+    float iso[8];    // Those values, ascending.
 };
 
 // What is worked out of a view on the device.
@@ -76,8 +78,8 @@ struct RayState {
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
     uint best;      // Best candidate among them, or all ones.
     float smallest; // Its smallest barycentric coordinate.
-    uint in_box;    // Whether its box holds the sample.
-    uint check;     // From this sample on the tree is asked whether there is anything to see.
+    uint last;      // Bits of the value at the last sample, for iso-surfaces; all ones where it has none.
+    uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits tell of the best candidate.
 };
 
 // Counters of a picture; 64 bits as two words, low first.

@@ -20,6 +20,8 @@ pub(crate) struct PictureCase {
     pub shading: bool,
     /// Opacity points; by default what fits the field.
     pub opacity: Option<&'static str>,
+    /// Iso-surfaces instead of the volume.
+    pub iso: &'static [f32],
 }
 
 /// A wave through the mesh.
@@ -38,8 +40,14 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
     if let Some(opacity) = case.opacity {
         transfer = transfer.with_opacity(TransferFunction::parse_opacity(opacity)?)?;
     }
-    let settings =
-        RenderSettings { size: [40, 34], camera: case.camera.parse()?, shading: case.shading, transfer, ..RenderSettings::default() };
+    let settings = RenderSettings {
+        size: [40, 34],
+        camera: case.camera.parse()?,
+        shading: case.shading,
+        transfer,
+        iso: case.iso.to_vec(),
+        ..RenderSettings::default()
+    };
     let mut first: Option<Vec<u8>> = None;
     let (all, boundary) = (Lists::All, Lists::Boundary);
     for (alpha, assign, lists) in [(0.0, Assign::Aabb, all), (0.0, Assign::Planes, boundary), (2.0, Assign::Exact, all)] {

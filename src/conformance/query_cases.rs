@@ -61,7 +61,11 @@ pub(super) fn add(cases: &mut Vec<Case>) {
             add_ranges(cases, RangesCase { mesh, alpha, assign, lists, on });
         }
         for camera in ["iso", "top,ortho"].into_iter().filter(|_| mesh.name == PEAKED) {
-            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity: Some(PEAK) });
+            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity: Some(PEAK), iso: &[] });
+        }
+        // Seen through one another, and opaque.
+        for (camera, opacity) in [("iso", Some("0.4")), ("top,ortho", None)].into_iter().filter(|_| mesh.name == PEAKED) {
+            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity, iso: &[0.2, -0.3, 0.9] });
         }
     }
 }
@@ -73,7 +77,7 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
             add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
         }
     }
-    add_picture(cases, Group::Quick, PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None });
+    add_picture(cases, Group::Quick, PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None, iso: &[] });
     add_ranges(cases, RangesCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, on: On::Points });
     add_slices(cases, mesh);
     for lists in Lists::EVERY {
@@ -97,15 +101,22 @@ fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for camera in ["iso", "top,ortho"] {
         for (on, shading) in [(On::Points, true), (On::Points, false), (On::Cells, false)] {
             let group = if camera == "iso" && shading { mesh.group } else { Group::Full };
-            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None });
+            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None, iso: &[] });
         }
     }
 }
 
 fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
-    let PictureCase { mesh, camera, on, shading, opacity } = case;
+    let PictureCase { mesh, camera, on, shading, opacity, iso } = case;
     let camera = camera.split(',').next().unwrap_or(camera);
-    let (light, transfer) = (if shading { "/shaded" } else { "" }, if opacity.is_some() { "/peak" } else { "" });
+    let light = if shading { "/shaded" } else { "" };
+    let transfer = if !iso.is_empty() {
+        "/surfaces"
+    } else if opacity.is_some() {
+        "/peak"
+    } else {
+        ""
+    };
     push(cases, format!("render/{}/{camera}/{}{light}{transfer}", mesh.name, values(on)), group, Work::Picture(case));
 }
 

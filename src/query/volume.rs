@@ -38,6 +38,8 @@ pub struct RenderInput {
     pub size: [u32; 2],
     /// [`RenderView`]: rays, light, step, range of values, as [`crate::render::Plan::view`] makes it.
     pub view: BufferRef,
+    /// Iso-surfaces, of the values that the view has, instead of the volume.
+    pub iso: bool,
     /// The transfer function, [`TABLE_SIZE`] times four floats, as [`crate::render::Plan::table`] has it.
     pub table: BufferRef,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
@@ -139,7 +141,8 @@ pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput
         r.fill(unfinished, width * height);
         cmd_plan(r, searched, input, memory, visible)?;
         r.barrier("render.plan → render.intervals");
-        cmd_intervals(r, searched, rays, memory, visible)?;
+        // Between surfaces that are not to be seen a field may jump where the mesh has a crack: that is looked at, whatever the tree.
+        cmd_intervals(r, searched, rays, memory, visible.filter(|_| !input.iso))?;
     }
     for round in 0..rounds.count {
         if round > 0 {
@@ -208,7 +211,7 @@ fn cmd_march(
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.all()));
     let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
-    let (skip, normals) = (u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
+    let (iso, skip, normals) = (u32::from(input.iso), u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
     r.stage("query.march", |r| {
         dispatch!(r, rays, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
             cells: mesh.cells,
@@ -222,6 +225,6 @@ fn cmd_march(
             status: memory.status,
             items: rays,
             budget: BUDGET,
-        }, { shading, on_cells })
+        }, { shading, on_cells, iso })
     })
 }

@@ -104,7 +104,7 @@ impl<'a> Scene<'a> {
 pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
     let [width, height] = plan.size;
-    let intervals = Intervals::new(scene.tree, scene.visible.as_deref(), plan);
+    let intervals = Intervals::new(scene.tree, scene.visible.as_deref().filter(|_| plan.iso.is_empty()), plan);
     let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();

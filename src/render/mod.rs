@@ -12,6 +12,9 @@
 //!   value is covered so far, whatever the step. The table holds `1 − (1 − a)^(s·Δ/unit)` for the opacity scale s.
 //! - With shading, c is lit and a grows on surfaces seen from the side, as [`Lighting::shade`] says, by normals that
 //!   [`shading_normals`] gives the vertices.
+//! - Iso-surfaces instead of the volume: between two samples one after the other, both with a value, each iso value that just one of them is below
+//!   adds colour and opacity of its place, as one surface, in the order along the ray. It lies where the value is linear between the two, which is
+//!   exact if they lie in one cell, with that cell's normals ([`gradient_normals`]).
 
 pub mod auto;
 pub mod camera;
@@ -26,7 +29,7 @@ pub use auto::auto_opacity;
 pub use camera::{Bounds, Camera, CameraSpec, Projection, RayGrid};
 pub use plan::{Plan, Prepared, TABLE_SIZE, interval_slack};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
-pub use shading::{Lighting, Shade, shading_normals};
+pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
 pub use transfer::TransferFunction;
 
 /// `1/√x` of a normal positive `x` by correctly rounded multiplications and subtractions alone, so that every device gets the same

@@ -1,8 +1,8 @@
 //! A picture's settings worked out for one mesh and field: all that the kernels and the reference renderer need to know.
 
 use super::drawn::drawn_values;
-use super::settings::DEFAULT_STEPS;
-use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, shading_normals};
+use super::settings::{DEFAULT_STEPS, MAX_ISO};
+use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, gradient_normals, shading_normals};
 use crate::error::{Error, Result};
 use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
@@ -27,10 +27,12 @@ pub struct Plan {
     pub value_lo: f32,
     /// Places per unit of value.
     pub value_scale: f32,
-    /// [`TABLE_SIZE`] entries: sRGB colour, and opacity of one step.
+    /// [`TABLE_SIZE`] entries: sRGB colour, and opacity of one step or of one surface.
     pub table: Vec<[f32; 4]>,
     /// Ranges of values, ascending and apart, outside of which the table is transparent.
     pub drawn: Vec<[f32; 2]>,
+    /// Values of the iso-surfaces that are drawn instead of the volume, ascending, each once.
+    pub iso: Vec<f32>,
     /// A ray ends once it is this opaque.
     pub termination: f32,
     /// The light; `None`: colours as they are.
@@ -68,9 +70,15 @@ impl Plan {
         let [right, up, back] = settings.light.map(f64::from);
         let to_light = (camera.right * right + camera.up * up - camera.forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
         let range = value_range(settings.range.or(settings.transfer.range()).or(field_range));
-        let exponent = f64::from(settings.opacity_scale) * step / (diagonal * OPACITY_UNIT);
+        let mut iso: Vec<f32> = settings.iso.iter().copied().map(canonical).collect();
+        iso.sort_by(f32::total_cmp);
+        iso.dedup();
+        let surfaces = !iso.is_empty();
+        let exponent = f64::from(settings.opacity_scale) * if surfaces { 1.0 } else { step / (diagonal * OPACITY_UNIT) };
+        let opaque = surfaces && !settings.transfer.has_opacity();
         let entry = |i: usize| {
             let [r, g, b, a] = settings.transfer.at(i as f32 / (TABLE_SIZE - 1) as f32);
+            let a = if opaque { 1.0 } else { a };
             [r, g, b, (1.0 - (1.0 - f64::from(a)).powf(exponent)) as f32]
         };
         let (value_lo, value_scale) = (range[0] as f32, (1.0 / (range[1] - range[0])) as f32);
@@ -81,8 +89,9 @@ impl Plan {
             step: step as f32,
             value_lo,
             value_scale,
-            drawn: drawn_values(&table, value_lo, value_scale),
+            drawn: if surfaces { iso.iter().map(|&v| [v; 2]).collect() } else { drawn_values(&table, value_lo, value_scale) },
             table,
+            iso,
             termination: settings.termination,
             lighting: settings.shading.then(|| Lighting::new(to_light, (1.0 - (1.0 - f64::from(settings.outline)).powf(exponent)) as f32)),
             background: settings.background,
@@ -104,6 +113,8 @@ impl Plan {
         let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
         let Lighting { to_light, strength: [ambient, diffuse, specular], rim } =
             self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
+        let mut iso = [0.0; MAX_ISO];
+        iso.iter_mut().zip(&self.iso).for_each(|(to, v)| *to = *v);
         RenderView {
             origin: wide(self.rays.origin),
             origin_x: wide(self.rays.origin_x),
@@ -118,7 +129,9 @@ impl Plan {
             value_lo: self.value_lo,
             value_scale: self.value_scale,
             termination: self.termination,
-            pad: [0; 3],
+            isos: self.iso.len().min(MAX_ISO) as u32,
+            pad: [0; 2],
+            iso,
         }
     }
 
@@ -184,7 +197,13 @@ impl Prepared {
         let range = settings.range.or(settings.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
         let mut settings = RenderSettings { range: Some(range), ..settings.clone() };
         settings.check()?;
-        if !settings.transfer.has_opacity() {
+        if !settings.iso.is_empty() && field.on == On::Cells {
+            return Err(Error::Invalid(format!(
+                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or --opacity to show some values only",
+                field.name
+            )));
+        }
+        if settings.iso.is_empty() && !settings.transfer.has_opacity() {
             let unit = bounds.diagonal() * OPACITY_UNIT;
             settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, neighbours, &valid, field, range, unit))?;
         }
@@ -199,7 +218,11 @@ impl Prepared {
         let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
         let camera = settings.camera.resolve_around(bounds, &points, mesh.origin, aspect)?;
         let plan = Plan::with_camera(&settings, &camera, bounds, None)?;
-        let normals = if settings.shading { shading_normals(mesh, neighbours, &valid, field, range, bounds) } else { Vec::new() };
+        let normals = match (settings.shading, settings.iso.is_empty()) {
+            (false, _) => Vec::new(),
+            (true, true) => shading_normals(mesh, neighbours, &valid, field, range, bounds),
+            (true, false) => gradient_normals(mesh, &valid, field, bounds),
+        };
         Ok(Self { plan, camera, normals, range })
     }
 }

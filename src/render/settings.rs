@@ -7,6 +7,8 @@ use crate::error::{Error, Result};
 pub const OPACITY_UNIT: f64 = 0.01;
 /// Steps per diagonal by default.
 pub const DEFAULT_STEPS: f64 = 512.0;
+/// Most iso-surfaces of a picture.
+pub const MAX_ISO: usize = 8;
 /// Largest width and height of a picture.
 pub const MAX_SIZE: u32 = 16_384;
 
@@ -30,6 +32,9 @@ pub struct RenderSettings {
     pub camera: CameraSpec,
     /// Colours and opacities.
     pub transfer: TransferFunction,
+    /// Values whose iso-surfaces are drawn instead of the volume, up to [`MAX_ISO`]; none: the volume. A surface is opaque unless `transfer` has opacities,
+    /// which are the surface's own then.
+    pub iso: Vec<f32>,
     /// The field's values at places 0 and 1 of the transfer function; by default what the function says, or all of the field's range.
     pub range: Option<[f32; 2]>,
     /// Distance Δ of two samples in mesh units; by default 1/512 of the diagonal.
@@ -54,6 +59,7 @@ impl Default for RenderSettings {
             size: [1024, 1024],
             camera: CameraSpec::default(),
             transfer: TransferFunction::default(),
+            iso: Vec::new(),
             range: None,
             step: None,
             background: Background::Color([1.0; 3]),
@@ -81,6 +87,9 @@ impl RenderSettings {
         }
         if let Some([lo, hi]) = self.range.filter(|[lo, hi]| !(lo <= hi && lo.is_finite() && hi.is_finite())) {
             return fail(format!("a range from {lo} to {hi}; give LO:HI with LO below HI"));
+        }
+        if self.iso.len() > MAX_ISO || !self.iso.iter().all(|v| v.is_finite()) {
+            return fail(format!("iso-surfaces at {:?}; give up to {MAX_ISO} finite values", self.iso));
         }
         if !(self.opacity_scale.is_finite() && self.opacity_scale > 0.0) {
             return fail(format!("an opacity scale of {}; it lies above 0", self.opacity_scale));

@@ -92,13 +92,30 @@ pub fn shading_normals(
     bounds: &Bounds,
 ) -> Vec<[f32; 3]> {
     let span = f64::from(range[1]) - f64::from(range[0]);
+    let steep = if span > 0.0 { STEEP * bounds.diagonal() / span / bounds.diagonal() } else { 0.0 };
+    normals(mesh, |tet, face| neighbours.get(tet).is_some_and(|across| across[face] == u32::MAX), valid, field, steep, bounds)
+}
+
+/// A normal of length 1 per vertex, for iso-surfaces: the field's gradient, on the surface of the mesh as well; 0 where it has none.
+pub fn gradient_normals(mesh: &Mesh, valid: impl Fn(usize) -> bool, field: &Field, bounds: &Bounds) -> Vec<[f32; 3]> {
+    normals(mesh, |_, _| false, valid, field, f64::INFINITY, bounds)
+}
+
+/// Normals of the surface (the faces that `is_outside`), elsewhere the gradient times `steep` (per unit of value over the diagonal), at most 1 long.
+fn normals(
+    mesh: &Mesh,
+    is_outside: impl Fn(usize, usize) -> bool,
+    valid: impl Fn(usize) -> bool,
+    field: &Field,
+    steep: f64,
+    bounds: &Bounds,
+) -> Vec<[f32; 3]> {
     let length = bounds.diagonal();
-    let scale = if span > 0.0 && field.on == On::Points && field.values.len() == mesh.points.len() { STEEP * length / span } else { 0.0 };
+    let has_gradient = steep > 0.0 && field.on == On::Points && field.values.len() == mesh.points.len();
     // Per vertex: normal times area, volume of the cells below, area.
     let mut surface = vec![(DVec3::ZERO, 0.0, 0.0); mesh.points.len()];
     let mut inside = vec![(DVec3::ZERO, 0.0); mesh.points.len()];
-    let tets = mesh.tets.iter().zip(neighbours).enumerate().filter(|&(tet, _)| valid(tet));
-    for (_, (ids, across)) in tets {
+    for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
         let ids = ids.map(|id| id as usize);
         // In diagonals, so that no product overflows on meshes of any size.
         let p = ids.map(|id| DVec3::from_array(mesh.points[id].map(f64::from)) / length);
@@ -106,7 +123,7 @@ pub fn shading_normals(
         for i in 0..4 {
             let face = [(1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1)][i];
             let normal = (p[face.1] - p[face.0]).cross(p[face.2] - p[face.0]) * volume.signum();
-            if across[i] == u32::MAX {
+            if is_outside(tet, i) {
                 for k in [face.0, face.1, face.2] {
                     let (sum, below, area) = &mut surface[ids[k]];
                     *sum += normal;
@@ -115,7 +132,7 @@ pub fn shading_normals(
                 }
             }
         }
-        if scale > 0.0 && volume != 0.0 {
+        if has_gradient && volume != 0.0 {
             let v = ids.map(|id| f64::from(field.values[id]));
             if v.iter().all(|v| v.is_finite()) {
                 let (a, b, c) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
@@ -131,7 +148,11 @@ pub fn shading_normals(
     let normal = |((sum, below, area), (gradient, volume)): ((DVec3, f64, f64), (DVec3, f64))| {
         // Volume (sixfold) over area (twofold) is the height of the cells.
         let skin = |n: DVec3| n * if below > SKIN * area { SKIN * area / below } else { 1.0 };
-        let gradient = || if volume > 0.0 { (gradient / volume * (scale / length)).clamp_length_max(1.0) } else { DVec3::ZERO };
+        let gradient = || match volume {
+            0.0 => DVec3::ZERO,
+            _ if steep.is_infinite() => (gradient / volume).normalize_or_zero(),
+            _ => (gradient / volume * steep).clamp_length_max(1.0),
+        };
         let n = sum.try_normalize().map_or_else(gradient, skin);
         n.as_vec3().to_array()
     };

@@ -125,7 +125,7 @@ impl Queries {
         cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
         let [view, table, drawn, normals] = self.drawn.each_ref().map(Buffer::all);
         let shown = Some(Shown { ranges: self.ranges, drawn, count: self.plan.drawn.len() as u32 + 1 });
-        let input = RenderInput { size: self.plan.size, view, table, field, normals: Some(normals), shown };
+        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), shown };
         cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
         let other = Scene::new(&self.other, &self.other_tree);
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;

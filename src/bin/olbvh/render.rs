@@ -21,6 +21,7 @@ Examples:
   olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
   olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900
   olbvh render bracket.vtu -o shell.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   only values around 70 % of the range
+  olbvh render bracket.vtu -o surfaces.png --iso 120,180,240 --opacity 0.5   three iso-surfaces, seen through one another
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
 The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the
@@ -55,6 +56,10 @@ pub struct Args {
     /// fits the field, so that rare values show through common ones.
     #[arg(long, value_name = "A|P:A,P:A,…", value_parser = |text: &str| TransferFunction::parse_opacity(text).map(Opacity))]
     opacity: Option<Opacity>,
+    /// Iso-surfaces of a field of points at these values (up to 8) instead of the volume; opaque, or each as opaque as
+    /// --opacity says.
+    #[arg(long, value_name = "V,V,…", value_parser = iso, allow_hyphen_values = true)]
+    iso: Option<Iso>,
     /// The field's values at the two ends of the transfer function; by default the smallest and largest there are.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
@@ -84,6 +89,10 @@ pub struct Args {
 #[derive(Clone)]
 struct Opacity(Vec<(f32, f32)>);
 
+/// Values of surfaces, a type of its own for the same reason.
+#[derive(Clone)]
+struct Iso(Vec<f32>);
+
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     output::announce(&args.output, &[OutputFormat::Png])?;
@@ -101,7 +110,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let seconds = start.elapsed().as_secs_f64();
     write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
     let json = json!({
-        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi],
+        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi], "iso": settings.iso,
         "step": step, "samples": picture.samples, "skipped_samples": picture.skipped_samples, "found_samples": picture.found_samples,
         "ranges_ms": picture.ranges_ms, "interval_ms": picture.interval_ms, "march_ms": picture.march_ms,
         "build_ms": built.summary().build_ms, "seconds": seconds, "device": engine.name(),
@@ -139,6 +148,7 @@ impl Args {
             size: self.size,
             camera: self.camera,
             transfer,
+            iso: self.iso.as_ref().map(|iso| iso.0.clone()).unwrap_or_default(),
             range: self.range,
             step: self.step,
             background: self.background.unwrap_or(defaults.background),
@@ -167,6 +177,12 @@ fn size(text: &str) -> Result<[u32; 2], String> {
         (Ok(w), Ok(h)) => Ok([w, h]),
         _ => Err("a size is WxH in pixels, such as 1600x900".into()),
     }
+}
+
+/// `V,V,…`.
+fn iso(text: &str) -> Result<Iso, String> {
+    let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse()).collect();
+    values.map(Iso).map_err(|_| "values of surfaces are numbers separated by commas, such as 120,180".into())
 }
 
 /// `LO:HI`.

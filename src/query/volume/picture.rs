@@ -70,7 +70,8 @@ pub fn render(
     let (memory, ranges) = carve(&mut Arena::new(buffer.all()))?;
     let shown = ranges.map(|ranges| Shown { ranges, drawn: drawn.all(), count: plan.drawn.len() as u32 });
     let (field, normals) = ((field.all(), on), normals.as_ref().map(crate::gpu::Buffer::all));
-    let input = RenderInput { size: plan.size, view: view.all(), table: table.all(), field, normals, shown };
+    let iso = !plan.iso.is_empty();
+    let input = RenderInput { size: plan.size, view: view.all(), iso, table: table.all(), field, normals, shown };
     let ((), time) = gpu.run("olbvh.query.intervals", |r| {
         if let (Some(tree), Some(ranges)) = (skipped, ranges) {
             cmd_ranges(r, &searched.mesh, tree, field, ranges)?;

@@ -3,8 +3,9 @@
 use super::Scene;
 use super::skip::{Skips, inverse_of};
 use crate::mesh::On;
+use crate::reference::grid::{canonical, reciprocal};
 use crate::reference::walk::Stand;
-use crate::render::Plan;
+use crate::render::{Lighting, Plan};
 
 /// Steps of a walk across faces before the tree is asked.
 const WALK: u32 = 6;
@@ -23,6 +24,37 @@ pub struct Marcher<'a> {
     pub found_samples: u64,
 }
 
+/// What has these values at the corners, at barycentric coordinates.
+fn weighed(b: [f32; 4], v: [f32; 4]) -> f32 {
+    (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3])
+}
+
+/// What a ray has gathered, and its light.
+struct Gathered<'a> {
+    sum: [f32; 4],
+    direction: [f32; 3],
+    light: Option<(Lighting, [f32; 3])>,
+    normals: &'a [[f32; 3]],
+}
+
+impl Gathered<'_> {
+    /// Adds a colour at these barycentric coordinates of a cell.
+    fn add(&mut self, [red, green, blue, mut a]: [f32; 4], stand: &Stand, b: [f32; 4]) {
+        let mut color = [red, green, blue];
+        if let Some((light, half)) = &self.light {
+            let n = [0, 1, 2].map(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])));
+            let shade = light.shade(n, self.direction, *half);
+            color = color.map(|c| (c * shade.factor + shade.added).min(1.0));
+            a += (1.0 - a) * shade.rim;
+        }
+        let w = (1.0 - self.sum[3]) * a;
+        for c in 0..3 {
+            self.sum[c] += w * color[c];
+        }
+        self.sum[3] += w;
+    }
+}
+
 impl<'a> Marcher<'a> {
     /// Ready for any ray of the scene.
     pub fn new(scene: &'a Scene<'a>) -> Self {
@@ -34,58 +66,80 @@ impl<'a> Marcher<'a> {
         let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
-        let mut sum = [0.0f32; 4];
+        let mut gathered = Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals };
+        let mut last: Option<f32> = None;
         // Each ray begins without a hint, so that no pixel depends on another one.
         self.cell = None;
         let skips = self.scene.visible.as_deref().map(|visible| Skips { tree: self.scene.tree, visible, plan });
         let inverse = inverse_of(direction);
         let (mut next, mut check) = (begin, 0);
-        while next < end {
+        while next < end && gathered.sum[3] < plan.termination {
+            let mut ahead = 1;
             if let Some(skips) = skips.as_ref().filter(|_| next >= check) {
                 let (behind, hidden) = skips.stretch(ray, inverse, next, end);
-                if hidden {
+                if hidden && !plan.iso.is_empty() {
+                    // The stretch is on one side of every surface: its first and its last sample tell all.
+                    ahead = (behind - next).max(2) - 1;
+                } else if hidden {
                     self.cell = self.cell.filter(|_| behind - next < WALK);
                     self.skipped_samples += u64::from(behind - next);
                     next = behind;
                     continue;
+                } else {
+                    check = behind;
                 }
-                check = behind;
             }
-            let p = plan.sample(ray, next);
-            next += 1;
+            let (k, before) = (next, last.take());
+            next += ahead;
+            self.skipped_samples += u64::from(ahead - 1);
             self.samples += 1;
-            let Some((stand, b)) = self.locate(p) else { continue };
+            let Some((stand, b)) = self.locate(plan.sample(ray, k)) else { continue };
             self.found_samples += 1;
-            let at = |v: [f32; 4]| (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3]);
             let field = self.scene.field;
-            let value =
-                if field.on == On::Cells { field.values[stand.t as usize] } else { at(stand.ids.map(|i| field.values[i as usize])) };
+            let value = if field.on == On::Cells {
+                field.values[stand.t as usize]
+            } else {
+                weighed(b, stand.ids.map(|i| field.values[i as usize]))
+            };
             if !value.is_finite() {
                 continue;
             }
-            let [red, green, blue, mut a] = plan.lookup(value);
-            if a <= 0.0 {
+            if !plan.iso.is_empty() {
+                last = Some(value);
+                if let Some(before) = before {
+                    self.add_surfaces(&mut gathered, ray, k, [before, value], &stand);
+                }
                 continue;
             }
-            check = check.max(next + 1);
-            let mut color = [red, green, blue];
-            if let Some((light, half)) = &light {
-                let normals = &self.scene.prepared.normals;
-                let n = [0, 1, 2].map(|c| at(stand.ids.map(|i| normals[i as usize][c])));
-                let shade = light.shade(n, direction, *half);
-                color = color.map(|c| (c * shade.factor + shade.added).min(1.0));
-                a += (1.0 - a) * shade.rim;
-            }
-            let w = (1.0 - sum[3]) * a;
-            for c in 0..3 {
-                sum[c] += w * color[c];
-            }
-            sum[3] += w;
-            if sum[3] >= plan.termination {
-                break;
+            let color = plan.lookup(value);
+            if color[3] > 0.0 {
+                check = check.max(next + 1);
+                gathered.add(color, &stand, b);
             }
         }
-        sum
+        gathered.sum
+    }
+
+    /// Adds the surfaces between sample k, which lies in a cell, and the one before.
+    fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), k: u32, [before, value]: [f32; 2], stand: &Stand) {
+        let plan = self.plan;
+        let n = plan.iso.len();
+        let in_order = (0..n).map(|i| plan.iso[if before < value { i } else { n - 1 - i }]);
+        for iso in in_order.filter(|&iso| (before < iso) != (value < iso)) {
+            if gathered.sum[3] >= plan.termination {
+                break;
+            }
+            let rise = (value - before).clamp(-1e37, 1e37);
+            let part = if canonical(rise) == 0.0 { 1.0 } else { ((iso - before) * reciprocal(rise)).clamp(0.0, 1.0) };
+            let s = ((k as f32 - 0.5) + part) * plan.step;
+            let at = [0, 1, 2].map(|c| ray.0[c] + ray.1[c] * s);
+            let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
+            let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));
+            let color = plan.lookup(iso);
+            if color[3] > 0.0 {
+                gathered.add(color, stand, b.map(|b| b * whole));
+            }
+        }
     }
 
     /// Where a point lies, and its barycentric coordinates: in the last cell or one a short walk across faces away, if that contains the point
