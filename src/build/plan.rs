@@ -187,8 +187,7 @@ pub struct SeedScratch {
 
 impl SeedScratch {
     fn carve(arena: &mut Arena, shares: u32, level: u32) -> Result<Self> {
-        // A word more, since rows of bits are read two words at a time.
-        let marks = arena.words(8u64.pow(level).div_ceil(32) + 1)?;
+        let marks = arena.words(8u64.pow(level).div_ceil(32))?;
         Ok(Self { marks, doubts: arena.words(u64::from(shares))?, doubt_count: arena.words(1)? })
     }
 }
