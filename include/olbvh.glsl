@@ -268,6 +268,12 @@ vec3 olbvh_from_corner(olbvh_Grid g, vec3 x) {
     return vec3(olbvh_canonical(d.x), olbvh_canonical(d.y), olbvh_canonical(d.z));
 }
 
+// Far outside of the bounds, or not a number: no mesh can be there.
+bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
+    precise vec3 t = olbvh_from_corner(g, x) * g.scale;
+    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+}
+
 // Cell of the finest grid, clamped into the grid.
 uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     precise vec3 q = floor(olbvh_from_corner(g, x) * g.inv.xyz);
@@ -486,13 +492,7 @@ uvec2 olbvh_entry_range(uint leaf) {
 }
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
 
-// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl, and vertices.
-
-// Far outside of the bounds, or not a number: no mesh can be there.
-bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
-    precise vec3 t = olbvh_from_corner(g, x) * g.scale;
-    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
-}
+// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
 
 olbvh_Tet olbvh_load_tet(uvec4 ids) {
     return olbvh_make_tet(ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
@@ -779,25 +779,24 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
 // Whether a leaf is one to walk through: full of mesh, its list left out.
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
-// The owner of x, the normalised point `at`, in a leaf with these entries: by a stride from a hint (or NONE) or from the middle of the list; where that
-// fails, by a whole walk if the leaf is full of mesh. None, if its list must be searched.
-olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, uint hint, vec3 at, vec3 x) {
-    olbvh_Best best = olbvh_no_best();
-    if (olbvh_LISTS == 0u || range.x >= range.y) return best;
-    uint t = hint;
-    bool found = hint != olbvh_NONE && olbvh_stride_to(t, x, olbvh_HINTED);
-    if (!found) {
-        t = olbvh_p.at[range.x + (range.y - range.x) / 2u];
-        found = olbvh_stride_to(t, x, olbvh_STRIDE);
-    }
-    if (found) best = olbvh_Best(t, true, true, 0.0);
-    if (!found && !olbvh_is_boundary_node(leaf)) {
-        olbvh_Room room;
-        room.half_size = olbvh_half_cell(g, g.level);
-        room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-        best = olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
-    }
-    return best;
+// Where a stride through a leaf with these entries begins.
+uint olbvh_middle_of(uvec2 range) { return olbvh_p.at[range.x + (range.y - range.x) / 2u]; }
+
+// The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
+olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
+    olbvh_Room room;
+    room.half_size = olbvh_half_cell(g, g.level);
+    room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+    return olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
+}
+
+// The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
+// if its list must be searched.
+olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, vec3 at, vec3 x) {
+    if (olbvh_LISTS == 0u || range.x >= range.y) return olbvh_no_best();
+    uint t = olbvh_middle_of(range);
+    if (olbvh_stride_to(t, x, olbvh_STRIDE)) return olbvh_Best(t, true, true, 0.0);
+    return olbvh_is_boundary_node(leaf) ? olbvh_no_best() : olbvh_walked_through(g, range, at, x);
 }
 
 // Names the tree that the functions below mean.
@@ -828,7 +827,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (leaf == olbvh_NONE) return olbvh_NONE;
     vec3 x = olbvh_normalise(g, place);
     uvec2 range = olbvh_entry_range(leaf);
-    olbvh_Best best = olbvh_walked(g, leaf, range, olbvh_NONE, place, x);
+    olbvh_Best best = olbvh_walked(g, leaf, range, place, x);
     if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, x);
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
@@ -849,7 +848,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uvec2 range = olbvh_entry_range(leaf);
     bool by_walk = olbvh_walks_in(leaf, range);
     if (by_walk) {
-        olbvh_Best first = olbvh_walked(g, leaf, range, olbvh_NONE, place, x), unused = olbvh_no_best();
+        olbvh_Best first = olbvh_walked(g, leaf, range, place, x), unused = olbvh_no_best();
         olbvh_arrive(first.owner, x, unused);
         range = uvec2(0u, olbvh_star_size);
     }
