@@ -597,9 +597,11 @@ olbvh_Stand olbvh_stand_in(uint t) {
     return s;
 }
 
-olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) {
-    return olbvh_sides_of(vec3(s.x.x, s.y.x, s.z.x), vec3(s.x.y, s.y.y, s.z.y), vec3(s.x.z, s.y.z, s.z.z), vec3(s.x.w, s.y.w, s.z.w), x);
-}
+vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+
+olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(vec3[4](olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u)), olbvh_ranks(s.cell)); }
+
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u), x); }
 
 uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 

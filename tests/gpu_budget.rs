@@ -169,7 +169,7 @@ fn every_capacity() {
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Reject).unwrap();
     let view = MeshView { input: *device.input(), arrays: *device.arrays() };
     let (input, tets) = (view.input, view.input.tets);
-    let points = PointInput { points: input.positions, stride: input.stride, count: input.points, hints: None };
+    let points = PointInput { points: input.positions, stride: input.stride, count: input.points, hints: None, order: None };
     for lists in Lists::EVERY {
         let options = BuildOptions { lists, ..BuildOptions::default() };
         let deepest = sizes.level(&options).unwrap();

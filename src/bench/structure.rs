@@ -104,7 +104,8 @@ impl Structure {
         }
     }
 
-    /// Locates points in the way that is the best for those of `quantity`: where leaves within the mesh have no lists, by runs, points in no order sorted.
+    /// Locates points in the way that suits those of `quantity`: where leaves within the mesh have no lists, points in no order sorted, samples
+    /// of rays in runs.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
@@ -112,7 +113,8 @@ impl Structure {
                     (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => Path::Traversal(8),
                     (_, Lists::All) => Path::Descent,
                     (Quantity::LocateRandom, Lists::Boundary) => Path::Sorted,
-                    (_, Lists::Boundary) => Path::Runs,
+                    (Quantity::LocateSamples, Lists::Boundary) => Path::Runs,
+                    (_, Lists::Boundary) => Path::Descent,
                 };
                 query::locate(mesh, tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, &|_, _| {})
             }

@@ -48,7 +48,7 @@ impl Baseline {
     }
 
     pub fn record_rays(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
-        let input = PointInput { points: self.points.all(), stride: 3, count: self.mesh.input().points, hints: None };
+        let input = PointInput { points: self.points.all(), stride: 3, count: self.mesh.input().points, hints: None, order: None };
         for rays in &self.rays {
             r.barrier("located → rays.locate");
             rays.cmd_locate(r, &self.mesh, &input, &self.output)?;

@@ -48,8 +48,8 @@ impl Gathered<'_> {
             a += (1.0 - a) * shade.rim;
         }
         let w = (1.0 - self.sum[3]) * a;
-        for c in 0..3 {
-            self.sum[c] += w * color[c];
+        for (sum, color) in self.sum.iter_mut().zip(color) {
+            *sum += w * color;
         }
         self.sum[3] += w;
     }
