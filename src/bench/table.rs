@@ -181,7 +181,7 @@ fn heading(report: &Report) -> String {
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
          medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
-         trees with lists `boundary` sort random points, which is timed with their location, and take others in runs\n\
+         trees with lists `boundary` sort random points, which is timed with their location, and take samples of rays in runs\n\
          copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
         suite.name(),
