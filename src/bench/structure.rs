@@ -111,10 +111,9 @@ impl Structure {
             Self::Octree(tree) => {
                 let path = match (quantity, tree.memory().lists) {
                     (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => Path::Traversal(8),
-                    (_, Lists::All) => Path::Descent,
                     (Quantity::LocateRandom, Lists::Boundary) => Path::Sorted,
                     (Quantity::LocateSamples, Lists::Boundary) => Path::Runs,
-                    (_, Lists::Boundary) => Path::Descent,
+                    _ => Path::Descent,
                 };
                 query::locate(mesh, tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, &|_, _| {})
             }
