@@ -87,7 +87,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     vec3 x = normalise(g, place);
     uvec2 range = entry_range(leaf);
     Best best = walked(g, leaf, range, place, x);
-    if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, x);
+    if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, sought_at(g, place, x, tolerance));
     uint owner = decide(best, leaf, tolerance);
     if (owner == NONE) return NONE;
     Tet tet = load_tet(cells.at[owner]);
@@ -113,7 +113,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     }
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? star[i] : p.at[i];
+        uint t = by_walk ? star[i] : primitive(i);
         if (!weights(load_tet(cells.at[t]), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
@@ -165,6 +165,6 @@ bool olbvh_is_boundary(Node node) { return is_boundary_node(node.index); }
 
 uvec2 olbvh_entries(Node node) { return entry_range(node.index); }
 
-uint olbvh_primitive(uint entry) { return p.at[entry]; }
+uint olbvh_primitive(uint entry) { return primitive(entry); }
 #endif
 #endif

@@ -47,7 +47,7 @@ struct olbvh_Grid {
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
-    uint pad;     // Unused.
+    uint ids;     // Bits of an entry of P that are its primitive; those above are its halves, if there are any.
 };
 
 // What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
@@ -468,6 +468,7 @@ struct olbvh_Node {
 
 // The children of a node. The including kernel declares masks and co.
 
+// Of an internal node the children that there are; of a leaf the octants that its primitives come near to, by the same digits.
 uint olbvh_child_mask(uint node) { return olbvh_masks.at[node >> 2u] >> (8u * (node & 3u)) & 0xffu; }
 
 uint olbvh_child_of(uint node, uint mask, uint digit) { return olbvh_co.at[node] + 1u + bitCount(mask & ((1u << digit) - 1u)); }
@@ -482,8 +483,15 @@ uint olbvh_find_node(uint node, uint from, uint level, uint code) {
     return node;
 }
 
-// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
-uint olbvh_find_leaf(uint level, uvec3 finest) { return olbvh_find_node(0u, 0u, level, olbvh_morton(finest) >> (3u * (olbvh_MAX_LEVEL - level))); }
+// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none, or none of its primitives is near the cell.
+uint olbvh_find_leaf(uint level, uvec3 finest) {
+    uint code = olbvh_morton(finest), leaf = olbvh_find_node(0u, 0u, level, code >> (3u * (olbvh_MAX_LEVEL - level)));
+    if (leaf == olbvh_NONE || level == olbvh_MAX_LEVEL) return leaf;
+    return (olbvh_child_mask(leaf) >> (code >> (3u * (olbvh_MAX_LEVEL - 1u - level)) & 7u) & 1u) != 0u ? leaf : olbvh_NONE;
+}
+
+// The primitive of an entry; the bits above are halves.
+uint olbvh_primitive(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.
 uvec2 olbvh_entry_range(uint leaf) {
@@ -496,6 +504,59 @@ uvec2 olbvh_entry_range(uint leaf) {
 
 olbvh_Tet olbvh_load_tet(uvec4 ids) {
     return olbvh_make_tet(ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
+}
+
+// The halves of its leaf's cell that an entry is near to, per axis: bit 2 c the lower one along axis c, bit 2 c + 1 the upper. They stand in the
+// top bits of its word in P. Twin of src/reference/halves.rs, which explains it. Needs grid.glsl.
+const uint olbvh_ID_BITS = 26u; // below the halves
+const uint olbvh_BOTH_HALVES = 0x3fu;
+const uint olbvh_ALL_OCTANTS = 0xffu;
+
+// By how many finest cells per axis boxes grow: by all of them where normalised coordinates are too coarse to tell those cells apart.
+uvec3 olbvh_reach_of(olbvh_Grid g, uint least) { return mix(uvec3(least), uvec3(1024u), lessThan(g.extent.xyz, vec3(olbvh_two_to(-30)))); }
+
+// Those that the box of finest cells [lo, hi] meets once it has grown.
+uint olbvh_halves_near(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
+    if (g.level == olbvh_MAX_LEVEL) return olbvh_BOTH_HALVES;
+    uvec3 middle = (2u * olbvh_unmorton(code) + 1u) << (olbvh_MAX_LEVEL - 1u - g.level), reach = olbvh_reach_of(g, 1u);
+    uvec3 met = uvec3(lessThan(lo, middle + reach)) + 2u * uvec3(greaterThanEqual(hi + reach, middle));
+    return met.x | met.y << 2u | met.z << 4u;
+}
+
+// Those around a finest cell.
+uint olbvh_halves_around(uint level, uvec3 cell) {
+    if (level == olbvh_MAX_LEVEL) return 0u;
+    uvec3 around = 1u + (cell >> (olbvh_MAX_LEVEL - 1u - level) & 1u);
+    return around.x | around.y << 2u | around.z << 4u;
+}
+
+// The octants of the cell that an entry is near to, one bit for each 3-bit Morton digit.
+uint olbvh_octants_of(uint halves) {
+    uint x = (halves & 1u) * 0x0fu | (halves >> 1u & 1u) * 0xf0u;
+    uint y = (halves >> 2u & 1u) * 0x33u | (halves >> 3u & 1u) * 0xccu;
+    return x & y & ((halves >> 4u & 1u) * 0x55u | (halves >> 5u & 1u) * 0xaau);
+}
+
+// A point that an owner is sought for.
+struct olbvh_Sought {
+    vec3 x;             // in normalised coordinates
+    uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
+    uint halves;        // of the leaf that it lies in
+};
+
+// That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
+olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
+    uvec3 cell = olbvh_quantize(g, at);
+    uint least = 1u + uint(clamp(tolerance, 0.0, 1.0) * 4096.0);
+    uvec3 reach = olbvh_reach_of(g, least);
+    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == olbvh_NONE ? 0u : olbvh_halves_around(g.level, cell));
+}
+
+// Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
+bool olbvh_is_near(uvec4 ids, olbvh_Sought s) {
+    uvec3 a = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.x].w)), b = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.y].w));
+    uvec3 c = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.z].w)), d = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.w].w));
+    return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 
 // The best of the candidates so far.
@@ -522,13 +583,27 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
 
-// Looks at entries [begin, end) in order, ends at the first that contains x.
-void olbvh_search(inout olbvh_Best best, uint begin, uint end, vec3 x) {
-    for (uint i = begin; i < end; ++i) {
-        uint t = olbvh_p.at[i];
-        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
-        olbvh_consider(best, t, tet, olbvh_weights(tet, x));
-        if (best.inside) return;
+// The next entry of [i, end) that is near, `t` its primitive and `cell` the vertices. Most are not: they are passed over here, so that invocations wait for
+// each other less.
+uint olbvh_next_near(uint i, uint end, olbvh_Sought s, out uint t, out uvec4 cell) {
+    uint ids = olbvh_grid.at[0].ids;
+    for (; i < end; ++i) {
+        uint entry = olbvh_p.at[i];
+        if ((entry >> olbvh_ID_BITS & s.halves) != s.halves) continue;
+        t = entry & ids;
+        cell = olbvh_cells.at[t];
+        if (olbvh_is_near(cell, s)) break;
+    }
+    return i;
+}
+
+// Looks at entries [begin, end) in order, ends at the first that contains the point.
+void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
+    uint t;
+    uvec4 cell;
+    for (uint i = olbvh_next_near(begin, end, s, t, cell); i < end && !best.inside; i = olbvh_next_near(i + 1u, end, s, t, cell)) {
+        olbvh_Tet tet = olbvh_load_tet(cell);
+        olbvh_consider(best, t, tet, olbvh_weights(tet, s.x));
     }
 }
 
@@ -782,14 +857,14 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
 // Where a stride through a leaf with these entries begins.
-uint olbvh_middle_of(uvec2 range) { return olbvh_p.at[range.x + (range.y - range.x) / 2u]; }
+uint olbvh_middle_of(uvec2 range) { return olbvh_primitive(range.x + (range.y - range.x) / 2u); }
 
 // The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
     olbvh_Room room;
     room.half_size = olbvh_half_cell(g, g.level);
     room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-    return olbvh_walk_from_seed(olbvh_p.at[range.x], room, x);
+    return olbvh_walk_from_seed(olbvh_primitive(range.x), room, x);
 }
 
 // The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
@@ -830,7 +905,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     vec3 x = olbvh_normalise(g, place);
     uvec2 range = olbvh_entry_range(leaf);
     olbvh_Best best = olbvh_walked(g, leaf, range, place, x);
-    if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, x);
+    if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, olbvh_sought_at(g, place, x, tolerance));
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
     olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[owner]);
@@ -856,7 +931,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     }
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? olbvh_star[i] : olbvh_p.at[i];
+        uint t = by_walk ? olbvh_star[i] : olbvh_primitive(i);
         if (!olbvh_weights(olbvh_load_tet(olbvh_cells.at[t]), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
@@ -989,6 +1064,6 @@ bool olbvh_is_boundary(olbvh_Node node) { return olbvh_is_boundary_node(node.ind
 
 uvec2 olbvh_entries(olbvh_Node node) { return olbvh_entry_range(node.index); }
 
-uint olbvh_primitive(uint entry) { return olbvh_p.at[entry]; }
+uint olbvh_primitive(uint entry) { return olbvh_primitive(entry); }
 #endif
 #endif

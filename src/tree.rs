@@ -23,6 +23,8 @@ pub struct TreeArrays {
     pub grid: Grid,
     /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
     pub p: Vec<u32>,
+    /// Halves of its leaf's cell that each entry is near to (see [`crate::reference::halves`]); empty where entries have none.
+    pub halves: Vec<u8>,
     /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper has offsets for every node; those of the
     /// other nodes follow from their leaves.
     pub po: Vec<u32>,
@@ -32,7 +34,8 @@ pub struct TreeArrays {
     pub no: Vec<u32>,
     /// Boundary flag per node, bit j % 32 of word j / 32; set if a boundary primitive lies in the node.
     pub boundary: Vec<u32>,
-    /// Child mask per internal node, byte i % 4 of word i / 4; bit d: the child with the 3-bit Morton digit d exists.
+    /// Mask per node, byte i % 4 of word i / 4. Of an internal node, bit d: the child with the 3-bit Morton digit d exists. Of a leaf: an entry is
+    /// near to that octant of its cell (see [`crate::reference::leaves::octants`]); in the others nothing is to be found.
     pub mask: Vec<u32>,
     /// Box per node, `[lo, hi]` in the units of the mesh: a leaf's is its cell's, others the union of their children's.
     pub boxes: Option<Vec<Box6>>,
@@ -73,9 +76,14 @@ impl TreeArrays {
         }
     }
 
+    /// The mask of a node: its children, or the octants of a leaf.
+    pub fn mask_of(&self, node: u32) -> u32 {
+        self.mask[node as usize / 4] >> (8 * (node % 4)) & 0xff
+    }
+
     /// Child mask of a node, 0 for leaves.
     pub fn child_mask(&self, node: u32) -> u32 {
-        if node < self.internal_nodes() { self.mask[node as usize / 4] >> (8 * (node % 4)) & 0xff } else { 0 }
+        if node < self.internal_nodes() { self.mask_of(node) } else { 0 }
     }
 
     /// The child of a node with the 3-bit Morton digit `digit`.
@@ -111,10 +119,12 @@ impl TreeArrays {
         bit(&self.boundary, node)
     }
 
-    /// The leaf that stands for a cell of the finest grid (as [`Grid::quantize`] gives it), by descent over the child masks.
+    /// The leaf that stands for a cell of the finest grid (as [`Grid::quantize`] gives it), by descent over the child masks, if a primitive is near it.
     pub fn find_leaf(&self, finest: [u32; 3]) -> Option<u32> {
-        let level = self.grid.level;
-        self.find_node(morton(finest) >> (3 * (MAX_LEVEL - level)), level)
+        let (level, code) = (self.grid.level, morton(finest));
+        let leaf = self.find_node(code >> (3 * (MAX_LEVEL - level)), level)?;
+        let near = level == MAX_LEVEL || self.mask_of(leaf) >> (code >> (3 * (MAX_LEVEL - 1 - level)) & 7) & 1 != 0;
+        near.then_some(leaf)
     }
 
     /// The node of a level that stands for the cell with this Morton code.

@@ -12,6 +12,7 @@ use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, l
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
+use olbvh::reference::halves::taken_apart;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::vertices::Vertices;
 use olbvh::tree::{Memory, TreeArrays};
@@ -144,16 +145,19 @@ fn one<T: bytemuck::AnyBitPattern>(content: &[u32], part: BufferRef) -> T {
 fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArrays {
     let words = |part: BufferRef, n: u32| content[part.offset as usize / 4..][..n as usize].to_vec();
     let (nodes, internal) = (status.nodes, status.internal);
+    let grid = one(content, tree.grid);
+    let (p, halves) = taken_apart(words(tree.p, status.entries), &grid);
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,
-        grid: one(content, tree.grid),
-        p: words(tree.p, status.entries),
+        grid,
+        p,
+        halves,
         po: words(tree.po, status.leaves + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         boundary: words(tree.flags, nodes.div_ceil(32)),
-        mask: words(tree.masks, internal.div_ceil(4)),
+        mask: words(tree.masks, nodes.div_ceil(4)),
         boxes: None,
     }
 }

@@ -39,7 +39,7 @@ uvec2 most_words(uint level) {
         nodes += leaves;
     }
     uvec2 words = plus(plus(total(level), leaves + 1u), internal + 1u);
-    words = plus(words, level + 1u + (nodes + 31u) / 32u + (internal + 3u) / 4u);
+    words = plus(words, level + 1u + (nodes + 31u) / 32u + (nodes + 3u) / 4u);
     for (uint i = 0u; i < box_words; ++i) words = plus(words, nodes);
     return words;
 }

@@ -7,10 +7,11 @@
 #include "shared/assign.glsl"
 #include "shared/separate.glsl"
 // Leaves, 2 of 2 (Alg. 1): the box of every leaf where boxes are stored, from the code of its last entry; the flag of
-// leaves outside of the mesh (see src/reference/leaves.rs); statistics. Where cells are MARKED (Lists::Boundary), that is the flag.
+// leaves outside of the mesh (see src/reference/leaves.rs); the mask of its octants; statistics. Where cells are MARKED (Lists::Boundary), that is the
+// flag.
 layout(constant_id = 2) const uint BOXES = 0;
 layout(constant_id = 3) const uint MARKED = 0;
-ARGUMENTS(10)
+ARGUMENTS(11)
     uint unused;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -23,9 +24,12 @@ BUFFER(6, readonly, uint, p)
 BUFFER16(7, readonly, uvec4, cells)
 BUFFER16(8, readonly, vec4, vertices)
 BUFFER(9, readonly, uint, marks)
+BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/marks.glsl"
+#include "shared/halves.glsl"
 
 const uint ASKED = 16u;
+const uint OCTANTS_ASKED = 16384u;
 
 // Whether one of the first primitives of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {
@@ -39,6 +43,16 @@ bool touched(Grid g, uint begin, uint end, uint code) {
         if (box_touches(v, axes, vec3(0.0))) return true;
     }
     return false;
+}
+
+// The octants that the entries of a leaf's list are near to; all of them for the longest lists.
+uint octants(Grid g, uint begin, uint end) {
+    if (end - begin > OCTANTS_ASKED) return ALL_OCTANTS;
+    uint mask = 0u;
+    for (uint i = begin; i < end && mask != ALL_OCTANTS; ++i) {
+        mask |= octants_of(p.at[i] >> ID_BITS);
+    }
+    return mask;
 }
 
 void main() {
@@ -60,6 +74,8 @@ void main() {
             atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
             flagged = 1u;
         }
+        uint mask = g.ids != NONE && flagged != 0u ? octants(g, begin, end) : entries > 0u ? ALL_OCTANTS : 0u;
+        atomicOr(masks.at[node >> 2u], mask << (8u * (node & 3u)));
         if (BOXES != 0u) {
             vec3 lo, hi;
             cell_box(g, g.level, end == 0u ? 0u : codes.at[end - 1u], lo, hi);

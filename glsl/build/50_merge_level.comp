@@ -14,7 +14,7 @@ BUFFER(2, readonly, uint, codes)
 BUFFER(3, readonly, uint, po)
 BUFFER(4, readonly, uint, co)
 BUFFER(5, READ_WRITE, uint, flags)
-BUFFER(6, READ_WRITE, uint, masks) // zeroed; one byte per internal node
+BUFFER(6, READ_WRITE, uint, masks) // zeroed; one byte per node
 BUFFER(7, READ_WRITE, float, boxes)
 
 void main() {

@@ -98,7 +98,7 @@ void main() {
         }
         if (walks && slice == 0u) best = walked_through(g, range, a.at, a.x);
         uint begin = min(range.y, range.x + slice * SLICE), behind = min(range.y, begin + SLICE);
-        if (!walks && !best.inside) search(best, begin, behind, a.x);
+        if (!walks && !best.inside) search(best, begin, behind, sought_at(g, a.at, a.x, tolerance));
         uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
         vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
         if (last != 0u && owner != NONE) {

@@ -74,9 +74,11 @@ void main() {
         return;
     }
     uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
-    for (uint e = begin; e < end; ++e) {
-        uint t = p.at[e];
-        if (!weights(load_tet(cells.at[t]), x).inside) continue;
+    Sought sought = sought_at(g, at, x, 0.0);
+    uint t;
+    uvec4 cell;
+    for (uint e = next_near(begin, end, sought, t, cell); e < end; e = next_near(e + 1u, end, sought, t, cell)) {
+        if (!weights(load_tet(cell), x).inside) continue;
         if (FILL != 0u && place < capacity) found.at[place] = t;
         ++place;
     }

@@ -56,7 +56,12 @@ void main() {
         vec3 x = normalise(g, at);
         uvec2 range = entry_range(leaf_found);
         Best best = walked(g, leaf_found, range, at, x);
-        if (!best.inside && !walks_in(leaf_found, range)) search(best, range.x, min(range.y, range.x + 32000u), x);
+        uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + 32000u);
+        for (uint i = range.x; i < end && !best.inside; ++i) {
+            uint t = primitive(i);
+            Tet tet = load_tet(cells.at[t]);
+            consider(best, t, tet, weights(tet, x));
+        }
         owner = decide(best, leaf_found, tolerance);
         if (owner != NONE) {
             Tet tet = load_tet(cells.at[owner]);

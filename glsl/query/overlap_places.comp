@@ -43,12 +43,13 @@ void main() {
             places.at[i] = 1u;
         } else if (leaf != NONE) {
             located = uint(slice == 0u);
-            x = normalise(g, x);
+            Sought sought = sought_at(g, x, normalise(g, x), 0.0);
             uvec2 range = entry_range(leaf);
             uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
-            for (uint e = begin; e < end; ++e) {
-                uint t = p.at[e];
-                if (!weights(load_tet(cells.at[t]), x).inside) continue;
+            uint t;
+            uvec4 cell;
+            for (uint e = next_near(begin, end, sought, t, cell); e < end; e = next_near(e + 1u, end, sought, t, cell)) {
+                if (!weights(load_tet(cell), sought.x).inside) continue;
                 places.at[i] = 1u;
                 atomicOr(around.at[t >> 5u], 1u << (t & 31u));
                 break;

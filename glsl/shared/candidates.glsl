@@ -4,6 +4,30 @@ Tet load_tet(uvec4 ids) {
     return make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
 }
 
+#include "shared/halves.glsl"
+
+// A point that an owner is sought for.
+struct Sought {
+    vec3 x;             // in normalised coordinates
+    uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
+    uint halves;        // of the leaf that it lies in
+};
+
+// That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
+Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
+    uvec3 cell = quantize(g, at);
+    uint least = 1u + uint(clamp(tolerance, 0.0, 1.0) * 4096.0);
+    uvec3 reach = reach_of(g, least);
+    return Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == NONE ? 0u : halves_around(g.level, cell));
+}
+
+// Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
+bool is_near(uvec4 ids, Sought s) {
+    uvec3 a = unpack_cell(floatBitsToUint(vertices.at[ids.x].w)), b = unpack_cell(floatBitsToUint(vertices.at[ids.y].w));
+    uvec3 c = unpack_cell(floatBitsToUint(vertices.at[ids.z].w)), d = unpack_cell(floatBitsToUint(vertices.at[ids.w].w));
+    return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
+}
+
 // The best of the candidates so far.
 struct Best {
     uint owner; // NONE: none yet

@@ -1,5 +1,6 @@
 // The children of a node. The including kernel declares masks and co.
 
+// Of an internal node the children that there are; of a leaf the octants that its primitives come near to, by the same digits.
 uint child_mask(uint node) { return masks.at[node >> 2u] >> (8u * (node & 3u)) & 0xffu; }
 
 uint child_of(uint node, uint mask, uint digit) { return co.at[node] + 1u + bitCount(mask & ((1u << digit) - 1u)); }

@@ -2,13 +2,27 @@
 
 #include "shared/candidates.glsl"
 
-// Looks at entries [begin, end) in order, ends at the first that contains x.
-void search(inout Best best, uint begin, uint end, vec3 x) {
-    for (uint i = begin; i < end; ++i) {
-        uint t = p.at[i];
-        Tet tet = load_tet(cells.at[t]);
-        consider(best, t, tet, weights(tet, x));
-        if (best.inside) return;
+// The next entry of [i, end) that is near, `t` its primitive and `cell` the vertices. Most are not: they are passed over here, so that invocations wait for
+// each other less.
+uint next_near(uint i, uint end, Sought s, out uint t, out uvec4 cell) {
+    uint ids = grid.at[0].ids;
+    for (; i < end; ++i) {
+        uint entry = p.at[i];
+        if ((entry >> ID_BITS & s.halves) != s.halves) continue;
+        t = entry & ids;
+        cell = cells.at[t];
+        if (is_near(cell, s)) break;
+    }
+    return i;
+}
+
+// Looks at entries [begin, end) in order, ends at the first that contains the point.
+void search(inout Best best, uint begin, uint end, Sought s) {
+    uint t;
+    uvec4 cell;
+    for (uint i = next_near(begin, end, s, t, cell); i < end && !best.inside; i = next_near(i + 1u, end, s, t, cell)) {
+        Tet tet = load_tet(cell);
+        consider(best, t, tet, weights(tet, s.x));
     }
 }
 

@@ -17,7 +17,7 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     uvec2 range = entry_range(leaf);
     uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
     if (s.cursor == 0u) s.best = walked(g, leaf, range, at, x);
-    if (!s.best.inside && !walks_in(leaf, range)) search(s.best, begin, end, x);
+    if (!s.best.inside && !walks_in(leaf, range)) search(s.best, begin, end, sought_at(g, at, x, tolerance));
     work += end - begin;
     s.cursor = end - range.x;
     if (!s.best.inside && end < range.y) return false;

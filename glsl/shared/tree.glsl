@@ -2,8 +2,15 @@
 
 #include "shared/children.glsl"
 
-// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none.
-uint find_leaf(uint level, uvec3 finest) { return find_node(0u, 0u, level, morton(finest) >> (3u * (MAX_LEVEL - level))); }
+// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none, or none of its primitives is near the cell.
+uint find_leaf(uint level, uvec3 finest) {
+    uint code = morton(finest), leaf = find_node(0u, 0u, level, code >> (3u * (MAX_LEVEL - level)));
+    if (leaf == NONE || level == MAX_LEVEL) return leaf;
+    return (child_mask(leaf) >> (code >> (3u * (MAX_LEVEL - 1u - level)) & 7u) & 1u) != 0u ? leaf : NONE;
+}
+
+// The primitive of an entry; the bits above are halves.
+uint primitive(uint entry) { return p.at[entry] & grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.
 uvec2 entry_range(uint leaf) {

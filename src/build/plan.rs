@@ -57,7 +57,7 @@ pub struct TreeMemory {
     pub status: BufferRef,
     /// [`Grid`] with the level of the leaves.
     pub grid: BufferRef,
-    /// Primitive ids by Morton code.
+    /// Primitive ids by Morton code; where leaves within the mesh have no lists, halves above them ([`crate::reference::halves`]).
     pub p: BufferRef,
     /// Ends of the leaves in `p`.
     pub po: BufferRef,
@@ -65,7 +65,7 @@ pub struct TreeMemory {
     pub co: BufferRef,
     /// Boundary flags, one bit per node.
     pub flags: BufferRef,
-    /// Child masks, one byte per internal node.
+    /// Masks of children, and of the octants of leaves, one byte per node.
     pub masks: BufferRef,
     /// Boxes, 24 bytes per node, where they are stored.
     pub boxes: Option<BufferRef>,
@@ -87,7 +87,7 @@ impl TreeMemory {
     pub fn carve(arena: &mut Arena, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
         let (status, grid) = Self::carve_head(arena)?;
         let nodes = u64::from(capacity.nodes);
-        // Leaves are not internal: what is left of the nodes bounds CO and the masks.
+        // Leaves are not internal: what is left of the nodes bounds CO.
         let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
         Ok(Self {
             assign: options.assign,
@@ -99,7 +99,7 @@ impl TreeMemory {
             po: arena.words(nodes.min(u64::from(capacity.entries.max(1))) + 1)?,
             co: arena.words(internal + 1)?,
             flags: arena.words(nodes.div_ceil(32))?,
-            masks: arena.words(internal.div_ceil(4))?,
+            masks: arena.words(nodes.div_ceil(4))?,
             boxes: if options.boxes { Some(arena.words(6 * nodes)?) } else { None },
         })
     }

@@ -7,11 +7,13 @@ use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     ChooseDepth, ChooseDepthSpec, Count as CountCells, CountSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec,
     EmitSplits, EmitSplitsSpec, EstimateDepth, EstimateDepthSpec, Filter, FilterSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves,
-    FlagLeavesSpec, Mark, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, SettleSeeds, SettleSeedsSpec,
+    FlagLeavesSpec, Mark, MarkHalves, MarkHalvesSpec, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec, SettleSeeds,
+    SettleSeedsSpec,
 };
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
+use crate::reference::halves::id_mask;
 
 /// A mesh as the stages see it.
 #[derive(Clone, Copy, Debug)]
@@ -311,29 +313,25 @@ pub(crate) fn cmd_leaves(
     scratch: &SortedScratch,
 ) -> Result<()> {
     let target = r.gpu().target();
-    let TreeMemory { status, grid, p, po, flags, .. } = *tree;
+    let TreeMemory { status, grid, p, po, flags, masks, .. } = *tree;
     // Leaves of marked cells are those with boundary primitives.
     let marks = filter.and_then(|f| f.seeds).map(|s| s.marks);
     r.stage("build.leaves", |r| {
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));
-        let flag = FlagLeaves {
-            entries: entries.word(r.gpu()),
-            p,
-            po,
-            boundary_cells: mesh.arrays.boundary,
-            status,
-            flags,
-            capacity: capacity.entries,
-        };
-        if marks.is_none() {
-            r.dispatch(&flag, FlagLeavesSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
-            r.barrier("leaves.flag → leaves.finish");
+        let (live, run, capacity) = (entries.word(r.gpu()), target.run, capacity.entries);
+        let (cells, vertices, codes) = (mesh.input.cells, mesh.arrays.vertices, scratch.codes);
+        if id_mask(tree.lists, mesh.input.tets as usize) != u32::MAX {
+            let mark = MarkHalves { entries: live, grid, status, codes, cells, quantized: vertices, p, capacity };
+            r.dispatch(&mark, MarkHalvesSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;
+        } else if marks.is_none() {
+            let flag = FlagLeaves { entries: live, p, po, boundary_cells: mesh.arrays.boundary, status, flags, capacity };
+            r.dispatch(&flag, FlagLeavesSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;
         }
+        r.barrier("leaves.flag → leaves.finish");
         let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
-        let (cells, vertices) = (mesh.input.cells, mesh.arrays.vertices);
-        let (codes, marked) = (scratch.codes, u32::from(marks.is_some()));
+        let marked = u32::from(marks.is_some());
         let marks = marks.unwrap_or_else(|| r.gpu().nothing());
-        let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, unused: 0 };
+        let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, masks, unused: 0 };
         let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), marked, ..Default::default() };
         r.dispatch(&finish, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
         r.barrier("leaves.finish → levels");

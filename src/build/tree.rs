@@ -10,6 +10,7 @@ use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::too_large;
 use crate::reference::grid::MAX_LEVEL;
+use crate::reference::halves::taken_apart;
 use crate::tree::{Memory, TreeArrays};
 use bytemuck::Pod;
 
@@ -114,7 +115,7 @@ impl Tree {
                 po: a.words(leaves + 1)?,
                 co: a.words(internal + 1)?,
                 flags: a.words(nodes.div_ceil(32))?,
-                masks: a.words(internal.div_ceil(4))?,
+                masks: a.words(nodes.div_ceil(4))?,
                 boxes: if options.boxes { Some(a.words(6 * nodes)?) } else { None },
             })
         };
@@ -148,16 +149,19 @@ impl Tree {
             Some(part) => Some(self.gpu.download(&self.node_buffer, part.part(0, 24 * nodes))?),
             None => None,
         };
+        let entries = self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?;
+        let (p, halves) = taken_apart(entries, &self.grid);
         Ok(TreeArrays {
             assign: self.options.assign,
             lists: self.options.lists,
             grid: self.grid,
-            p: self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?,
+            p,
+            halves,
             po: words(self.memory.po, u64::from(self.status.leaves) + 1)?,
             co: words(self.memory.co, internal + 1)?,
             no: self.status.levels[..=self.status.level as usize].to_vec(),
             boundary: words(self.memory.flags, nodes.div_ceil(32))?,
-            mask: words(self.memory.masks, internal.div_ceil(4))?,
+            mask: words(self.memory.masks, nodes.div_ceil(4))?,
             boxes,
         })
     }

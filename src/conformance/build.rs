@@ -11,6 +11,7 @@ use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::Arena;
+use crate::reference::halves::taken_apart;
 use crate::tree::{Memory, TreeArrays};
 
 /// Which interface builds, within what.
@@ -109,7 +110,7 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
     size("PO (bytes)", s.leaves + 1, memory.po)?;
     size("CO (bytes)", s.internal + 1, memory.co)?;
     size("flags (bytes)", s.nodes.div_ceil(32), memory.flags)?;
-    size("masks (bytes)", s.internal.div_ceil(4), memory.masks)?;
+    size("masks (bytes)", s.nodes.div_ceil(4), memory.masks)?;
     match memory.boxes {
         Some(boxes) => size("boxes (bytes)", 6 * s.nodes, boxes),
         None => compare_one("build.plan", "boxes", &false, &options.boxes),
@@ -144,7 +145,9 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     }
     let n = expected.codes().len();
     compare("build.sort", "codes", expected.codes(), in_scratch(scratch.sorted.codes, n))?;
-    compare("build.sort", "P", &expected_tree.p, &words(tree.p, n))?;
+    let grid = one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?;
+    let (p, halves) = taken_apart(words(tree.p, n), &grid);
+    compare("build.sort", "P", &expected_tree.p, &p)?;
     compare_status(&expected.status, &status)?;
     let (nodes, internal) = (status.nodes as usize, status.internal as usize);
     let boxes =
@@ -152,13 +155,14 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let found = TreeArrays {
         assign: options.assign,
         lists: options.lists,
-        grid: one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?,
-        p: words(tree.p, n),
+        grid,
+        p,
+        halves,
         po: words(tree.po, nodes - internal + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         boundary: words(tree.flags, nodes.div_ceil(32)),
-        mask: words(tree.masks, internal.div_ceil(4)),
+        mask: words(tree.masks, nodes.div_ceil(4)),
         boxes,
     };
     compare_arrays(expected, &found)
@@ -193,11 +197,14 @@ fn compare_arrays(expected: &Expected, f: &TreeArrays) -> Verdict {
     let words = |grid| bytemuck::cast_slice::<Grid, u32>(std::slice::from_ref(grid)).to_vec();
     compare("build.choose_depth", "grid", &words(&e.grid), &words(&f.grid))?;
     compare("build.sort", "P", &e.p, &f.p)?;
+    compare("build.mark_halves", "halves", &e.halves, &f.halves)?;
     compare("build.emit_splits", "NO", &e.no, &f.no)?;
     compare("build.emit_splits", "PO", &e.po, &f.po)?;
     compare("build.emit_splits", "CO", &e.co, &f.co)?;
     let flags = |t: &TreeArrays| t.leaves().map(|j| (j, t.is_boundary(j))).collect::<Vec<_>>();
     compare("build.flag_leaves", "boundary of the leaves (node, flag)", &flags(e), &flags(f))?;
+    let octants = |t: &TreeArrays| t.leaves().map(|j| (j, t.mask_of(j))).collect::<Vec<_>>();
+    compare("build.finish_leaves", "masks of the leaves (node, octants)", &octants(e), &octants(f))?;
     compare("build.merge_level", "boundary", &e.boundary, &f.boundary)?;
     compare("build.merge_level", "masks", &e.mask, &f.mask)?;
     compare_one("build.finish_leaves", "boxes.is_some()", &expected.boxes, &f.boxes.is_some())?;

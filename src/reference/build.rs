@@ -5,7 +5,7 @@ use super::codes::Stage;
 use super::grid::Grid;
 use super::marks::Marks;
 use super::vertices::Vertices;
-use super::{depth, leaves, levels};
+use super::{depth, halves, leaves, levels};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
@@ -58,11 +58,14 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
 
     // Stage 4: construct the nodes bottom-up.
     let flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
+    let halved = halves::id_mask(options.lists, mesh.tets.len()) != u32::MAX;
+    let halves = if halved { halves::halves(&entries.codes, &entries.primitives, &grid, mesh, vertices) } else { Vec::new() };
+    let octants = leaves::masks(&splits, &flags, &halves);
     let boundary = levels::flags(flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
-    let mask = levels::masks(&splits);
+    let mask = levels::masks(&octants, &splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    let grid = Grid { first_leaf: co.len() as u32 - 1, ..grid };
-    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, po, co, no, boundary, mask, boxes };
+    let grid = Grid { first_leaf: co.len() as u32 - 1, ids: halves::id_mask(options.lists, mesh.tets.len()), ..grid };
+    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, halves, po, co, no, boundary, mask, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

@@ -31,7 +31,8 @@ impl Grid {
         let exponent = (largest.to_bits() >> 23) as i32 - 127;
         let scale = f32::from_bits(((127 - exponent) as u32) << 23);
         let inv = extent.map(|e| if e < MIN_EXTENT { 0.0 } else { 1024.0 / e });
-        let mut grid = Self { lo: pad(lo), hi: pad(hi), inv: pad(inv), extent: [0.0; 4], scale, level: MAX_LEVEL, ..Self::default() };
+        let mut grid =
+            Self { lo: pad(lo), hi: pad(hi), inv: pad(inv), extent: [0.0; 4], scale, level: MAX_LEVEL, ids: u32::MAX, ..Self::default() };
         grid.extent = pad(grid.normalise(hi));
         grid
     }

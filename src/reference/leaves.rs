@@ -3,6 +3,7 @@
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{Topology, bit};
 use super::grid::{Grid, canonical, unmorton};
+use super::halves::{ALL_OCTANTS, octants_of};
 use super::separate::box_touches;
 use super::splits::Splits;
 use super::tet::sub;
@@ -10,6 +11,7 @@ use super::vertices::Vertices;
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// A box as `[lo, hi]`, x y z each.
 pub type Box6 = [f32; 6];
@@ -52,6 +54,24 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
     let axes = [[half[0], 0.0, 0.0], [0.0, half[1], 0.0], [0.0, 0.0, half[2]]];
     let touches = |&p: &u32| box_touches(&vertices.tet(mesh.tets[p as usize]).v.map(|v| sub(v, centre)), &axes, [0.0; 3]);
     !listed.is_empty() && !listed.iter().take(ASKED).any(touches)
+}
+
+/// Lists longer than this are not asked for their octants.
+pub const OCTANTS_ASKED: usize = 16_384;
+
+/// The mask of a leaf with entries `listed`: bit d says that one of them is near to the octant of its cell with the 3-bit Morton digit d. All octants of
+/// leaves without boundary primitives, of long lists, and where entries have no halves.
+pub fn octants(listed: Range<usize>, boundary: bool, halves: &[u8]) -> u32 {
+    if !boundary || halves.is_empty() || listed.len() > OCTANTS_ASKED {
+        return if listed.is_empty() { 0 } else { ALL_OCTANTS };
+    }
+    listed.fold(0, |mask, i| mask | octants_of(halves[i].into()))
+}
+
+/// The mask of each leaf.
+pub fn masks(splits: &Splits, flags: &[bool], halves: &[u8]) -> Vec<u32> {
+    let listed = |i: usize| splits.po[i] as usize..splits.po[i + 1] as usize;
+    flags.par_iter().enumerate().map(|(i, &flag)| octants(listed(i), flag, halves)).collect()
 }
 
 /// Boundary flag of each leaf.

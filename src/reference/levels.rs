@@ -17,15 +17,17 @@ pub fn boxes(leaves: Vec<Box6>, splits: &Splits) -> Vec<Box6> {
     upwards(leaves, splits, |children| children.iter().copied().reduce(union).unwrap_or_default())
 }
 
-/// Child mask of every internal node, four to a word: bit d says that the child with the 3-bit digit d exists.
-pub fn masks(splits: &Splits) -> Vec<u32> {
-    let byte = |i: usize| {
+/// Mask of every node, four to a word: of an internal node bit d says that the child with the 3-bit digit d exists, those of leaves are given.
+pub fn masks(leaves: &[u32], splits: &Splits) -> Vec<u32> {
+    let internal = splits.co.len() - 1;
+    let children = |i: usize| {
         let children = splits.co[i] as usize + 1..=splits.co[i + 1] as usize;
         splits.codes[children].iter().fold(0u32, |mask, code| mask | 1 << (code & 7))
     };
-    let internal = splits.co.len() - 1;
-    let word = |w: usize| (4 * w..internal.min(4 * w + 4)).fold(0, |word, i| word | byte(i) << (8 * (i % 4)));
-    (0..internal.div_ceil(4)).into_par_iter().map(word).collect()
+    let byte = |i: usize| if i < internal { children(i) } else { leaves[i - internal] };
+    let nodes = internal + leaves.len();
+    let word = |w: usize| (4 * w..nodes.min(4 * w + 4)).fold(0, |word, i| word | byte(i) << (8 * (i % 4)));
+    (0..nodes.div_ceil(4)).into_par_iter().map(word).collect()
 }
 
 /// The smallest box around two.

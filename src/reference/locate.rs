@@ -4,8 +4,10 @@ use super::assign::{cell_centre, half_cell};
 use super::boundary::{NONE, Topology};
 use super::candidates::Best;
 use super::grid::{Grid, MAX_LEVEL, canonical, morton};
+use super::halves::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
+use super::vertices::Vertices;
 use super::walk::{HINTED, Room, STRIDE, Walked, Walker};
 use crate::mesh::{Field, Mesh, On};
 use crate::options::Lists;
@@ -66,15 +68,14 @@ pub struct Locator<'a> {
     mesh: &'a Mesh,
     tree: &'a TreeArrays,
     neighbours: &'a [[u32; 4]],
-    normalised: Vec<Vec3>,
+    vertices: Vertices,
     tolerance: f32,
 }
 
 impl<'a> Locator<'a> {
     /// Prepares queries with the default tolerance. `topology` and `tree` must be those of `mesh`.
     pub fn new(mesh: &'a Mesh, topology: &'a Topology, tree: &'a TreeArrays) -> Self {
-        let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Self { mesh, tree, neighbours: &topology.neighbours, normalised, tolerance: TOLERANCE }
+        Self { mesh, tree, neighbours: &topology.neighbours, vertices: Vertices::new(mesh, &tree.grid), tolerance: TOLERANCE }
     }
 
     /// The same with another tolerance (see [`TOLERANCE`]).
@@ -94,7 +95,7 @@ impl<'a> Locator<'a> {
     /// As [`Locator::locate`], but first goes a few steps from `hint` (any number, such as the owner of the last point) towards the point, and takes the cell
     /// that holds it clearly: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
-        let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.normalised.len() && !t[..i].contains(&v));
+        let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.mesh.points.len() && !t[..i].contains(&v));
         let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };
         self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
     }
@@ -177,12 +178,12 @@ impl<'a> Locator<'a> {
     }
 
     fn weights(&self, tet: u32, x: Vec3) -> (Tet, Weights) {
-        let tet = Tet::new(self.mesh.tets[tet as usize], &self.normalised);
+        let tet = self.vertices.tet(self.mesh.tets[tet as usize]);
         (tet, tet.weights(x))
     }
 
     pub(super) fn walker(&self) -> Walker<'_> {
-        Walker { mesh: self.mesh, neighbours: self.neighbours, normalised: &self.normalised }
+        Walker { mesh: self.mesh, neighbours: self.neighbours, normalised: &self.vertices.normalised }
     }
 
     fn location(&self, owner: u32, x: Vec3) -> Location {
@@ -214,7 +215,7 @@ impl<'a> Locator<'a> {
     fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Location {
         let walk = |seed| self.walker().walk(seed, &self.room(finest), x).best;
         let walked = self.strode(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
-        let best = walked.unwrap_or_else(|| self.listed(leaf, x));
+        let best = walked.unwrap_or_else(|| self.listed(leaf, finest, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
     }
@@ -226,10 +227,12 @@ impl<'a> Locator<'a> {
         self.walker().stride_to(middle, x, STRIDE)
     }
 
-    /// The best of a leaf's list, up to the first that contains x.
-    fn listed(&self, leaf: u32, x: Vec3) -> Best {
+    /// The best of those of a leaf's list that are near, up to the first that contains x.
+    fn listed(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Best {
+        let reach = reach(&self.tree.grid, self.tolerance);
+        let near = |&&t: &&u32| is_near(&self.vertices.cells(self.mesh.tets[t as usize], MAX_LEVEL), finest, reach);
         let mut best = Best::NONE;
-        for &t in self.tree.primitives(leaf) {
+        for &t in self.tree.primitives(leaf).iter().filter(near) {
             let (tet, weights) = self.weights(t, x);
             best.consider(t, &tet, &weights);
             if best.inside {

@@ -9,6 +9,7 @@ pub mod candidates;
 pub mod codes;
 pub mod depth;
 pub mod grid;
+pub mod halves;
 pub mod leaf_walk;
 pub mod leaves;
 pub mod levels;

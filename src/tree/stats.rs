@@ -42,7 +42,7 @@ pub struct Memory {
     pub no: u64,
     /// Boundary flags.
     pub boundary: u64,
-    /// Child masks.
+    /// Masks of children and octants.
     pub mask: u64,
     /// Boxes, 0 if not stored.
     pub boxes: u64,
@@ -57,7 +57,7 @@ impl Memory {
             co: 4 * (internal + 1),
             no: 4 * (u64::from(level) + 1),
             boundary: 4 * nodes.div_ceil(32),
-            mask: 4 * internal.div_ceil(4),
+            mask: 4 * nodes.div_ceil(4),
             boxes: if boxes { 24 * nodes } else { 0 },
         }
     }

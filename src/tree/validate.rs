@@ -7,7 +7,8 @@ use crate::options::Lists;
 use crate::reference::boundary::Topology;
 use crate::reference::codes::Stage;
 use crate::reference::grid::{MAX_LEVEL, unmorton};
-use crate::reference::leaves::{cell_box, flag};
+use crate::reference::halves::{halves_near, id_mask};
+use crate::reference::leaves::{cell_box, flag, octants};
 use crate::reference::levels::union;
 use crate::reference::marks::Marks;
 use crate::reference::vertices::Vertices;
@@ -53,6 +54,7 @@ impl TreeArrays {
         rule(level <= MAX_LEVEL, || format!("grid: level {level} is beyond {MAX_LEVEL}"))?;
         let mut expected = topology.grid;
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
+        expected.ids = id_mask(self.lists, topology.neighbours.len());
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
@@ -65,14 +67,16 @@ impl TreeArrays {
         rule(first as usize == internal, || format!("the grid says that node {first} is the first leaf, NO that {internal} is"))?;
         let length =
             |name: &str, is: usize, needs: usize| rule(is == needs, || format!("{name} has {is} elements, {nodes} nodes need {needs}"));
+        let halves = if self.grid.ids == u32::MAX { 0 } else { self.p.len() };
+        length("halves", self.halves.len(), halves)?;
         length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
         length("CO", self.co.len(), internal + 1)?;
         length("BF", self.boundary.len(), nodes.div_ceil(32))?;
-        length("mask", self.mask.len(), internal.div_ceil(4))?;
+        length("mask", self.mask.len(), nodes.div_ceil(4))?;
         length("BV", self.boxes.as_ref().map_or(nodes, Vec::len), nodes)?;
         let tail = |words: &[u32], used: usize| used == 0 || words.last().is_none_or(|w| w >> used == 0);
         rule(tail(&self.boundary, nodes % 32), || format!("BF has bits past node {nodes}"))?;
-        rule(tail(&self.mask, internal % 4 * 8), || format!("mask has bits past internal node {internal}"))
+        rule(tail(&self.mask, nodes % 4 * 8), || format!("mask has bits past node {nodes}"))
     }
 
     /// NO: one root; every level has at least a node and at most 8 per node above.
@@ -135,7 +139,7 @@ impl TreeArrays {
         rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))
     }
 
-    /// P: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
+    /// P and the halves of its entries: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
     /// duplicates, as often as there are pairs, is every pair once.
     fn check_lists(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let vertices = Vertices::new(mesh, &self.grid);
@@ -152,6 +156,9 @@ impl TreeArrays {
                 let ids = mesh.tets[p as usize];
                 let belongs = vertices.cells(ids, self.grid.level).contains(cell) && stage.lists(p)(cell);
                 rule(belongs, || format!("{}: by the assignment {} it does not belong there", at(), self.assign))?;
+                let found = self.halves.get(slots.start + i).map(|&halves| u32::from(halves));
+                let expected = halves_near(&self.grid, codes[leaf as usize], &vertices.cells(ids, MAX_LEVEL));
+                rule(found.is_none_or(|halves| halves == expected), || format!("{}: near halves {found:?}, not {expected}", at()))?;
             }
             Ok(())
         };
@@ -161,7 +168,7 @@ impl TreeArrays {
         rule(pairs == n_m as u64, || format!("P has {n_m} entries, the assignment {} makes {pairs}", self.assign))
     }
 
-    /// BF: a leaf's flag is 0 if its cell is touched, and by no boundary primitive; others' says whether a child has it.
+    /// BF: a leaf's flag is 0 if its cell is touched, and by no boundary primitive; others' says whether a child has it. Masks of the leaves.
     fn check_flags(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let internal = self.internal_nodes();
         let vertices = Vertices::new(mesh, &self.grid);
@@ -172,7 +179,12 @@ impl TreeArrays {
                 flag(self.primitives(j), codes[j as usize], self.lists, mesh, topology, &vertices, &self.grid)
             };
             let what = if j < internal { "children" } else { "primitives" };
-            rule(self.is_boundary(j) == expected, || format!("BF[{j}] = {}, its {what} say {expected}", !expected))
+            rule(self.is_boundary(j) == expected, || format!("BF[{j}] = {}, its {what} say {expected}", !expected))?;
+            if j < internal {
+                return Ok(());
+            }
+            let (mask, expected) = (self.mask_of(j), octants(self.entries(j), expected, &self.halves));
+            rule(mask == expected, || format!("mask of leaf {j} is {mask:#010b}, its entries say {expected:#010b}"))
         };
         (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)
     }

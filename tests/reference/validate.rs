@@ -3,8 +3,9 @@
 use super::{prepared, tree};
 use olbvh::Error;
 use olbvh::mesh::{Mesh, kuhn_jittered};
-use olbvh::options::Assign;
+use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::boundary::Topology;
+use olbvh::reference::build::build;
 use olbvh::tree::TreeArrays;
 
 fn valid(assign: Assign) -> (Mesh, Topology, TreeArrays) {
@@ -68,6 +69,21 @@ fn children() {
 fn masks() {
     breaks(Assign::Aabb, "mask of node 0", |t| t.mask[0] &= !1);
     breaks(Assign::Aabb, "mask of node 5", |t| t.mask[1] &= !(1 << 8));
+    breaks(Assign::Aabb, "mask of leaf", |t| *t.mask.last_mut().unwrap() &= !1);
+}
+
+#[test]
+fn halves() {
+    let (mesh, topology) = prepared(kuhn_jittered([7, 5, 6], 0.2, 4).unwrap());
+    let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    tree.validate(&mesh, &topology).unwrap();
+    let refused = |change: fn(&mut TreeArrays)| {
+        let mut broken = tree.clone();
+        change(&mut broken);
+        broken.validate(&mesh, &topology).unwrap_err().to_string()
+    };
+    assert!(refused(|t| t.halves.truncate(3)).contains("halves has 3 elements"));
+    assert!(refused(|t| t.halves[2] ^= 1 << 3).contains("near halves"));
 }
 
 #[test]

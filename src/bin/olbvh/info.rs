@@ -147,7 +147,7 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
             "CO" => "child offsets",
             "NO" => "level offsets",
             "BF" => "boundary flags",
-            "mask" => "child masks",
+            "mask" => "masks of children and octants",
             _ => "",
         };
         page.row(format_args!("{name:4} {what}"), bytes(n));
