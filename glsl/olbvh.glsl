@@ -113,7 +113,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     }
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? star[i] : primitive(i);
+        uint t = by_walk ? star[i] : listed_tet(i);
         if (!weights(load_tet(cells.at[t]), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
@@ -165,6 +165,6 @@ bool olbvh_is_boundary(Node node) { return is_boundary_node(node.index); }
 
 uvec2 olbvh_entries(Node node) { return entry_range(node.index); }
 
-uint olbvh_primitive(uint entry) { return primitive(entry); }
+uint olbvh_primitive(uint entry) { return listed_tet(entry); }
 #endif
 #endif

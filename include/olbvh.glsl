@@ -491,7 +491,7 @@ uint olbvh_find_leaf(uint level, uvec3 finest) {
 }
 
 // The primitive of an entry; the bits above are halves.
-uint olbvh_primitive(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
+uint olbvh_listed_tet(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.
 uvec2 olbvh_entry_range(uint leaf) {
@@ -857,14 +857,14 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
 // Where a stride through a leaf with these entries begins.
-uint olbvh_middle_of(uvec2 range) { return olbvh_primitive(range.x + (range.y - range.x) / 2u); }
+uint olbvh_middle_of(uvec2 range) { return olbvh_listed_tet(range.x + (range.y - range.x) / 2u); }
 
 // The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
     olbvh_Room room;
     room.half_size = olbvh_half_cell(g, g.level);
     room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-    return olbvh_walk_from_seed(olbvh_primitive(range.x), room, x);
+    return olbvh_walk_from_seed(olbvh_listed_tet(range.x), room, x);
 }
 
 // The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
@@ -931,7 +931,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     }
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? olbvh_star[i] : olbvh_primitive(i);
+        uint t = by_walk ? olbvh_star[i] : olbvh_listed_tet(i);
         if (!olbvh_weights(olbvh_load_tet(olbvh_cells.at[t]), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
@@ -1064,6 +1064,6 @@ bool olbvh_is_boundary(olbvh_Node node) { return olbvh_is_boundary_node(node.ind
 
 uvec2 olbvh_entries(olbvh_Node node) { return olbvh_entry_range(node.index); }
 
-uint olbvh_primitive(uint entry) { return olbvh_primitive(entry); }
+uint olbvh_primitive(uint entry) { return olbvh_listed_tet(entry); }
 #endif
 #endif

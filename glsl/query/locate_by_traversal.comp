@@ -58,7 +58,7 @@ void main() {
         Best best = walked(g, leaf_found, range, at, x);
         uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + 32000u);
         for (uint i = range.x; i < end && !best.inside; ++i) {
-            uint t = primitive(i);
+            uint t = listed_tet(i);
             Tet tet = load_tet(cells.at[t]);
             consider(best, t, tet, weights(tet, x));
         }

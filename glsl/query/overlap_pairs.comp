@@ -78,7 +78,7 @@ void main() {
                 uvec2 range = entry_range(leaf);
                 uint begin = range.x + state.entry, end = min(range.y, begin + max(BUDGET - min(work, BUDGET), 1u));
                 for (uint e = begin; e < end; ++e) {
-                    uint b = primitive(e);
+                    uint b = listed_tet(e);
                     RawTet other = other_tet(b);
                     if (!compared_in(g, at.code, own, other)) continue;
                     vec3 w[4];

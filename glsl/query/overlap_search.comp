@@ -94,7 +94,7 @@ void main() {
                     uvec2 range = entry_range(leaf);
                     uint begin = range.x + state.entry, end = min(range.y, begin + max(BUDGET - min(work, BUDGET), 1u)), e = begin;
                     for (; e < end && !found; ++e) {
-                        RawTet other = other_tet(primitive(e));
+                        RawTet other = other_tet(listed_tet(e));
                         if (!compared_in(g, at.code, own, other)) continue;
                         vec3 w[4];
                         to_joint(other, w);

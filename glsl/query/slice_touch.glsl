@@ -98,7 +98,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
         uvec2 range = entry_range(leaf);
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
         for (uint e = from; e < to; ++e) {
-            uint t = primitive(e);
+            uint t = listed_tet(e);
             if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) measure(t);
         }
         work += to - from;

@@ -7,14 +7,14 @@
 bool walks_in(uint leaf, uvec2 range) { return LISTS != 0u && range.x < range.y && !is_boundary_node(leaf); }
 
 // Where a stride through a leaf with these entries begins.
-uint middle_of(uvec2 range) { return primitive(range.x + (range.y - range.x) / 2u); }
+uint middle_of(uvec2 range) { return listed_tet(range.x + (range.y - range.x) / 2u); }
 
 // The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
 Best walked_through(Grid g, uvec2 range, vec3 at, vec3 x) {
     Room room;
     room.half_size = half_cell(g, g.level);
     room.centre = cell_centre(room.half_size, quantize(g, at) >> (MAX_LEVEL - g.level));
-    return walk_from_seed(primitive(range.x), room, x);
+    return walk_from_seed(listed_tet(range.x), room, x);
 }
 
 // The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,

@@ -10,7 +10,7 @@ uint find_leaf(uint level, uvec3 finest) {
 }
 
 // The primitive of an entry; the bits above are halves.
-uint primitive(uint entry) { return p.at[entry] & grid.at[0].ids; }
+uint listed_tet(uint entry) { return p.at[entry] & grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.
 uvec2 entry_range(uint leaf) {

@@ -120,7 +120,7 @@ fn an_empty_mesh_is_one_empty_leaf() {
         let TreeArrays { p, po, co, no, boundary, mask, .. } = &tree;
         assert_eq!(
             (&p[..], &po[..], &co[..], &no[..], &boundary[..], &mask[..]),
-            (&[][..], &[0, 0][..], &[0][..], &[1][..], &[0][..], &[][..])
+            (&[][..], &[0, 0][..], &[0][..], &[1][..], &[0][..], &[0][..])
         );
         assert_eq!(tree.validate(&mesh, &topology).unwrap().leaves, 1);
     }
@@ -173,7 +173,7 @@ fn levels_children_and_memory_agree() {
     let (n_m, n_n, n_ni) = (tree.p.len() as u64, u64::from(tree.nodes()), u64::from(tree.internal_nodes()));
     assert_eq!(
         memory.total(),
-        4 * (n_m + n_n + 2 + u64::from(tree.grid.level) + 1) + 4 * n_n.div_ceil(32) + 4 * n_ni.div_ceil(4) + 24 * n_n
+        4 * (n_m + n_n + 2 + u64::from(tree.grid.level) + 1) + 4 * n_n.div_ceil(32) + 4 * n_n.div_ceil(4) + 24 * n_n
     );
     assert_eq!(tree.memory().paper(), 4 * n_m + 25 * n_n + 4 * n_ni);
 }
