@@ -86,7 +86,7 @@ typedef struct olbvh_build_options {
    */
   uint32_t lists;
   /*
-   Most entries the tree may have; it gets coarser until it fits. 0: no limit.
+   Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
    */
   uint32_t capacity;
   /*

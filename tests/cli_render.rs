@@ -120,6 +120,12 @@ fn locate_finds_points_and_values() {
     for ending in ["npy", "npz", "vtu", "json"] {
         json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", &format!("o.{ending}"), "--device", "cpu"]);
     }
+    // Many points for the mesh: sorted, or in runs.
+    let table = |name: &str, more: &[&str]| {
+        json(folder.path(), &[&["locate", "kuhn:1,1,1", "p.csv", "-o", name, "--device", "cpu"], more].concat());
+        std::fs::read_to_string(folder.path().join(name)).unwrap()
+    };
+    assert_eq!(table("a.csv", &[]), table("b.csv", &["--coherent"]));
 }
 
 #[test]
@@ -180,9 +186,9 @@ fn bad_files_end_with_3_and_are_named() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("bad.vtu"), "<VTKFile type=\"UnstructuredGrid\"><Unstruct").unwrap();
     std::fs::write(folder.path().join("p.csv"), "x,y\n1,2\n").unwrap();
-    for mesh in ["bad.vtu", "missing.vtu", "."] {
+    for (mesh, part) in [("bad.vtu", "bad.vtu"), ("missing.vtu", "missing.vtu"), (".", "folder; name a file in it (.vtu")] {
         let message = fails(folder.path(), 3, &["info", mesh, "--device", "cpu"]);
-        assert!(message.contains(mesh), "{message}");
+        assert!(message.contains(part), "{message}");
     }
     fails(folder.path(), 3, &["locate", "kuhn:2,2,2", "p.csv", "-o", "o.csv", "--device", "cpu"]);
     fails(folder.path(), 3, &["render", "kuhn:2,2,2", "-o", "a.png", "--tf", "missing.json"]);

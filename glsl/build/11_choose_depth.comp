@@ -8,8 +8,8 @@ ARGUMENTS(4)
     uint tets;
     uint alpha;    // in units of 1/65536
     uint capacity; // most entries
-    uint usual;    // most per valid tetrahedron,
-    uint least;    // but as many as this
+    uint per_tet;  // most entries per valid tetrahedron,
+    uint ample;    // unless there are no more than these
     uint deepest;  // most levels
     uint budget[2]; // most words of all arrays, low word first
     uint box_words; // per node
@@ -65,8 +65,8 @@ void main() {
     status.at[0].heuristic_level = level;
     level = min(level, deepest);
     uvec2 most;
-    umulExtended(valid, usual, most.y, most.x);
-    if (less_equal(most, uvec2(least, 0u))) most = uvec2(least, 0u);
+    umulExtended(valid, per_tet, most.y, most.x);
+    if (less_equal(most, uvec2(ample, 0u))) most = uvec2(ample, 0u);
     while (level > 0u && !fits(level, most)) level -= 1u;
     if (!fits(level, most)) status.at[0].overflow = 1u;
     uint n = status.at[0].overflow != 0u ? 0u : status.at[0].total[2u * level];

@@ -17,7 +17,7 @@ BUFFER(3, readonly, uint, bad)
 BUFFER16(4, readonly, vec4, vertices)
 BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
 BUFFER(6, readonly, uint, shares)  // their number
-BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves, and a word more; zeroed
+BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves; zeroed
 BUFFER(8, readonly, uint, boundary)
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"

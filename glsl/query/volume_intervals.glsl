@@ -123,8 +123,8 @@ void main() {
         // Too many nodes to visit: all of the bounds, which holds every leaf.
         if (!visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
         if (first <= last) {
-            precise float begin = floor(max(first * view.inverse_step - 1.5, 0.0));
-            precise float end = floor(max(last * view.inverse_step + 1.5, 0.0));
+            precise float begin = floor(clamp(first * view.inverse_step - 1.5, 0.0, MAX_SAMPLES));
+            precise float end = floor(clamp(last * view.inverse_step + 1.5, 0.0, MAX_SAMPLES));
             state.next = uint(begin);
             state.end = uint(end);
         }

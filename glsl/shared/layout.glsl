@@ -79,7 +79,7 @@ struct RayState {
     uint best;      // Best candidate among them, or all ones.
     float smallest; // Its smallest barycentric coordinate.
     uint last;      // Bits of the value at the last sample, for iso-surfaces; all ones where it has none.
-    uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits tell of the best candidate.
+    uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits, which no sample needs, tell of the best candidate.
 };
 
 // Counters of a picture; 64 bits as two words, low first.

@@ -35,6 +35,8 @@ vec3 inverse_of(vec3 way) {
     return r;
 }
 
+const float MAX_SAMPLES = 8388608.0; // of a ray: beyond, k + 1/2 is not exact, and the march keeps flags in numbers from bit 30 on
+
 // Where a sample lies.
 vec3 sample_at(RenderView view, vec3 origin, vec3 way, uint k) {
     precise float t = (float(k) + 0.5) * view.step_size;

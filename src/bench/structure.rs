@@ -104,15 +104,16 @@ impl Structure {
         }
     }
 
-    /// Locates points in the way that suits those of `quantity`: where leaves within the mesh have no lists, points in no order sorted, samples
-    /// of rays in runs.
+    /// Locates points in the way that suits those of `quantity`: samples of rays each by itself, as the paper does; others, where leaves within the mesh
+    /// have no lists, as [`Path::suited`] says.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
+                let suited = |in_order| Path::suited(points.len(), mesh.input().tets as usize, in_order);
                 let path = match (quantity, tree.memory().lists) {
                     (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => Path::Traversal(8),
-                    (Quantity::LocateRandom, Lists::Boundary) => Path::Sorted,
-                    (Quantity::LocateSamples, Lists::Boundary) => Path::Runs,
+                    (Quantity::LocateRandom, Lists::Boundary) => suited(false),
+                    (Quantity::LocateCoherent, Lists::Boundary) => suited(true),
                     _ => Path::Descent,
                 };
                 query::locate(mesh, tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, &|_, _| {})

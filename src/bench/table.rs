@@ -15,13 +15,13 @@ impl Table {
     pub fn text(&self, out: &mut String) {
         let Self { title, header, rows } = self;
         let width = |c: usize| rows.iter().chain([header]).filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-        let widths: Vec<usize> = (0..header.len()).map(width).collect();
+        // More is not a width to `write!`.
+        let widths: Vec<usize> = (0..header.len()).map(|c| width(c).min(usize::from(u16::MAX))).collect();
         let _ = writeln!(out, "\n{title}");
         for row in std::iter::once(header).chain(rows) {
-            let room = |cell: &str, width: usize| " ".repeat(width.saturating_sub(cell.chars().count()));
-            let mut line = format!("  {}{}", row[0], room(&row[0], widths[0]));
+            let mut line = format!("  {:<1$}", row[0], widths[0]);
             for (cell, &w) in row.iter().zip(&widths).skip(1) {
-                let _ = write!(line, "  {}{cell}", room(cell, w));
+                let _ = write!(line, "  {cell:>w$}");
             }
             let _ = writeln!(out, "{}", line.trim_end());
         }
@@ -181,7 +181,8 @@ fn heading(report: &Report) -> String {
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
          medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
-         trees with lists `boundary` sort random points, which is timed with their location, and take samples of rays in runs\n\
+         trees with lists `boundary` look for points near the one before where there is one to two tetrahedra or more (random ones are sorted for it, \
+         which is timed), and for samples of rays one by one, as all others do\n\
          copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
         suite.name(),

@@ -38,7 +38,7 @@ pub(crate) fn cmd_depth(
     let workgroup = r.gpu().target().each;
     let alpha = options.alpha_fixed()?;
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
-    let (usual, least) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
+    let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
     let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
     let (budget, box_words) = ([words as u32, (words >> 32) as u32], if options.boxes { 6 } else { 0 });
     r.stage("build.depth", |r| {
@@ -59,8 +59,8 @@ pub(crate) fn cmd_depth(
             tets,
             alpha,
             capacity,
-            usual,
-            least,
+            per_tet,
+            ample,
             deepest,
             budget,
             box_words,
@@ -100,22 +100,21 @@ pub(crate) fn cmd_filter(
 ) -> Result<()> {
     let MeshInput { cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
-    let first = Groups::Count(tets.div_ceil(workgroup));
     r.stage("build.filter", |r| {
         if let Some(seeds) = &filter.seeds {
             r.fill(seeds.marks, 0);
             r.fill(seeds.doubt_count, 0);
         }
-        let shares = Count::device(filter.most, scratch.total);
-        let later = shares.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
+        let all = Count::device(filter.most, scratch.total);
+        let later = all.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
         let nothing = r.gpu().nothing();
         let SeedScratch { marks, doubts, doubt_count } =
             filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
         let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
-        let (quantized, offsets, shares_word, capacity) = (vertices, scratch.offsets, scratch.total, filter.most);
+        let (quantized, offsets, shares, capacity) = (vertices, scratch.offsets, scratch.total, filter.most);
         let (hits, counts) = (filter.hits, filter.counts);
         if filter.seeds.is_some() {
-            let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares: shares_word, marks, boundary, tets, capacity };
+            let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
             let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
             r.dispatch(&mark, spec, Groups::Count(tets.div_ceil(32).div_ceil(workgroup)))?;
             r.barrier("codes.mark → codes.mark_later");
@@ -129,7 +128,7 @@ pub(crate) fn cmd_filter(
             bad,
             vertices,
             offsets,
-            shares: shares_word,
+            shares,
             hits,
             counts,
             marks,
@@ -140,7 +139,7 @@ pub(crate) fn cmd_filter(
             capacity,
         };
         let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
-        r.dispatch(&arguments, spec, first)?;
+        r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup)))?;
         r.barrier("codes.filter → codes.filter_later");
         r.dispatch(&arguments, FilterSpec { later: 1, ..spec }, later)?;
         if filter.seeds.is_some() {
@@ -164,7 +163,7 @@ pub(crate) fn cmd_filter(
             };
             r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
         }
-        cmd_exclusive_scan(r, counts, counts, filter.entries, shares, &filter.scan)
+        cmd_exclusive_scan(r, counts, counts, filter.entries, all, &filter.scan)
     })
 }
 

@@ -69,7 +69,7 @@ pub struct OlbvhBuildOptions {
     pub assign: u32,
     /// 0: all primitives are listed (the paper). 1: where the surface is, seeds and walks elsewhere.
     pub lists: u32,
-    /// Most entries the tree may have; it gets coarser until it fits. 0: no limit.
+    /// Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
     pub capacity: u32,
     /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
     pub budget: u64,

@@ -16,6 +16,8 @@ pub(crate) enum Format {
     TetGen,
 }
 
+/// Endings of the formats.
+pub(crate) const READABLE: &str = ".vtu, .vtk, .msh, .mesh, .meshb, .node with .ele";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 
 /// The format of a file; an error that names what was found if it cannot be read.
@@ -54,14 +56,8 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
         "mesh" | "meshb" => Ok(Format::Medit),
         "node" | "ele" => Ok(Format::TetGen),
         "inp" => Err(source.error(format!("looks like AVS UCD, which cannot be read; {CONVERT}"))),
-        "" => Err(source
-            .error("its content is not recognised, and it has no ending; readable are .vtu, .vtk, .msh, .mesh, .meshb, .node with .ele")),
-        other => {
-            let message = format!(
-                "neither its content nor the ending .{other} is one of .vtu, .vtk, .msh, .mesh, .meshb, .node with .ele; {CONVERT}"
-            );
-            Err(source.error(message))
-        }
+        "" => Err(source.error(format!("its content is not recognised, and it has no ending; readable are {READABLE}"))),
+        other => Err(source.error(format!("neither its content nor the ending .{other} is one of {READABLE}; {CONVERT}"))),
     }
 }
 

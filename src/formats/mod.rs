@@ -82,7 +82,7 @@ pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
     if let Some(made) = path.to_str().and_then(procedural::make) {
         return made.map(|(format, mesh)| procedural::loaded(format, mesh, start));
     }
-    read(&Source::read(path)?, options, start)
+    read(&Source::read(path, detect::READABLE)?, options, start)
 }
 
 /// Reads a mesh from the content of a file; `name` stands for it in messages and gives its ending. The second file of TetGen's pairs

@@ -13,7 +13,7 @@ use crate::error::Result;
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
 pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
-    let source = Source::read(path.as_ref())?;
+    let source = Source::read(path.as_ref(), ".npy or a table of text")?;
     if source.bytes.starts_with(npy::MAGIC) {
         return npy::read_points(&source);
     }

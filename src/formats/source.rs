@@ -13,10 +13,14 @@ pub(crate) struct Source {
 }
 
 impl Source {
-    /// Reads the whole file. A memory map would save the copy, but a map of a file that another process cuts short kills this one.
-    pub fn read(path: &Path) -> Result<Self> {
-        let bytes = std::fs::read(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        Ok(Self::new(path, bytes))
+    /// Reads the whole file, of which `kinds` are understood. A memory map would save the copy, but a map of a file that another process cuts short kills
+    /// this one.
+    pub fn read(path: &Path, kinds: &str) -> Result<Self> {
+        match std::fs::read(path) {
+            Ok(bytes) => Ok(Self::new(path, bytes)),
+            Err(_) if path.is_dir() => Err(Self::new(path, Vec::new()).error(format!("a folder; name a file in it ({kinds})"))),
+            Err(source) => Err(Error::Io { path: path.into(), source }),
+        }
     }
 
     /// The content of a file.

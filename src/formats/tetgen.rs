@@ -13,7 +13,7 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
     let other = if ending(&source.path) == "node" { "ele" } else { "node" };
     let upper = source.path.extension().is_some_and(|e| e.to_string_lossy().chars().all(|c| c.is_ascii_uppercase()));
     let path = source.path.with_extension(if upper { other.to_ascii_uppercase() } else { other.to_owned() });
-    Source::read(&path).map_err(|error| {
+    Source::read(&path, other).map_err(|error| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         source.error(format!("`{name}` is needed beside it ({error})"))
     })

@@ -124,6 +124,21 @@ impl Camera {
         camera
     }
 
+    /// How far from its origin a ray of [`Camera::rays`] can meet the box: no farther than this.
+    pub(crate) fn reach(&self, size: [u32; 2], bounds: &Bounds) -> f64 {
+        let depth = |p: DVec3| (p - self.eye).dot(self.forward);
+        let corners = bounds.corners();
+        let [near, far] = corners.into_iter().map(depth).fold([f64::MAX, f64::MIN], |[lo, hi], d| [lo.min(d), hi.max(d)]);
+        let Projection::Perspective(degrees) = self.projection else { return far - near };
+        let (near, [w, h]) = (near.max(0.0), size.map(f64::from));
+        if far <= near {
+            return 0.0;
+        }
+        let slope = (degrees.to_radians() * 0.5).tan() * (w / h).hypot(1.0);
+        let distance = corners.into_iter().map(|p| p.distance(self.eye)).fold(0.0, f64::max);
+        (distance * (1.0 - near / far)).min(slope.hypot(1.0) * (far - near))
+    }
+
     /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the nearest corner of
     /// `bounds`, or at the eye where that lies behind it, so that single precision is spent on the mesh and not on the way to it.
     pub fn rays(&self, size: [u32; 2], bounds: &Bounds) -> RayGrid {

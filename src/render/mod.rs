@@ -27,7 +27,7 @@ pub mod transfer;
 
 pub use auto::auto_opacity;
 pub use camera::{Bounds, Camera, CameraSpec, Projection, RayGrid};
-pub use plan::{Plan, Prepared, TABLE_SIZE, interval_slack};
+pub use plan::{MAX_SAMPLES, Plan, Prepared, TABLE_SIZE, interval_slack};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
 pub use transfer::TransferFunction;

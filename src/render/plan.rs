@@ -13,6 +13,8 @@ use glam::DVec3;
 pub const TABLE_SIZE: usize = 1024;
 /// A step is at least this part of the diagonal: sample numbers stay exact in single precision.
 const MIN_STEP: f64 = 1.0 / 65_536.0;
+/// Samples of a ray end here, where `k + ½` is no longer exact in single precision; the kernels keep flags from bit 30 on.
+pub const MAX_SAMPLES: u32 = 1 << 23;
 
 /// What is drawn.
 #[derive(Clone, Debug, PartialEq)]
@@ -45,7 +47,8 @@ impl Plan {
     /// Works out `settings` for a mesh with these bounds, whose coordinates are relative to `origin`, and a field with this range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a setting makes no sense, or the step is below 1/65,536 of the diagonal.
+    /// [`Error::Invalid`] if a setting makes no sense, the step is below 1/65,536 of the diagonal, or the camera sees the mesh at an angle so flat that a ray
+    /// would have more than [`MAX_SAMPLES`].
     pub fn new(settings: &RenderSettings, bounds: &Bounds, origin: [f64; 3], field_range: Option<[f32; 2]>) -> Result<Self> {
         settings.check()?;
         let [width, height] = settings.size.map(f64::from);
@@ -65,6 +68,14 @@ impl Plan {
             return Err(Error::Invalid(format!(
                 "a step of {step} is too small for a mesh of diagonal {diagonal}; take at least {}",
                 diagonal * MIN_STEP
+            )));
+        }
+        let reach = camera.reach(settings.size, bounds);
+        if reach > step * f64::from(MAX_SAMPLES) {
+            return Err(Error::Invalid(format!(
+                "rays that reach the mesh after {:.0} steps of {step}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a smaller angle or a step of {} or more",
+                reach / step,
+                reach / f64::from(MAX_SAMPLES)
             )));
         }
         let [right, up, back] = settings.light.map(f64::from);
@@ -249,7 +260,7 @@ fn value_range(range: Option<[f32; 2]>) -> [f64; 2] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::TransferFunction;
+    use crate::render::{Projection, TransferFunction};
 
     const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
 
@@ -287,6 +298,21 @@ mod tests {
         }
         let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], Some([5.0, 5.0])).unwrap();
         assert_eq!(((5.0 - plan.value_lo) * plan.value_scale * 10.0).round(), 5.0);
+    }
+
+    #[test]
+    fn sample_numbers_are_held_down() {
+        let camera = |eye: [f64; 3], target: [f64; 3]| {
+            Camera::look_at(DVec3::from_array(eye), DVec3::from_array(target), DVec3::Z, Projection::Perspective(179.0)).unwrap()
+        };
+        let plan = |camera: &Camera, step: f64| {
+            let settings = RenderSettings { size: [16_384, 1], step: Some(step), ..RenderSettings::default() };
+            Plan::with_camera(&settings, camera, &BOX, None)
+        };
+        // Far beside the box, seen along the edge of a picture that is all width; and as far before it.
+        let (beside, before) = (camera([1e7, 0.0, 6.0], [1e7, 1.0, 6.0]), camera([1e7, 2.0, 6.0], [0.0, 2.0, 6.0]));
+        assert!(plan(&beside, 0.1).unwrap_err().to_string().contains("step of 0.89"));
+        assert!(plan(&beside, 0.9).is_ok() && plan(&before, 0.1).is_ok());
     }
 
     #[test]

@@ -92,7 +92,7 @@ pub fn shading_normals(
     bounds: &Bounds,
 ) -> Vec<[f32; 3]> {
     let span = f64::from(range[1]) - f64::from(range[0]);
-    let steep = if span > 0.0 { STEEP * bounds.diagonal() / span / bounds.diagonal() } else { 0.0 };
+    let steep = if span > 0.0 { STEEP / span } else { 0.0 };
     normals(mesh, |tet, face| neighbours.get(tet).is_some_and(|across| across[face] == u32::MAX), valid, field, steep, bounds)
 }
 

@@ -24,8 +24,8 @@ Examples:
 Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it; ids count the cells of
 the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order.
 A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json.
-Points are located along a Z curve, since each is looked for near the one before; --order given takes them as they come, which saves the sorting where
-they follow each other closely anyway, as samples of a line or a scan do. The answers are the same, and stand in the order of the points in any case.
+Where there is a point to every two cells or more, each is looked for near the one before, along a Z curve; --coherent takes them as they come, which
+saves the sorting. The answers are the same, and stand in the order of the points in any case.
 With --all the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
 pub struct Args {
     /// Mesh file, or kuhn:NX,NY,NZ.
@@ -44,20 +44,11 @@ pub struct Args {
     /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
     #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T")]
     tolerance: f32,
-    /// In which order points are located.
-    #[arg(long, value_enum, default_value_t = Order::Sorted, conflicts_with = "all")]
-    order: Order,
+    /// Each point lies near the one before, as samples of a line or a scan do; without, no order is assumed.
+    #[arg(long, conflicts_with = "all")]
+    coherent: bool,
     #[command(flatten)]
     tree: TreeArgs,
-}
-
-/// An order of points.
-#[derive(Clone, Copy, clap::ValueEnum)]
-enum Order {
-    /// Along a Z curve.
-    Sorted,
-    /// That of the file.
-    Given,
 }
 
 /// What is said in the end.
@@ -88,10 +79,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let done = if args.all {
         every_owner(args, format, mesh, &*built, &local, &report)?
     } else {
-        let path = match args.order {
-            Order::Sorted => query::Path::Sorted,
-            Order::Given => query::Path::Runs,
-        };
+        let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
         let located = built.locate(&local, field, &LocateOptions { path, tolerance: args.tolerance }, &report)?;
         let seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();

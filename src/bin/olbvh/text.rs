@@ -28,15 +28,10 @@ impl std::fmt::Display for Page {
         let valued = self.rows.iter().filter(|row| !row.1.is_empty());
         let width = valued.map(|row| row.0.chars().count()).filter(|&n| n <= ALIGNED).max().unwrap_or(0);
         for (label, value) in &self.rows {
-            if value.is_empty() { writeln!(f, "{label}")? } else { writeln!(f, "{}  {value}", padded(label, width))? }
+            if value.is_empty() { writeln!(f, "{label}")? } else { writeln!(f, "{label:<width$}  {value}")? }
         }
         Ok(())
     }
-}
-
-/// Text with spaces behind it up to a width.
-fn padded(text: &str, width: usize) -> String {
-    text.to_owned() + &" ".repeat(width.saturating_sub(text.chars().count()))
 }
 
 /// 12290298 as 12,290,298.

@@ -3,7 +3,7 @@
 use super::skip::inverse_of;
 use crate::reference::boundary::bit;
 use crate::reference::leaves::{Box6, cell_box};
-use crate::render::{Plan, interval_slack};
+use crate::render::{MAX_SAMPLES, Plan, interval_slack};
 use crate::tree::TreeArrays;
 
 /// Ray intervals of a plan.
@@ -56,8 +56,8 @@ impl<'a> Intervals<'a> {
             return [0, 0];
         }
         // Sample k lies at (k + ½)·Δ.
-        let begin = (first * self.inverse_step - 1.5).max(0.0).floor();
-        let end = (last * self.inverse_step + 1.5).max(0.0).floor();
+        let number = |x: f32| x.clamp(0.0, MAX_SAMPLES as f32).floor();
+        let (begin, end) = (number(first * self.inverse_step - 1.5), number(last * self.inverse_step + 1.5));
         [begin as u32, end as u32]
     }
 
