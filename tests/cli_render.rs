@@ -117,6 +117,8 @@ fn locate_finds_points_and_values() {
     let table = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
     let of = |point: &str| table.lines().filter(|l| l.starts_with(point)).count();
     assert_eq!((of("0,"), of("1,"), of("2,")), (1, 0, 24), "one cell, none, all round an inner vertex: {table}");
+    json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "again.csv", "--all", "--reorder", "--device", "cpu"]);
+    assert_eq!(table, std::fs::read_to_string(folder.path().join("again.csv")).unwrap());
     for ending in ["npy", "npz", "vtu", "json"] {
         json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", &format!("o.{ending}"), "--device", "cpu"]);
     }

@@ -158,7 +158,7 @@ pub struct DeviceMesh {
 }
 
 impl DeviceMesh {
-    /// Uploads a mesh and prepares it.
+    /// Uploads a mesh and prepares it; one whose cells are in no order is faster as [`Mesh::along_curve`] gives it.
     ///
     /// # Errors
     /// [`Error::Memory`], [`Error::TooLarge`], or [`Error::BadCells`] if the policy rejects them.

@@ -195,7 +195,7 @@ impl<'a> Assembly<'a> {
         };
         let plain = self.n_cells == self.tets.len() && self.ids.iter().enumerate().all(|(i, &id)| i == id as usize);
         let cell_ids = (!plain).then_some(self.ids);
-        Ok((Mesh { points, tets: self.tets, cell_ids, source_cells: self.n_cells as u32, fields, origin }, report))
+        Ok((Mesh { points, tets: self.tets, cell_ids, point_ids: None, source_cells: self.n_cells as u32, fields, origin }, report))
     }
 
     /// Which points a tetrahedron uses; an error if one of them is not finite.

@@ -16,6 +16,8 @@ pub struct Mesh {
     /// For each tetrahedron the id of the cell it came from (cells of a file count from 0, all types included; a hexahedron becomes several
     /// tetrahedra with one id). `None`: tetrahedron `i` is cell `i`.
     pub cell_ids: Option<Vec<u32>>,
+    /// For each point its number in the source, where the order is another one. `None`: point `i` is point `i`.
+    pub point_ids: Option<Vec<u32>>,
     /// Number of cells of the source, those that are no tetrahedra included; equals `tets.len()` without `cell_ids`.
     pub source_cells: u32,
     /// Scalar fields.
@@ -65,6 +67,11 @@ impl Mesh {
     /// The id that the source gave the cell of tetrahedron `tet`.
     pub fn cell_id(&self, tet: u32) -> u32 {
         self.cell_ids.as_ref().map_or(tet, |ids| ids[tet as usize])
+    }
+
+    /// The number that the source gave a point.
+    pub fn point_id(&self, point: u32) -> u32 {
+        self.point_ids.as_ref().map_or(point, |ids| ids[point as usize])
     }
 
     /// The field of that name.

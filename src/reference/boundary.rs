@@ -133,15 +133,26 @@ fn words(n: usize, answer: &(dyn Fn(u32) -> bool + Sync)) -> Vec<u32> {
     (0..n.div_ceil(32)).into_par_iter().map(word).collect()
 }
 
-/// Why a tetrahedron is bad; `None` if it is not.
+/// The grid over the vertices that valid cells use, at the finest level: that of the [`Topology`].
+pub fn valid_grid(mesh: &Mesh) -> Grid {
+    let (lo, hi) = bounds(mesh, &words(mesh.tets.len(), &|t| fault_of(mesh, t).is_none()));
+    Grid::new(lo, hi)
+}
+
+/// Whether a point can be computed with.
+pub fn is_usable(p: [f32; 3]) -> bool {
+    p.iter().all(|x| x.abs() < COORDINATE_LIMIT)
+}
+
+/// Why a tetrahedron is bad, with vertices as the source numbers them; `None` if it is not.
 pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
     let ids = mesh.tets.get(tet as usize)?;
     let repeated = |i: usize| ids[..i].contains(&ids[i]);
     let point = |v: u32| mesh.points.get(v as usize);
     let range = ids.iter().find(|&&v| point(v).is_none()).map(|&v| Fault::Index(v));
-    let range = range.or_else(|| (1..4).find(|&i| repeated(i)).map(|i| Fault::Repeated(ids[i])));
-    let usable = |v: u32| point(v).is_some_and(|p| p.iter().all(|x| x.abs() < COORDINATE_LIMIT));
-    range.or_else(|| ids.iter().find(|&&v| !usable(v)).map(|&v| Fault::Coordinate(v)))
+    let range = range.or_else(|| (1..4).find(|&i| repeated(i)).map(|i| Fault::Repeated(mesh.point_id(ids[i]))));
+    let usable = |v: u32| point(v).is_some_and(|&p| is_usable(p));
+    range.or_else(|| ids.iter().find(|&&v| !usable(v)).map(|&v| Fault::Coordinate(mesh.point_id(v))))
 }
 
 fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {

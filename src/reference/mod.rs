@@ -15,6 +15,7 @@ pub mod leaves;
 pub mod levels;
 pub mod locate;
 pub mod marks;
+pub mod order;
 pub mod overlap;
 pub mod ranges;
 pub mod separate;

@@ -8,6 +8,7 @@ mod claim;
 mod lists;
 mod locate;
 mod oracle;
+mod order;
 mod overlap;
 mod slice;
 mod slice_files;

@@ -2,7 +2,7 @@
 
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Engine, Shapes, Summary};
-use crate::input::{self, TreeArgs};
+use crate::input::TreeArgs;
 use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
@@ -35,7 +35,7 @@ pub struct Args {
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(true)?;
     let engine = engine::open(common)?;
-    let loaded = input::mesh(&args.mesh, common)?;
+    let loaded = args.tree.mesh(&args.mesh, common)?;
     let built = engine.build(&loaded.mesh, &options)?;
     let summary = built.summary();
     let json = json(args, engine.as_ref(), &loaded, summary);

@@ -21,8 +21,8 @@ Examples:
   olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
   olbvh locate bracket.vtu points.csv -o cells.csv --all      every cell, for points on faces, edges and vertices
 
-Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it; ids count the cells of
-the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order.
+Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder the first along
+the curve); ids count the cells of the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order.
 A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json.
 Where there is a point to every two cells or more, each is looked for near the one before, along a Z curve; --coherent takes them as they come, which
 saves the sorting. The answers are the same, and stand in the order of the points in any case.
@@ -66,7 +66,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, formats)?;
     let options = args.tree.options(false)?;
     let engine = engine::open(common)?;
-    let loaded = input::mesh(&args.mesh, common)?;
+    let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
     let points = load_points(&args.points).map_err(Failure::input)?;
@@ -119,13 +119,17 @@ fn every_owner(
     let start = Instant::now();
     let owners = built.locate_all(points, args.tolerance, report)?;
     let seconds = start.elapsed().as_secs_f64();
-    let rows: Vec<[u32; 2]> = (0..).zip(&owners).flat_map(|(i, owners)| owners.iter().map(move |&tet| [i, mesh.cell_id(tet)])).collect();
+    let cells = |tets: &Vec<u32>| {
+        let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    };
+    let owners: Vec<Vec<u32>> = owners.iter().map(cells).collect();
+    let rows: Vec<[u32; 2]> = (0..).zip(&owners).flat_map(|(i, cells)| cells.iter().map(move |&cell| [i, cell])).collect();
     match format {
         OutputFormat::Csv => write_rows(&args.output, &rows)?,
-        OutputFormat::Json => {
-            let cells: Vec<Vec<u32>> = owners.iter().map(|owners| owners.iter().map(|&tet| mesh.cell_id(tet)).collect()).collect();
-            write_json(&args.output, &json!({ "owners": cells }))?;
-        }
+        OutputFormat::Json => write_json(&args.output, &json!({ "owners": owners }))?,
         _ => write_npy(&args.output, &[rows.len(), 2], rows.as_flattened())?,
     }
     Ok(Done { found: owners.iter().filter(|o| !o.is_empty()).count(), seconds })

@@ -2,7 +2,7 @@
 
 use crate::common::{Common, Outcome};
 use crate::engine;
-use crate::input::{self, TreeArgs};
+use crate::input::TreeArgs;
 use crate::output::{self, Progress};
 use crate::slice::vector;
 use crate::text::{grouped, milliseconds};
@@ -55,8 +55,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         options.lists = Lists::All; // pairs are found by lists
     }
     let engine = engine::open(common)?;
-    let a = input::mesh(&args.a, common)?.mesh;
-    let mut b = input::mesh(&args.b, common)?.mesh;
+    let a = args.tree.mesh(&args.a, common)?.mesh;
+    let mut b = args.tree.mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;
     let progress = Progress::new(common, "overlap");
     let found = engine.overlap(&a, &b, &options, args.pairs, &|done, total| progress.set(done, total))?;
@@ -131,9 +131,11 @@ fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
     if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("B is moved beyond all bounds".into()).into()) }
 }
 
-/// Some cells of a mesh, with its points and fields.
+/// Some cells of a mesh, in the order of their ids, with its points and fields.
 fn part(mesh: &Mesh, tets: &[u32]) -> Mesh {
     let mut part = mesh.clone();
+    let mut tets = tets.to_vec();
+    tets.sort_by_key(|&t| mesh.cell_id(t));
     part.tets = tets.iter().map(|&t| mesh.tets[t as usize]).collect();
     part.cell_ids = Some(tets.iter().map(|&t| mesh.cell_id(t)).collect());
     for field in part.fields.iter_mut().filter(|f| f.on == On::Cells) {

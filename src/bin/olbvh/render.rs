@@ -100,7 +100,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let settings = args.settings()?;
     settings.check()?;
     let engine = engine::open(common)?;
-    let loaded = input::mesh(&args.mesh, common)?;
+    let loaded = args.tree.mesh(&args.mesh, common)?;
     let field = args.field(&loaded.mesh, common)?;
     let built = engine.build(&loaded.mesh, &options)?;
     let start = Instant::now();

@@ -93,7 +93,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let colors = TransferFunction::named(&args.tf)?;
     let options = args.tree.options(false)?;
     let engine = engine::open(common)?;
-    let loaded = input::mesh(&args.mesh, common)?;
+    let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
     let built = engine.build(mesh, &options)?;

@@ -114,7 +114,8 @@ fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Writes a mesh with its fields as `.vtu`. The ids of cells that were split become the array `cell_id`.
+/// Writes a mesh with its fields as `.vtu`. The ids of cells that were split or brought into another order become the array `cell_id`, those of points
+/// `point_id`.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if it cannot be written.
@@ -129,17 +130,11 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
         let fields = mesh.fields.iter().filter(|f| f.on == on);
         fields.map(|f| Column { name: &f.name, components: 1, block: Block::F32(&f.values) }).collect()
     };
-    let mut cell_data = columns(On::Cells);
-    if let Some(ids) = &mesh.cell_ids {
-        cell_data.push(Column { name: "cell_id", components: 1, block: Block::U32(ids) });
+    let (mut point_data, mut cell_data) = (columns(On::Points), columns(On::Cells));
+    for (name, ids, columns) in [("point_id", &mesh.point_ids, &mut point_data), ("cell_id", &mesh.cell_ids, &mut cell_data)] {
+        columns.extend(ids.as_ref().map(|ids| Column { name, components: 1, block: Block::U32(ids) }));
     }
-    let grid = Grid {
-        points,
-        connectivity: mesh.tets.as_flattened(),
-        ends: &ends,
-        types: &types,
-        point_data: &columns(On::Points),
-        cell_data: &cell_data,
-    };
+    let grid =
+        Grid { points, connectivity: mesh.tets.as_flattened(), ends: &ends, types: &types, point_data: &point_data, cell_data: &cell_data };
     write_file(path.as_ref(), |file| grid.write(file))
 }

@@ -1,0 +1,64 @@
+//! The order of a mesh in memory: along the Morton curve.
+
+use super::boundary::{fault_of, is_usable, valid_grid};
+use super::grid::morton;
+use crate::error::{Error, Result};
+use crate::mesh::{Mesh, On};
+use rayon::prelude::*;
+
+impl Mesh {
+    /// The same mesh with its tetrahedra along the Morton curve, by their centroids, and its points likewise; what has one code keeps its order. Bad cells
+    /// come last, and points that are not finite. [`Mesh::cell_ids`] and [`Mesh::point_ids`] name those of the source, as before; fields follow.
+    ///
+    /// Neighbours in space become neighbours in memory. A mesh of 1.5 million tetrahedra in no order took 15–50 % longer to locate points in and 25–30 %
+    /// longer to build over (lavapipe, Mesa 25) than along the curve; generators mostly give an order that is as good.
+    ///
+    /// Answers stay the same but for one: of the cells that share a face, edge or vertex, the first along the curve owns its points, not the lowest id.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] past 32-bit indices.
+    pub fn along_curve(mut self) -> Result<Self> {
+        if self.points.len().max(self.tets.len()) >= u32::MAX as usize {
+            let (tets, points) = (self.tets.len(), self.points.len());
+            return Err(Error::TooLarge(format!("{tets} tetrahedra on {points} points; 2^32 can be indexed")));
+        }
+        let grid = valid_grid(&self);
+        let code = |p: [f32; 3]| if is_usable(p) { morton(grid.quantize(p)) } else { u32::MAX };
+        let points = sorted(self.points.len(), |i| code(self.points[i as usize]));
+        let tets = sorted(self.tets.len(), |t| {
+            if fault_of(&self, t).is_some() {
+                return u32::MAX;
+            }
+            let [a, b, c, d] = self.tets[t as usize].map(|v| self.points[v as usize]);
+            code([0, 1, 2].map(|k| 0.25 * ((a[k] + b[k]) + (c[k] + d[k]))))
+        });
+        let mut place = vec![0; points.len()];
+        (0..).zip(&points).for_each(|(new, &old)| place[old as usize] = new);
+        // An index that is out of range stays so.
+        let moved = |v: u32| place.get(v as usize).copied().unwrap_or(v);
+        for field in &mut self.fields {
+            let order = if field.on == On::Points { &points } else { &tets };
+            if field.values.len() == order.len() {
+                field.values = take(&field.values, order);
+            }
+        }
+        Ok(Self {
+            points: take(&self.points, &points),
+            tets: tets.par_iter().map(|&t| self.tets[t as usize].map(moved)).collect(),
+            cell_ids: Some(tets.iter().map(|&t| self.cell_id(t)).collect()),
+            point_ids: Some(points.iter().map(|&p| self.point_id(p)).collect()),
+            ..self
+        })
+    }
+}
+
+/// The numbers below `n`, by their keys; equal ones ascending.
+fn sorted(n: usize, key: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
+    let mut pairs: Vec<(u32, u32)> = (0..n as u32).into_par_iter().map(|i| (key(i), i)).collect();
+    pairs.par_sort_unstable();
+    pairs.into_par_iter().map(|p| p.1).collect()
+}
+
+fn take<T: Copy + Send + Sync>(values: &[T], order: &[u32]) -> Vec<T> {
+    order.par_iter().map(|&i| values[i as usize]).collect()
+}
