@@ -19,7 +19,7 @@
 //! ```
 //!
 //! # Layers
-//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`], [`baseline`] ← conformance, `bench`, `formats` ← `tune` ← program.
+//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`] ← [`blocks`], [`baseline`] ← conformance, `bench`, `formats` ← `tune` ← program.
 //! [`mesh`], [`tree`], [`options`], [`layout`], [`render`] and [`mod@reference`] know no Vulkan.
 //!
 //! - **Record**: functions named `cmd_*` append to a [`gpu::Recorder`]: the caller's command buffer, the caller's memory, nothing submitted,
@@ -41,6 +41,7 @@ extern crate self as olbvh;
 pub mod baseline;
 #[cfg(feature = "cli")]
 pub mod bench;
+pub mod blocks;
 pub mod build;
 #[cfg(any(feature = "capi", test))]
 mod capi;

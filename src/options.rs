@@ -88,6 +88,8 @@ pub struct BuildOptions {
     /// Most bytes that the arrays of the tree may have together ([`crate::tree::Memory::total`]), α being the finest that is asked for: the tree gets
     /// coarser until it fits. What is held to the budget is [`crate::tree::Memory::most`], which is known before anything is built. `None`: no limit.
     pub budget: Option<u64>,
+    /// Level that the leaves should have, up to 10, whatever α and the size of the cells ask for; capacity and budget still hold. `None`: by α.
+    pub level: Option<u32>,
 }
 
 /// Entries per tetrahedron of the usual capacity; even cells have about 8 at α = 0.
@@ -103,7 +105,7 @@ pub fn usual_capacity(tets: u32) -> u32 {
 
 impl Default for BuildOptions {
     fn default() -> Self {
-        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::default(), boxes: false, capacity: None, budget: None }
+        Self { alpha: 0.0, assign: Assign::Aabb, lists: Lists::default(), boxes: false, capacity: None, budget: None, level: None }
     }
 }
 

@@ -41,6 +41,13 @@ fn usual(gpu: &Gpu) {
     let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
     assert_eq!((tree.status().heuristic_level, tree.status().level), (9, 4), "33·8^5 entries are more than 2^20");
     assert_eq!(tree.download().unwrap(), build(&mesh, &topology, &BuildOptions::default()).unwrap());
+    // A level that is asked for, coarser and finer than the cells ask for; capacities hold.
+    for (level, capacity, built) in [(2, None, 2), (10, None, 4), (10, Some(100_000), 3)] {
+        let options = BuildOptions { alpha: 1.5, level: Some(level), capacity, ..BuildOptions::default() };
+        let tree = Tree::build(gpu, &device, &options).unwrap();
+        assert_eq!(tree.status().level, built);
+        assert_eq!(tree.download().unwrap(), build(&mesh, &topology, &options).unwrap());
+    }
 }
 
 fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {

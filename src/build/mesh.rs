@@ -91,9 +91,22 @@ impl MeshScratch {
 /// # Errors
 /// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra; [`Error::Invalid`] for a stride below 3.
 pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
+    cmd_prepare(r, input, arrays, scratch, None)
+}
+
+/// As [`cmd_prepare_mesh`]; where there is a [`Grid`] already, over bounds that hold the mesh, with that one.
+fn cmd_prepare(
+    r: &mut Recorder<'_>,
+    input: &MeshInput,
+    arrays: &MeshArrays,
+    scratch: &MeshScratch,
+    given: Option<BufferRef>,
+) -> Result<()> {
     let MeshInput { positions, stride, points, cells, tets } = *input;
     if tets > MAX_TETS {
-        return Err(Error::TooLarge(format!("{tets} tetrahedra; one mesh holds {MAX_TETS} at most, build it in blocks")));
+        return Err(Error::TooLarge(format!(
+            "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks, see `blocks`"
+        )));
     }
     if stride < 3 {
         return Err(Error::Invalid(format!("positions {stride} floats apart; a point has three")));
@@ -114,7 +127,11 @@ pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshAr
         let spec = CheckCellsSpec { workgroup, ..Default::default() };
         r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, groups }, spec, Groups::Count(groups))?;
         r.barrier("mesh.check_cells → mesh.make_grid");
-        r.dispatch(&MakeGrid { status, grid, unused: 0 }, MakeGridSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
+        if let Some(given) = given {
+            r.copy(given, grid.part(0, given.size));
+        } else {
+            r.dispatch(&MakeGrid { status, grid, unused: 0 }, MakeGridSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
+        }
         r.barrier("mesh.make_grid → mesh.normalise_vertices");
         let spec = NormaliseVerticesSpec { workgroup, ..Default::default() };
         let groups = Groups::Count(points.div_ceil(workgroup));
@@ -163,6 +180,16 @@ impl DeviceMesh {
     /// # Errors
     /// [`Error::Memory`], [`Error::TooLarge`], or [`Error::BadCells`] if the policy rejects them.
     pub fn upload(gpu: &Gpu, mesh: &Mesh, policy: BadCells) -> Result<Self> {
+        Self::upload_in(gpu, mesh, policy, None)
+    }
+
+    /// The same; with a grid, that one at the finest level instead of the grid over the mesh's bounds, which lie within it. Parts of one mesh in one grid have
+    /// the same cells and the same normalised points.
+    ///
+    /// # Errors
+    /// As [`DeviceMesh::upload`].
+    pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
+        let given = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[*grid])).transpose()?;
         let positions = gpu.upload("olbvh.mesh.positions", &mesh.points)?;
         let cells = gpu.upload("olbvh.mesh.cells", &mesh.tets)?;
         let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
@@ -173,7 +200,7 @@ impl DeviceMesh {
         let carve = |a: &mut Arena| MeshScratch::carve(a, tets);
         let scratch_memory = gpu.buffer("olbvh.mesh.scratch", Arena::measure(carve)?)?;
         let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
-        let ((), time) = gpu.run("olbvh.mesh", |r| cmd_prepare_mesh(r, &input, &arrays, &scratch))?;
+        let ((), time) = gpu.run("olbvh.mesh", |r| cmd_prepare(r, &input, &arrays, &scratch, given.as_ref().map(Buffer::all)))?;
         let one = |v: Vec<MeshStatus>| v.first().copied().unwrap_or_default();
         let status = one(gpu.download(&memory, arrays.status.part(0, size_of::<MeshStatus>() as u64))?);
         let grid = gpu.download::<Grid>(&memory, arrays.grid.part(0, size_of::<Grid>() as u64))?.first().copied().unwrap_or_default();

@@ -24,6 +24,9 @@ pub struct MeshView {
     pub arrays: MeshArrays,
 }
 
+/// An α with which cells of any size ask for level 10, in units of 1/65536.
+const FINEST: i32 = -(11 << 16);
+
 /// Stage 1: the level of the leaves (§3.2; SPEC 2.4), into `grid` and `status`.
 pub(crate) fn cmd_depth(
     r: &mut Recorder<'_>,
@@ -36,7 +39,9 @@ pub(crate) fn cmd_depth(
 ) -> Result<()> {
     let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
-    let alpha = options.alpha_fixed()?;
+    let fixed = options.alpha_fixed()?;
+    // A level that is asked for is the deepest, and an α below 0 wants the deepest whatever the cells.
+    let (alpha, deepest) = options.level.map_or((fixed, deepest), |level| (FINEST.cast_unsigned(), deepest.min(level)));
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
     let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
     let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);

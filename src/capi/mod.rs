@@ -85,6 +85,7 @@ impl OlbvhBuildOptions {
             boxes: false,
             capacity: (self.capacity != 0).then_some(self.capacity),
             budget: (self.budget != 0).then_some(self.budget),
+            level: None,
         })
     }
 }

@@ -4,7 +4,7 @@ use super::acceleration::Acceleration;
 use super::debug::DebugUtils;
 use super::failed;
 use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
-use super::memory::{Buffer, BufferRef};
+use super::memory::{Buffer, BufferRef, Ledger};
 use super::requirements::DeviceReport;
 use crate::error::{Error, Result};
 use crate::kernels::{Row, Target};
@@ -46,6 +46,7 @@ type PipelineKey = (&'static str, Vec<(u32, u32)>);
 pub struct Gpu {
     inner: Arc<Inner>,
     target: Arc<Target>,
+    ledger: Option<Arc<Ledger>>,
 }
 
 /// What a [`Gpu`] stands on.
@@ -143,7 +144,7 @@ impl Gpu {
             unbounded: OnceLock::new(),
             foundation,
         };
-        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target) };
+        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None };
         gpu.make_unbounded()?;
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
@@ -222,7 +223,33 @@ impl Gpu {
     /// [`Error::Invalid`] if they do not fit the device.
     pub fn with_target(&self, target: Target) -> Result<Self> {
         target.check(&self.report().room)?;
-        Ok(Self { inner: self.inner.clone(), target: Arc::new(target) })
+        Ok(Self { inner: self.inner.clone(), target: Arc::new(target), ledger: self.ledger.clone() })
+    }
+
+    /// The same device, where all buffers made from this handle and its clones take at most `bytes` together, transfers included: the next one is refused
+    /// with [`Error::Memory`]. The allocator takes memory from the driver in blocks of 16 MiB, or as large as a larger buffer.
+    #[must_use]
+    pub fn with_memory(&self, bytes: u64) -> Self {
+        Self { ledger: Some(Arc::new(Ledger::new(bytes))), ..self.clone() }
+    }
+
+    /// What [`Gpu::with_memory`] was told; all there are without a limit.
+    pub fn memory_limit(&self) -> u64 {
+        self.ledger().map_or(u64::MAX, Ledger::limit)
+    }
+
+    /// Bytes that buffers made from this handle may still take; all there are without a limit.
+    pub fn memory_left(&self) -> u64 {
+        self.ledger().map_or(u64::MAX, Ledger::left)
+    }
+
+    /// The most bytes that buffers made from this handle took at once; 0 without a limit.
+    pub fn memory_peak(&self) -> u64 {
+        self.ledger().map_or(0, Ledger::peak)
+    }
+
+    pub(super) fn ledger(&self) -> Option<&Ledger> {
+        self.ledger.as_deref()
     }
 
     /// Tests that the device can be trusted with these shapes of the kernels, as opening it does.

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Usage of every buffer that kernels touch; the host's buffers need these flags too (the address one only with [`super::Binding::Address`]).
 pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
@@ -52,9 +53,45 @@ pub struct Buffer {
     gpu: Gpu,
     handle: vk::Buffer,
     allocation: Option<Allocation>,
+    /// Bytes counted in the device's ledger.
+    claimed: u64,
     size: u64,
     address: u64,
     name: String,
+}
+
+/// What the buffers of a [`Gpu`] take together, and how much that may be.
+#[derive(Debug)]
+pub(super) struct Ledger {
+    limit: u64,
+    used: AtomicU64,
+    peak: AtomicU64,
+}
+
+impl Ledger {
+    pub(super) fn new(limit: u64) -> Self {
+        Self { limit, used: AtomicU64::new(0), peak: AtomicU64::new(0) }
+    }
+
+    pub(super) fn limit(&self) -> u64 {
+        self.limit
+    }
+
+    pub(super) fn left(&self) -> u64 {
+        self.limit - self.used.load(Ordering::Relaxed).min(self.limit)
+    }
+
+    pub(super) fn peak(&self) -> u64 {
+        self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Counts so many bytes more, or says how many are in use.
+    fn claim(&self, bytes: u64) -> Result<(), u64> {
+        let more = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.limit);
+        let before = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more)?;
+        self.peak.fetch_max(before + bytes, Ordering::Relaxed);
+        Ok(())
+    }
 }
 
 impl Buffer {
@@ -89,10 +126,14 @@ impl Buffer {
         let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
         let description =
             AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
+        let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, claimed: 0, size, address: 0, name: name.into() };
+        if let Some(ledger) = gpu.ledger() {
+            let full = |used: u64| memory_error(format!("{used} of the {} bytes that may be used are in use", ledger.limit));
+            ledger.claim(requirements.size).map_err(full)?;
+            buffer.claimed = requirements.size;
+        }
         let allocated = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()));
-        let allocated = allocated.and_then(|mut a| a.allocate(&description).map_err(|e| memory_error(e.to_string())));
-        let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, size, address: 0, name: name.into() };
-        buffer.allocation = Some(allocated?);
+        buffer.allocation = Some(allocated.and_then(|mut a| a.allocate(&description).map_err(|e| memory_error(e.to_string())))?);
         if let Some(allocation) = &buffer.allocation {
             // SAFETY: fresh memory of the right requirements, bound once.
             unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) }.map_err(failed("vkBindBufferMemory"))?;
@@ -141,6 +182,9 @@ impl Drop for Buffer {
     fn drop(&mut self) {
         // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
         unsafe { self.gpu.device().destroy_buffer(self.handle, None) };
+        if let Some(ledger) = self.gpu.ledger() {
+            ledger.used.fetch_sub(self.claimed, Ordering::Relaxed);
+        }
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.gpu.allocator().lock())
             && let Err(e) = allocator.free(allocation)
         {

@@ -11,6 +11,8 @@ use gpu_allocator::MemoryLocation;
 
 /// Bytes that one staging buffer holds; larger transfers go in several.
 const STAGING: u64 = 32 << 20;
+/// Where memory is limited, one part in so many is for transfers.
+const STAGING_SHARE: u64 = 16;
 /// Timestamps of one submission.
 const TIMESTAMPS: u32 = 256;
 
@@ -131,17 +133,23 @@ impl Gpu {
         Ok(buffer)
     }
 
+    /// Bytes that one staging buffer holds here.
+    fn staging_bytes(&self) -> u64 {
+        self.ledger().map_or(STAGING, |ledger| (ledger.limit() / STAGING_SHARE).clamp(1 << 16, STAGING))
+    }
+
     /// Writes bytes to the beginning of a buffer.
     fn write(&self, buffer: &mut Buffer, bytes: &[u8]) -> Result<()> {
         if let Some(mapped) = buffer.mapped_mut() {
             mapped[..bytes.len()].copy_from_slice(bytes);
             return Ok(());
         }
-        let mut staging = Buffer::staging(self, "olbvh.upload.staging", STAGING.min(bytes.len() as u64), MemoryLocation::CpuToGpu)?;
-        for (i, chunk) in bytes.chunks(STAGING as usize).enumerate() {
+        let most = self.staging_bytes();
+        let mut staging = Buffer::staging(self, "olbvh.upload.staging", most.min(bytes.len() as u64), MemoryLocation::CpuToGpu)?;
+        for (i, chunk) in bytes.chunks(most as usize).enumerate() {
             let mapped = staging.mapped_mut().ok_or_else(|| Error::Invalid("upload memory is not mapped".into()))?;
             mapped[..chunk.len()].copy_from_slice(chunk);
-            let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(i as u64 * STAGING, chunk.len() as u64));
+            let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(i as u64 * most, chunk.len() as u64));
             self.run("olbvh.upload.staging", |r| {
                 r.copy(from, to);
                 Ok(())
@@ -169,9 +177,10 @@ impl Gpu {
 
     /// Reads a range of any buffer back through staging memory.
     pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
-        let staging = Buffer::staging(self, "olbvh.download.staging", STAGING.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
-        for (i, chunk) in bytes.chunks_mut(STAGING as usize).enumerate() {
-            let (from, to) = (part.part(i as u64 * STAGING, chunk.len() as u64), staging.all());
+        let most = self.staging_bytes();
+        let staging = Buffer::staging(self, "olbvh.download.staging", most.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
+        for (i, chunk) in bytes.chunks_mut(most as usize).enumerate() {
+            let (from, to) = (part.part(i as u64 * most, chunk.len() as u64), staging.all());
             self.run("olbvh.download.staging", |r| {
                 r.copy(from, to);
                 Ok(())

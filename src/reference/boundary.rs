@@ -70,6 +70,22 @@ pub fn bit(words: &[u32], i: u32) -> bool {
 }
 
 impl Topology {
+    /// Bad cells, bounds and their grid alone: no neighbours, nothing marked as boundary.
+    ///
+    /// # Errors
+    /// As [`topology`].
+    pub fn bare(mesh: &Mesh) -> Result<Self> {
+        if mesh.tets.len() >= (u32::MAX / 4) as usize || mesh.points.len() >= u32::MAX as usize {
+            let (tets, points) = (mesh.tets.len(), mesh.points.len());
+            return Err(Error::TooLarge(format!("{tets} tetrahedra on {points} points; at most 2^30 and 2^32 can be indexed")));
+        }
+        let bad: Vec<_> = (0..mesh.tets.len() as u32).into_par_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect();
+        let valid = words(mesh.tets.len(), &|t| bad.binary_search_by_key(&t, |b| b.0).is_err());
+        let (lo, hi) = bounds(mesh, &valid);
+        let counts = Counts { cells: mesh.tets.len() as u32, bad: bad.len() as u32, ..Counts::default() };
+        Ok(Self { neighbours: Vec::new(), boundary: Vec::new(), valid, grid: Grid::new(lo, hi), counts, bad })
+    }
+
     /// Whether tetrahedron `tet` is part of the structure.
     pub fn is_valid(&self, tet: u32) -> bool {
         bit(&self.valid, tet)
@@ -103,14 +119,7 @@ impl Topology {
 /// # Errors
 /// [`Error::TooLarge`] if the faces of the mesh, or its points, do not fit 32-bit indices.
 pub fn topology(mesh: &Mesh) -> Result<Topology> {
-    if mesh.tets.len() >= (u32::MAX / 4) as usize || mesh.points.len() >= u32::MAX as usize {
-        let (tets, points) = (mesh.tets.len(), mesh.points.len());
-        return Err(Error::TooLarge(format!("{tets} tetrahedra on {points} points; at most 2^30 and 2^32 can be indexed")));
-    }
-    let bad: Vec<_> = (0..mesh.tets.len() as u32).into_par_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect();
-    let valid = words(mesh.tets.len(), &|t| bad.binary_search_by_key(&t, |b| b.0).is_err());
-    let (lo, hi) = bounds(mesh, &valid);
-    let grid = Grid::new(lo, hi);
+    let Topology { valid, grid, bad, counts, .. } = Topology::bare(mesh)?;
     let neighbours = neighbours(mesh, &valid);
     let normalised: Vec<_> = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
     let signs: Vec<Signs> = mesh.tets.par_iter().enumerate().map(|(t, &ids)| Signs::new(bit(&valid, t as u32), ids, &normalised)).collect();
@@ -118,11 +127,10 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
     let boundary = words(mesh.tets.len(), &is_boundary);
     let count = |pick: fn(&Signs) -> bool| signs.par_iter().filter(|s| pick(s)).count() as u32;
     let counts = Counts {
-        cells: mesh.tets.len() as u32,
-        bad: bad.len() as u32,
         boundary: boundary.iter().map(|w| w.count_ones()).sum(),
         negative: count(|s| s.caller < 0),
         flat: count(|s| s.valid && s.sorted == 0),
+        ..counts
     };
     Ok(Topology { neighbours, boundary, valid, grid, counts, bad })
 }

@@ -66,12 +66,13 @@ impl Sizes {
         if count == 0 { 0 } else { (1..=MAX_LEVEL).rev().find(reached).unwrap_or(0) }
     }
 
-    /// The level to build: the heuristic's, or the next coarser one that keeps to the capacity and the budget.
+    /// The level to build: the one asked for or the heuristic's, or the next coarser one that keeps to the capacity and the budget.
     ///
     /// # Errors
     /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits.
     pub fn level(&self, options: &BuildOptions) -> Result<u32> {
-        let wanted = self.heuristic(options.alpha_fixed()?);
+        let heuristic = self.heuristic(options.alpha_fixed()?);
+        let wanted = options.level.map_or(heuristic, |level| level.min(MAX_LEVEL));
         let valid = u32::try_from(self.histogram.iter().sum::<u64>()).unwrap_or(u32::MAX);
         let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {

@@ -76,7 +76,10 @@ pub enum Failure {
 
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
-        let message = error.to_string();
+        let message = match &error {
+            Error::Memory { .. } => format!("{error}; meshes that do not fit are taken in blocks by `locate` and `overlap` alone"),
+            _ => error.to_string(),
+        };
         match error {
             Error::Invalid(_) => Self::Usage(message),
             Error::File { .. } | Error::BadCells { .. } => Self::Input(message),

@@ -7,11 +7,11 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
+use olbvh::blocks::{InBlocks, Points};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query::LocateOptions;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
@@ -33,9 +33,11 @@ pub struct Overlapped {
     pub build_seconds: f64,
     /// Seconds for the overlap.
     pub seconds: f64,
+    /// Trees that were built: two, or more where meshes are cut into blocks.
+    pub trees: u32,
 }
 
-/// Something that builds trees.
+/// Something that builds trees. Bytes of device memory, where a question takes them, are the most that may be used; without, all there are.
 pub trait Engine {
     /// What it is called in results.
     fn name(&self) -> String;
@@ -43,18 +45,28 @@ pub trait Engine {
     fn target(&self) -> Option<&Shapes>;
     /// Marks the boundary and builds the tree.
     fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>>;
+    /// Builds a tree over a mesh and finds owner, barycentric coordinates and value of each point.
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>>;
+    /// The same, but finds every tetrahedron that contains each point.
+    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds out where they overlap.
-    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped>;
+    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped>;
+}
+
+/// Two meshes, and what is asked of them.
+pub struct Question<'a> {
+    /// A and B.
+    pub meshes: [&'a Mesh; 2],
+    /// How their trees are built.
+    pub options: BuildOptions,
+    /// Whether all pairs are found.
+    pub pairs: bool,
 }
 
 /// A mesh with its tree.
 pub trait Built {
     /// What they are like.
     fn summary(&self) -> &Summary;
-    /// Owner, barycentric coordinates and value of each point (mesh coordinates).
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>>;
-    /// Every tetrahedron that contains each point.
-    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>>;
     /// Draws a field.
     fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn>;
     /// Slices the mesh, band by band into `sink`.

@@ -31,6 +31,15 @@ pub struct TreeArgs {
     pub reorder: bool,
 }
 
+/// How much of a device is used.
+#[derive(clap::Args)]
+pub struct MemoryArgs {
+    /// Most device memory to use, transfers included, such as 512MiB; by default what the device has. A mesh that does not fit is built and asked in blocks,
+    /// one after the other. Answers are the same.
+    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    pub memory: Option<u64>,
+}
+
 /// A number of bytes with a unit.
 fn bytes(text: &str) -> Result<u64, String> {
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());

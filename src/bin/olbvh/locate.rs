@@ -1,10 +1,11 @@
 //! `olbvh locate`.
 
 use crate::common::{Common, Failure, Outcome};
-use crate::engine::{self, Built};
-use crate::input::{self, TreeArgs};
+use crate::engine;
+use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::text::{grouped, milliseconds};
+use crate::text::{bytes, grouped, milliseconds};
+use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
 use olbvh::query::{self, LocateOptions};
@@ -49,12 +50,14 @@ pub struct Args {
     coherent: bool,
     #[command(flatten)]
     tree: TreeArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 /// What is said in the end.
 struct Done {
     found: usize,
-    seconds: f64,
+    took: InBlocks,
 }
 
 /// Runs it.
@@ -72,53 +75,53 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let points = load_points(&args.points).map_err(Failure::input)?;
     // The difference in double precision: that is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
-    let built = engine.build(mesh, &options)?;
+    let path = if args.all { query::Path::Descent } else { query::Path::suited(local.len(), mesh.tets.len(), args.coherent) };
+    let asked = Points { mesh, options, points: &local, how: LocateOptions { path, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);
     let start = Instant::now();
+    let mut seconds;
     let done = if args.all {
-        every_owner(args, format, mesh, &*built, &local, &report)?
+        let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.apart();
+        seconds = start.elapsed().as_secs_f64();
+        Done { found: every_owner(args, format, mesh, &owners)?, took }
     } else {
-        let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
-        let located = built.locate(&local, field, &LocateOptions { path, tolerance: args.tolerance }, &report)?;
-        let seconds = start.elapsed().as_secs_f64();
+        let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.apart();
+        seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();
         let bary: Vec<[f32; 4]> = located.iter().map(|l| l.bary).collect();
         let value: Vec<f32> = located.iter().map(|l| l.value).collect();
         write_located(&args.output, &Located { points: &points, owner: &owner, bary: &bary, value: field.map(|_| &value[..]) })?;
-        Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), seconds }
+        Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), took }
     };
     drop(progress);
-    let per_second = if done.seconds > 0.0 { points.len() as f64 / done.seconds } else { 0.0 };
+    let InBlocks { trees, peak, build_seconds, .. } = done.took;
+    seconds -= build_seconds;
+    let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
     let json = json!({
-        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": done.seconds,
+        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": seconds,
         "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
-        "build_ms": built.summary().build_ms, "device": engine.name(),
+        "build_ms": build_seconds * 1e3, "blocks": trees, "peak_bytes": peak, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} points, {} of them in the mesh; {} on {}, {} points a second\n",
+        "{}: {} points, {} of them in the mesh; {} on {}, {} points a second{}\n",
         args.output.display(),
         grouped(points.len() as u64),
         grouped(done.found as u64),
-        milliseconds(done.seconds * 1e3),
+        milliseconds(seconds * 1e3),
         engine.name(),
-        grouped(per_second as u64)
+        grouped(per_second as u64),
+        if trees > 1 {
+            format!("; {trees} blocks within {}, built in {}", bytes(peak), milliseconds(build_seconds * 1e3))
+        } else {
+            String::new()
+        }
     );
     output::summary(common, &json, &text)
 }
 
-/// Every owner of every point, written as rows (point, cell).
-fn every_owner(
-    args: &Args,
-    format: OutputFormat,
-    mesh: &Mesh,
-    built: &dyn Built,
-    points: &[[f32; 3]],
-    report: engine::Report<'_>,
-) -> Outcome<Done> {
-    let start = Instant::now();
-    let owners = built.locate_all(points, args.tolerance, report)?;
-    let seconds = start.elapsed().as_secs_f64();
+/// Writes every owner of every point as rows (point, cell); how many points have any.
+fn every_owner(args: &Args, format: OutputFormat, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
     let cells = |tets: &Vec<u32>| {
         let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
         cells.sort_unstable();
@@ -132,7 +135,7 @@ fn every_owner(
         OutputFormat::Json => write_json(&args.output, &json!({ "owners": owners }))?,
         _ => write_npy(&args.output, &[rows.len(), 2], rows.as_flattened())?,
     }
-    Ok(Done { found: owners.iter().filter(|o| !o.is_empty()).count(), seconds })
+    Ok(owners.iter().filter(|o| !o.is_empty()).count())
 }
 
 /// A table of rows (point, cell).

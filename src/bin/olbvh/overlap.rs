@@ -1,8 +1,8 @@
 //! `olbvh overlap`.
 
 use crate::common::{Common, Outcome};
-use crate::engine;
-use crate::input::TreeArgs;
+use crate::engine::{self, Question};
+use crate::input::{MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
 use crate::slice::vector;
 use crate::text::{grouped, milliseconds};
@@ -45,6 +45,8 @@ pub struct Args {
     rotate_b: Option<(DVec3, f64)>,
     #[command(flatten)]
     tree: TreeArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 /// Runs it.
@@ -59,7 +61,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut b = args.tree.mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;
     let progress = Progress::new(common, "overlap");
-    let found = engine.overlap(&a, &b, &options, args.pairs, &|done, total| progress.set(done, total))?;
+    let asked = Question { meshes: [&a, &b], options, pairs: args.pairs };
+    let found = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?;
     drop(progress);
     let overlap = &found.overlap;
     let cells = |mesh: &Mesh, tets: &[u32]| {
@@ -90,17 +93,18 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
     let json = json!({
         "file": args.output.display().to_string(), "a": ids_a.len(), "b": ids_b.len(), "pairs": pairs.as_ref().map(Vec::len),
-        "narrow_tests": narrow, "narrow_share": share, "seconds": found.seconds, "build_seconds": found.build_seconds,
+        "narrow_tests": narrow, "narrow_share": share, "seconds": found.seconds, "build_seconds": found.build_seconds, "trees": found.trees,
         "a_effort": effort(&overlap.effort[0]), "b_effort": effort(&overlap.effort[1]), "device": engine.name(),
     });
     let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
     let text = format!(
-        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.1} % of the cells; trees {}, overlap {} on {}\n",
+        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.1} % of the cells; {} trees {}, overlap {} on {}\n",
         args.output.display(),
         grouped(ids_a.len() as u64),
         grouped(ids_b.len() as u64),
         grouped(narrow),
         100.0 * share,
+        found.trees,
         milliseconds(found.build_seconds * 1e3),
         milliseconds(found.seconds * 1e3),
         engine.name()

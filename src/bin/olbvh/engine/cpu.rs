@@ -1,7 +1,8 @@
 //! The reference implementation as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Report, Sink, Summary};
-use olbvh::error::Result;
+use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
+use olbvh::blocks::{InBlocks, Points};
+use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::query::{self, LocateOptions};
@@ -39,6 +40,52 @@ impl Engine for Cpu {
     }
 
     fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
+        Ok(Box::new(CpuTree::new(mesh, options)?))
+    }
+
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
+        on_host(asked, memory, |tree| tree.locate(asked.points, field, &asked.how, report))
+    }
+
+    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+        on_host(asked, memory, |tree| {
+            let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
+            each(asked.points, |p| locator.owners(p), report)
+        })
+    }
+
+    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
+        no_memory(memory)?;
+        let ([a, b], options) = (asked.meshes, &asked.options);
+        let start = Instant::now();
+        let (topology_a, topology_b) = (topology(a)?, topology(b)?);
+        let build = olbvh::reference::build::build;
+        let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
+        let build_seconds = start.elapsed().as_secs_f64();
+        let start = Instant::now();
+        let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
+        let overlap = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        report(1, 1);
+        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64(), trees: 2 })
+    }
+}
+
+/// A limit means nothing here.
+fn no_memory(memory: Option<u64>) -> Result<()> {
+    memory.map_or(Ok(()), |_| {
+        Err(Error::Invalid("--memory is that of a device; the CPU works in the host's memory, on the whole mesh".into()))
+    })
+}
+
+/// An answer of the whole mesh.
+fn on_host<T>(asked: &Points<'_>, memory: Option<u64>, answer: impl FnOnce(&CpuTree<'_>) -> T) -> Result<InBlocks<T>> {
+    no_memory(memory)?;
+    let tree = CpuTree::new(asked.mesh, &asked.options)?;
+    Ok(InBlocks { answer: answer(&tree), trees: 1, peak: 0, build_seconds: tree.summary.build_ms / 1e3 })
+}
+
+impl<'a> CpuTree<'a> {
+    fn new(mesh: &'a Mesh, options: &BuildOptions) -> Result<Self> {
         let start = Instant::now();
         let topology = topology(mesh)?;
         let topology_ms = start.elapsed().as_secs_f64() * 1e3;
@@ -61,29 +108,10 @@ impl Engine for Cpu {
             build_ms,
             stages: Vec::new(),
         };
-        Ok(Box::new(CpuTree { mesh, topology, tree, summary }))
+        Ok(Self { mesh, topology, tree, summary })
     }
 
-    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped> {
-        let start = Instant::now();
-        let (topology_a, topology_b) = (topology(a)?, topology(b)?);
-        let build = olbvh::reference::build::build;
-        let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
-        let build_seconds = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
-        let overlap = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, pairs);
-        report(1, 1);
-        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64() })
-    }
-}
-
-impl Built for CpuTree<'_> {
-    fn summary(&self) -> &Summary {
-        &self.summary
-    }
-
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>> {
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Vec<Located> {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Vec::with_capacity(points.len());
         // As the device does it, so that owners are the same even where cells overlap.
@@ -97,12 +125,13 @@ impl Built for CpuTree<'_> {
             all.extend(located.iter().map(|l| Located { owner: l.owner, bary: l.barycentric, value: value(l) }));
             report(all.len() as u64, points.len() as u64);
         }
-        Ok(all)
+        all
     }
+}
 
-    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {
-        let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(tolerance);
-        Ok(each(points, |p| locator.owners(p), report))
+impl Built for CpuTree<'_> {
+    fn summary(&self) -> &Summary {
+        &self.summary
     }
 
     fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {

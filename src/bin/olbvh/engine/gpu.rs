@@ -1,13 +1,14 @@
 //! A Vulkan device as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Report, Shapes, Sink, Summary};
+use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
+use olbvh::blocks::{self, InBlocks, Points};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query::{self, LocateOptions, Party};
+use olbvh::query;
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::volume::Picture;
 use olbvh::render::{Bounds, Prepared, RenderSettings};
@@ -28,6 +29,11 @@ impl Device {
         let gpu = gpu.with_target(shapes.target.clone())?;
         gpu.self_test()?;
         Ok(Self(gpu, shapes))
+    }
+
+    /// Bytes of memory to stay within: those given, or the device's.
+    fn memory(&self, given: Option<u64>) -> u64 {
+        given.unwrap_or(self.0.report().memory)
     }
 
     /// The device itself.
@@ -90,33 +96,29 @@ impl Engine for Device {
         Ok(Box::new(DeviceTree { mesh, device, tree, summary }))
     }
 
-    fn overlap(&self, a: &Mesh, b: &Mesh, options: &BuildOptions, pairs: bool, report: Report<'_>) -> Result<Overlapped> {
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
+        let values = field.map(|f| (f.values.as_slice(), f.on));
+        let (answer, took) = blocks::locate(&self.0, self.memory(memory), asked, values, report)?.apart();
+        let value = |i: usize| answer.values.get(i).copied().unwrap_or(f32::NAN);
+        let located = answer.owners.iter().zip(&answer.barycentrics).enumerate();
+        Ok(took.with(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect()))
+    }
+
+    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+        blocks::locate_all(&self.0, self.memory(memory), asked, report)
+    }
+
+    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
         let start = Instant::now();
-        let (mesh_a, mesh_b) = (DeviceMesh::upload(&self.0, a, BadCells::Skip)?, DeviceMesh::upload(&self.0, b, BadCells::Skip)?);
-        let (tree_a, tree_b) = (Tree::build(&self.0, &mesh_a, options)?, Tree::build(&self.0, &mesh_b, options)?);
-        let build_seconds = start.elapsed().as_secs_f64();
-        let start = Instant::now();
-        let parties = [Party { mesh: &mesh_a, tree: &tree_a }, Party { mesh: &mesh_b, tree: &tree_b }];
-        let overlap = query::overlap(parties[0], parties[1], pairs, report)?.overlap;
-        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64() })
+        let found = blocks::overlap(&self.0, self.memory(memory), asked.meshes, &asked.options, asked.pairs, report)?;
+        let seconds = start.elapsed().as_secs_f64() - found.build_seconds;
+        Ok(Overlapped { overlap: found.answer.overlap, build_seconds: found.build_seconds, seconds, trees: found.trees })
     }
 }
 
 impl Built for DeviceTree<'_> {
     fn summary(&self) -> &Summary {
         &self.summary
-    }
-
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Result<Vec<Located>> {
-        let values = field.map(|f| (f.values.as_slice(), f.on));
-        let found = query::locate(&self.device, &self.tree, points, values, options, report)?;
-        let value = |i: usize| found.values.get(i).copied().unwrap_or(f32::NAN);
-        let located = found.owners.iter().zip(&found.barycentrics).enumerate();
-        Ok(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect())
-    }
-
-    fn locate_all(&self, points: &[[f32; 3]], tolerance: f32, report: Report<'_>) -> Result<Vec<Vec<u32>>> {
-        query::locate_all(&self.device, &self.tree, points, &LocateOptions { tolerance, ..LocateOptions::default() }, report)
     }
 
     fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {

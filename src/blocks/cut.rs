@@ -1,0 +1,265 @@
+//! How a mesh is cut: boxes of cells, and the tetrahedra that each takes.
+
+use crate::build::{
+    BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, Tree, TreeMemory,
+};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::layout::Grid;
+use crate::mesh::{Mesh, On};
+use crate::options::{BuildOptions, Lists};
+use crate::primitives::Arena;
+use crate::reference::boundary::Topology;
+use crate::reference::depth::measure;
+use crate::reference::grid::MAX_LEVEL;
+use crate::reference::vertices::{CellRange, Vertices};
+use rayon::prelude::*;
+use std::borrow::Cow;
+use std::rc::Rc;
+
+/// A mesh to be cut.
+pub(super) struct Source<'a> {
+    pub(super) mesh: &'a Mesh,
+    pub(super) grid: Grid,
+    /// With the level of all trees.
+    pub(super) options: BuildOptions,
+    level: u32,
+    topology: Topology,
+    vertices: Vertices,
+}
+
+/// A set of points of the mesh.
+struct Marks(Vec<u32>);
+
+impl Marks {
+    fn of(mesh: &Mesh, tets: &[u32]) -> Self {
+        let mut words = vec![0u32; mesh.points.len().div_ceil(32)];
+        for v in tets.iter().flat_map(|&t| mesh.tets[t as usize]) {
+            words[v as usize / 32] |= 1 << (v % 32);
+        }
+        Self(words)
+    }
+
+    fn holds(&self, v: u32) -> bool {
+        self.0[v as usize / 32] >> (v % 32) & 1 != 0
+    }
+
+    fn count(&self) -> u32 {
+        self.0.iter().map(|w| w.count_ones()).sum()
+    }
+}
+
+impl<'a> Source<'a> {
+    /// Chooses the level, for trees with these options within so many bytes of memory.
+    pub(super) fn new(mesh: &'a Mesh, options: &BuildOptions, memory: u64) -> Result<Self> {
+        let topology = Topology::bare(mesh)?;
+        let grid = topology.grid;
+        let cell = mesh.points.par_iter().map(|&p| grid.quantize(p).map(|q| q as u16)).collect();
+        let vertices = Vertices { cell, normalised: Vec::new() };
+        let wanted = measure(mesh, &topology, &vertices).level(options)?;
+        let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
+        let level = (0..=wanted).rev().find(fits).unwrap_or(0);
+        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, ..*options };
+        Ok(Self { mesh, grid, options, level, topology, vertices })
+    }
+
+    /// The longest side of the bounds.
+    pub(super) fn extent(&self) -> f64 {
+        (0..3).map(|c| f64::from(self.grid.hi[c]) - f64::from(self.grid.lo[c])).fold(0.0, f64::max)
+    }
+
+    /// The cell of a point on the trees' level.
+    pub(super) fn cell(&self, p: [f32; 3]) -> [u32; 3] {
+        self.grid.quantize(p).map(|q| q >> (MAX_LEVEL - self.level))
+    }
+
+    /// The whole mesh but its bad cells.
+    pub(super) fn whole(&self) -> Block {
+        let cells = CellRange { lo: [0; 3], hi: [(1 << self.level) - 1; 3] };
+        let tets: Vec<u32> = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.topology.is_valid(t)).collect();
+        self.block(cells, &tets)
+    }
+
+    fn cells_of(&self, tet: u32) -> CellRange {
+        self.vertices.cells(self.mesh.tets[tet as usize], self.level)
+    }
+
+    /// What `cells` take of these tetrahedra.
+    fn block(&self, cells: CellRange, among: &[u32]) -> Block {
+        let core: Vec<u32> = among.par_iter().copied().filter(|&t| common(&self.cells_of(t), &cells).is_some()).collect();
+        let marks = Marks::of(self.mesh, &core);
+        // Whoever shares a face has three of its corners; the core has four.
+        let beside = |t: &u32| self.mesh.tets[*t as usize].into_iter().filter(|&v| marks.holds(v)).count() >= 3;
+        let tets: Vec<u32> = among.par_iter().copied().filter(beside).collect();
+        let union = |a: CellRange, b: CellRange| CellRange {
+            lo: [0, 1, 2].map(|c| a.lo[c].min(b.lo[c])),
+            hi: [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])),
+        };
+        let span = core.par_iter().filter_map(|&t| common(&self.cells_of(t), &cells)).reduce_with(union);
+        let reach = tets.par_iter().map(|&t| self.cells_of(t)).reduce_with(union);
+        let count = |t: &u32| {
+            let own = self.cells_of(*t);
+            let crosses = common(&own, &cells) != Some(own);
+            [u64::from(own.count()), if crosses { u64::from(own.count()) } else { 0 }]
+        };
+        let [candidates, crossing] = tets.par_iter().map(count).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let size = Size {
+            points: marks.count() + (tets.len() - core.len()) as u32,
+            tets: tets.len(),
+            candidates,
+            // Lists are long outside of the own cells, where the boundary of the block is, and where the surface of the mesh is.
+            entries: if self.options.lists == Lists::All { candidates } else { crossing + (candidates - crossing) / SURFACE },
+            leaves: reach.map_or(0, |reach| u64::from(reach.count())),
+        };
+        Block { cells, span, tets: Rc::new(tets), size }
+    }
+
+    /// Two blocks for one, with about as many tetrahedra in either; `None` if that does not make it smaller.
+    pub(super) fn halves(&self, block: &Block) -> Option<[Block; 2]> {
+        let span = block.span?;
+        let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
+        let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;
+        let mut numbers = vec![0usize; span.size()[axis] as usize];
+        for cells in block.tets.iter().filter_map(|&t| common(&self.cells_of(t), &span)) {
+            numbers[(cells.lo[axis].midpoint(cells.hi[axis]) - span.lo[axis]) as usize] += 1;
+        }
+        let half = numbers.iter().sum::<usize>() / 2;
+        let mut sum = 0;
+        let below = numbers.iter().take_while(|n| {
+            sum += **n;
+            sum < half
+        });
+        let at = (span.lo[axis] + below.count() as u32).min(span.hi[axis] - 1);
+        let (mut low, mut high) = (block.cells, block.cells);
+        (low.hi[axis], high.lo[axis]) = (at, at + 1);
+        let halves = [low, high].map(|cells| self.block(cells, &block.tets));
+        halves.iter().all(|h| h.tets.len() < block.tets.len()).then_some(halves)
+    }
+}
+
+/// What two ranges have in common.
+fn common(a: &CellRange, b: &CellRange) -> Option<CellRange> {
+    let range = CellRange { lo: [0, 1, 2].map(|c| a.lo[c].max(b.lo[c])), hi: [0, 1, 2].map(|c| a.hi[c].min(b.hi[c])) };
+    (0..3).all(|c| range.lo[c] <= range.hi[c]).then_some(range)
+}
+
+/// A box of cells and its tetrahedra.
+pub(super) struct Block {
+    /// Its own cells; blocks have none in common.
+    pub(super) cells: CellRange,
+    /// Those of them that the core meets.
+    span: Option<CellRange>,
+    /// Core and neighbours, ascending.
+    pub(super) tets: Rc<Vec<u32>>,
+    /// What they amount to.
+    size: Size,
+}
+
+/// One in so many entries of a tree with all lists is taken to be left with lists where the surface is; Jets has one in 11 at α = 0, smaller meshes have
+/// more.
+const SURFACE: u64 = 4;
+
+/// What the memory of a mesh and its tree depends on.
+#[derive(Clone, Copy, Default)]
+struct Size {
+    /// At most.
+    points: u32,
+    tets: usize,
+    /// Cells in the quantized boxes of all tetrahedra.
+    candidates: u64,
+    /// About.
+    entries: u64,
+    /// At most.
+    leaves: u64,
+}
+
+/// A block or a whole mesh in device memory, with its tree.
+pub(super) struct Placed {
+    pub(super) mesh: DeviceMesh,
+    pub(super) tree: Tree,
+    /// Which points and tetrahedra of the whole mesh a block has.
+    ids: Option<[Rc<Vec<u32>>; 2]>,
+}
+
+impl Placed {
+    /// The whole mesh.
+    pub(super) fn whole(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Result<Self> {
+        let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
+        let tree = Tree::build(gpu, &device, options)?;
+        Ok(Self { mesh: device, tree, ids: None })
+    }
+
+    /// The tetrahedron of the whole mesh that is number `tet` here; "none" stays.
+    pub(super) fn tet(&self, tet: u32) -> u32 {
+        self.ids.as_ref().and_then(|[_, tets]| tets.get(tet as usize).copied()).unwrap_or(tet)
+    }
+
+    /// The values of a field that lie here.
+    pub(super) fn values<'v>(&self, values: &'v [f32], on: On) -> Cow<'v, [f32]> {
+        let Some([points, tets]) = &self.ids else { return Cow::Borrowed(values) };
+        let ids = if on == On::Points { points } else { tets };
+        ids.par_iter().map(|&i| values[i as usize]).collect::<Vec<_>>().into()
+    }
+}
+
+impl Block {
+    /// About the most bytes that a tree takes while it is built.
+    pub(super) fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
+        self.size.bytes(gpu, options)
+    }
+
+    /// The corners of its cells in the units of the mesh, where there is anything in them.
+    pub(super) fn bounds(&self, source: &Source<'_>) -> Option<[[f64; 3]; 2]> {
+        let span = self.span?;
+        let [lo, hi] = [source.grid.lo, source.grid.hi].map(|p| p.map(f64::from));
+        let at = |c: usize, k: u32| lo[c] + (hi[c] - lo[c]) * f64::from(k) / f64::from(1 << source.level);
+        Some([[0, 1, 2].map(|c| at(c, span.lo[c])), [0, 1, 2].map(|c| at(c, span.hi[c] + 1))])
+    }
+
+    /// Brings it to the device and builds its tree.
+    pub(super) fn place(&self, gpu: &Gpu, source: &Source<'_>) -> Result<Placed> {
+        let mesh = source.mesh;
+        let marks = Marks::of(mesh, &self.tets);
+        let points: Vec<u32> = (0..mesh.points.len() as u32).into_par_iter().filter(|&v| marks.holds(v)).collect();
+        let mut before = Vec::with_capacity(marks.0.len());
+        marks.0.iter().fold(0, |sum, word| {
+            before.push(sum);
+            sum + word.count_ones()
+        });
+        let rank = |v: u32| before[v as usize / 32] + (marks.0[v as usize / 32] & ((1 << (v % 32)) - 1)).count_ones();
+        let tets = self.tets.par_iter().map(|&t| mesh.tets[t as usize].map(rank)).collect();
+        let part = Mesh::new(points.par_iter().map(|&v| mesh.points[v as usize]).collect(), tets);
+        let mesh = DeviceMesh::upload_in(gpu, &part, BadCells::Skip, Some(&source.grid))?;
+        let tree = Tree::build(gpu, &mesh, &source.options)?;
+        Ok(Placed { mesh, tree, ids: Some([Rc::new(points), self.tets.clone()]) })
+    }
+}
+
+/// What a whole mesh takes at least, if its tree had no entries.
+pub(super) fn least_bytes(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Result<u64> {
+    let points = u32::try_from(mesh.points.len()).unwrap_or(u32::MAX);
+    Size { points, tets: mesh.tets.len(), ..Size::default() }.bytes(gpu, &BuildOptions { level: Some(0), ..*options })
+}
+
+impl Size {
+    /// About the most bytes that mesh and tree take while the tree is built; all there are if it cannot be numbered.
+    fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
+        let Self { points, tets, candidates, entries, leaves } = *self;
+        if tets > MAX_TETS as usize || candidates > u64::from(u32::MAX) {
+            return Ok(u64::MAX);
+        }
+        let (tets, candidates, entries, level) = (tets as u32, candidates as u32, entries as u32, options.level.unwrap_or(0));
+        // Each level has an eighth of the nodes of the next, or a few more.
+        let nodes = leaves.min(u64::from(entries)) as u32 / 7 * 8 + 64;
+        let capacity = Capacity { candidates, entries, nodes, level };
+        let kept = 12 * u64::from(points) + 16 * u64::from(tets) + Arena::measure(|a| MeshArrays::carve(a, points, tets))?;
+        let faces = Arena::measure(|a| MeshScratch::carve(a, tets))?;
+        let tree = Arena::measure(|a| {
+            CountScratch::carve(gpu, a, tets)?;
+            FilterScratch::carve(gpu, a, tets, options, &capacity)?;
+            SortedScratch::carve(gpu, a, &capacity)?;
+            TreeMemory::carve(a, &capacity, options)
+        })?;
+        Ok(kept + faces.max(tree))
+    }
+}

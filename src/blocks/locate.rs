@@ -1,0 +1,161 @@
+//! Points located in blocks.
+
+use super::cut::{Placed, Source, least_bytes};
+use super::{InBlocks, is_full, refusal, smaller};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::mesh::{Mesh, On};
+use crate::options::BuildOptions;
+use crate::query::{self, LocateOptions, Located};
+use crate::reference::boundary::NONE;
+use crate::reference::locate::{CHUNK, place};
+
+/// Bytes of device memory per point while points are located, and a reserve.
+const PER_POINT: u64 = 128;
+/// Fewer points at once are not worth a tree.
+const FEW: usize = 4096;
+
+/// Points of a mesh that may not fit the device.
+#[derive(Clone, Copy, Debug)]
+pub struct Points<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// How its trees are built.
+    pub options: BuildOptions,
+    /// Relative to the mesh's origin.
+    pub points: &'a [[f32; 3]],
+    /// How they are located.
+    pub how: LocateOptions,
+}
+
+/// The owner of each point, as [`query::locate`] finds them, within `memory` bytes of device memory. `report` is told how many points are done.
+///
+/// # Errors
+/// As [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+pub fn locate(
+    gpu: &Gpu,
+    memory: u64,
+    asked: &Points<'_>,
+    field: Option<(&[f32], On)>,
+    report: &dyn Fn(u64, u64),
+) -> Result<InBlocks<Located>> {
+    let (mesh, n) = (asked.mesh, asked.points.len());
+    if let Some((values, on)) = field {
+        let expected = if on == On::Points { mesh.points.len() } else { mesh.tets.len() };
+        if values.len() != expected {
+            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
+        }
+    }
+    let nan = f32::from_bits(0x7fc0_0000);
+    let values = vec![nan; if field.is_some() { n } else { 0 }];
+    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, stages: Vec::new() };
+    let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
+        let here = field.map(|(values, on)| (placed.values(values, on), on));
+        let here = here.as_ref().map(|(values, on)| (&values[..], *on));
+        let found = query::locate(&placed.mesh, &placed.tree, points, here, &asked.how, &|_, _| {})?;
+        for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
+            (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
+            if field.is_some() {
+                all.values[i] = found.values[k];
+            }
+        }
+        all.stages.extend(found.stages);
+        Ok(())
+    })?;
+    Ok(took.with(all))
+}
+
+/// Every tetrahedron that contains each point, as [`query::locate_all`] finds them.
+///
+/// # Errors
+/// As [`locate`].
+pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Vec<Vec<u32>>>> {
+    let mut all = vec![Vec::new(); asked.points.len()];
+    let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
+        let found = query::locate_all(&placed.mesh, &placed.tree, points, &asked.how, &|_, _| {})?;
+        for (&i, owners) in ids.iter().zip(found) {
+            all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
+        }
+        Ok(())
+    })?;
+    Ok(took.with(all))
+}
+
+/// What is done with some points, their numbers before them, that lie in a block or the whole. It may be done again with fewer.
+type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
+
+/// Asks the whole mesh, if it fits, or block after block.
+fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), ask: Ask<'_>) -> Result<InBlocks> {
+    let Points { mesh, ref options, points, .. } = *asked;
+    let gpu = &gpu.with_memory(memory);
+    let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };
+    let all: Vec<u32> = (0..points.len() as u32).collect();
+    if least_bytes(gpu, mesh, options)? <= memory {
+        let whole = job.took.build(|| Placed::whole(gpu, mesh, options));
+        match whole.and_then(|placed| job.ask(&placed, &all)) {
+            Err(e) if is_full(&e) => log::info!("in blocks, since the whole does not fit: {e}"),
+            other => return other.map(|()| job.end()),
+        }
+    }
+    let source = Source::new(mesh, options, memory)?;
+    // The others lie so far outside that they have no cell.
+    let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
+    let mut waiting = vec![(source.whole(), near)];
+    while let Some((block, ids)) = waiting.pop() {
+        if ids.is_empty() || block.tets.is_empty() {
+            continue;
+        }
+        let need = block.bytes(gpu, &source.options)?;
+        let mut why = None;
+        if need <= memory {
+            let placed = job.took.build(|| block.place(gpu, &source));
+            match placed.and_then(|placed| job.ask(&placed, &ids)) {
+                Err(e) if is_full(&e) => why = Some(e),
+                Err(e) => return Err(e),
+                Ok(()) => continue,
+            }
+        }
+        let Some([low, high]) = smaller(&source, &block) else {
+            return Err(refusal(gpu, block.tets.len(), need + PER_POINT * FEW as u64, why));
+        };
+        let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
+        let (below, above) = ids.into_iter().partition(is_low);
+        waiting.extend([(high, above), (low, below)]);
+    }
+    report(points.len() as u64, points.len() as u64);
+    Ok(job.end())
+}
+
+struct Job<'a> {
+    gpu: &'a Gpu,
+    points: &'a [[f32; 3]],
+    done: usize,
+    took: InBlocks,
+    ask: Ask<'a>,
+    report: &'a dyn Fn(u64, u64),
+}
+
+impl Job<'_> {
+    /// As many points at once as what memory is left will take.
+    fn ask(&mut self, placed: &Placed, ids: &[u32]) -> Result<()> {
+        let input = placed.mesh.input();
+        let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));
+        let most = usize::try_from(left / PER_POINT).unwrap_or(CHUNK).min(CHUNK);
+        if most < ids.len().min(FEW) {
+            let (bytes, reason) = (PER_POINT * FEW as u64, format!("{left} bytes are left"));
+            return Err(Error::Memory { name: "olbvh.blocks.points".into(), bytes, reason });
+        }
+        for chunk in ids.chunks(most.max(1)) {
+            let points: Vec<_> = chunk.iter().map(|&i| self.points[i as usize]).collect();
+            (self.ask)(chunk, &points, placed)?;
+            self.done += chunk.len();
+            (self.report)(self.done.min(self.points.len()) as u64, self.points.len() as u64);
+        }
+        log::debug!("{} points in {} tetrahedra", ids.len(), input.tets);
+        Ok(())
+    }
+
+    fn end(&self) -> InBlocks {
+        InBlocks { peak: self.gpu.memory_peak(), ..self.took.clone() }
+    }
+}

@@ -1,0 +1,86 @@
+//! Meshes that do not fit the device's memory, in blocks: built, asked and dropped one after the other, each within the bytes that may be used.
+//!
+//! Blocks divide the cells of the tree's level, a box of them each, cut in two where the tetrahedra of either side are as many. A block has its *core*, every
+//! tetrahedron that meets its cells, and around it the tetrahedra that share a face with the core. So every leaf over the block's own cells lists what it
+//! lists in the tree over the whole mesh, and has the same boundary flag: neighbours of the core are all there. The ids of points and tetrahedra keep their
+//! order, the grid is that of the whole mesh, and the level is the whole tree's ([`crate::options::BuildOptions::level`]). Hence each point is asked of one block,
+//! and **answers are those of the whole tree**, tolerance and gaps between cells included.
+//!
+//! - A mesh that fits is not cut. Whether a block fits is estimated first; what turns out larger is given up and cut again.
+//! - The limit is kept by [`Gpu::with_memory`], which counts every buffer, transfers included.
+//! - The mesh itself lies in host memory as a whole, and beside it 6 bytes per point and 4 per tetrahedron.
+//! - The level may be coarser than asked for where the bits of its cells would take more than an eighth of the memory. In cells that overlap each other
+//!   [`crate::options::Lists::Boundary`] may name another of those that contain a point, as always.
+
+mod cut;
+mod locate;
+mod overlap;
+
+pub use locate::{Points, locate, locate_all};
+pub use overlap::overlap;
+
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use cut::{Block, Source};
+use std::time::Instant;
+
+/// An answer, and what it took.
+#[derive(Clone, Debug, Default)]
+pub struct InBlocks<T = ()> {
+    /// The same as of the whole mesh.
+    pub answer: T,
+    /// Trees that were built for it; 1 per mesh where it fitted as a whole.
+    pub trees: u32,
+    /// The most bytes of device memory in use at once.
+    pub peak: u64,
+    /// Seconds for the trees, transfers included.
+    pub build_seconds: f64,
+}
+
+impl<T> InBlocks<T> {
+    /// The answer, and the rest.
+    pub fn apart(self) -> (T, InBlocks) {
+        let Self { answer, trees, peak, build_seconds } = self;
+        (answer, InBlocks { answer: (), trees, peak, build_seconds })
+    }
+}
+
+impl InBlocks {
+    /// With an answer.
+    #[must_use]
+    pub fn with<T>(self, answer: T) -> InBlocks<T> {
+        InBlocks { answer, trees: self.trees, peak: self.peak, build_seconds: self.build_seconds }
+    }
+
+    /// Builds a tree and says what it took.
+    fn build<T>(&mut self, build: impl FnOnce() -> Result<T>) -> Result<T> {
+        let start = Instant::now();
+        let built = build()?;
+        self.trees += 1;
+        self.build_seconds += start.elapsed().as_secs_f64();
+        Ok(built)
+    }
+}
+
+/// Tetrahedra of a block that is not cut again.
+const LEAST: usize = 1024;
+
+/// The halves of a block that is worth being cut.
+fn smaller(source: &Source<'_>, block: &Block) -> Option<[Block; 2]> {
+    if block.tets.len() > LEAST { source.halves(block) } else { None }
+}
+
+/// Whether something failed for want of memory or room, so that less of the mesh may do.
+fn is_full(error: &Error) -> bool {
+    matches!(error, Error::Memory { .. } | Error::TooLarge(_))
+}
+
+/// Why there is no answer: a block of `tets` tetrahedra takes about `bytes`, or more than there are, and is not cut again.
+fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
+    let why = why.map_or_else(String::new, |e| format!(" ({e})"));
+    let limit = gpu.memory_limit();
+    let enough = bytes.max(limit + limit / 2);
+    Error::TooLarge(format!(
+        "{limit} bytes of device memory are too few for a block of {tets} tetrahedra{why}; allow {enough} or more, or a finer tree (a smaller alpha)"
+    ))
+}

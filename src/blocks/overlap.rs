@@ -1,0 +1,167 @@
+//! Overlap of two meshes in blocks: pairs of blocks whose cells meet, the larger cut where a pair does not fit. What intersects lies in the cells of such a
+//! pair, so the answer is the union of theirs.
+
+use super::cut::{Block, Placed, Source, least_bytes};
+use super::{InBlocks, is_full, refusal, smaller};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::mesh::Mesh;
+use crate::options::BuildOptions;
+use crate::query::{self, Overlapped, Party};
+use std::cell::OnceCell;
+use std::rc::Rc;
+
+/// Bytes per tetrahedron of both meshes that the search takes: [`query::OverlapMemory`], [`query::PairMemory`].
+const PER_TET: u64 = 28;
+/// How far apart blocks may be, as a part of the extent of both meshes, that pairs which count as touching lie in: they are nearer than 1e-6 of the diagonal.
+const APART: f64 = 4e-6;
+
+/// A block, and its halves once they are asked for.
+struct Node {
+    block: Block,
+    halves: OnceCell<Option<[Rc<Node>; 2]>>,
+}
+
+impl Node {
+    fn new(block: Block) -> Rc<Self> {
+        Rc::new(Self { block, halves: OnceCell::new() })
+    }
+
+    fn halves(&self, source: &Source<'_>) -> Option<&[Rc<Self>; 2]> {
+        self.halves.get_or_init(|| smaller(source, &self.block).map(|halves| halves.map(Self::new))).as_ref()
+    }
+
+    fn tets(&self) -> usize {
+        self.block.tets.len()
+    }
+}
+
+/// Overlap of A and B, whose points lie in one space, as [`query::overlap`] finds it, within `memory` bytes of device memory. Pairs nearer to touching than
+/// 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The effort is the sum over all pairs of blocks.
+///
+/// # Errors
+/// As [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+pub fn overlap(
+    gpu: &Gpu,
+    memory: u64,
+    meshes: [&Mesh; 2],
+    options: &BuildOptions,
+    pairs: bool,
+    report: &dyn Fn(u64, u64),
+) -> Result<InBlocks<Overlapped>> {
+    let gpu = &gpu.with_memory(memory);
+    let mut took = InBlocks::default();
+    if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
+        let whole = |mesh| Placed::whole(gpu, mesh, options);
+        let found = took.build(|| whole(meshes[0])).and_then(|a| {
+            let b = took.build(|| whole(meshes[1]))?;
+            query::overlap(party(&a), party(&b), pairs, report)
+        });
+        match found {
+            Err(e) if is_full(&e) => log::info!("in blocks, since the whole does not fit: {e}"),
+            other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
+        }
+    }
+    let [a, b] = meshes.map(|mesh| Source::new(mesh, options, memory / 2));
+    let sources = [a?, b?];
+    let apart = APART * sources.iter().map(Source::extent).sum::<f64>();
+    let mut all = Overlapped::default();
+    let mut placed: [Option<(Rc<Node>, Placed)>; 2] = [None, None];
+    let mut waiting = vec![(sources.each_ref().map(|s| Node::new(s.whole())), 1.0)];
+    let mut done = 0.0;
+    while let Some((nodes, share)) = waiting.pop() {
+        if !meet(&sources, &nodes, apart) {
+            done += share;
+            continue;
+        }
+        let mut need = PER_TET * (nodes[0].tets() + nodes[1].tets()) as u64;
+        for (node, source) in nodes.iter().zip(&sources) {
+            need = need.saturating_add(node.block.bytes(gpu, &source.options)?);
+        }
+        let mut why = None;
+        if need <= memory {
+            match visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took) {
+                Err(e) if is_full(&e) => why = Some(e),
+                Err(e) => return Err(e),
+                Ok(found) => {
+                    merge(&mut all, found);
+                    done += share;
+                    report((done * 1e6) as u64, 1_000_000);
+                    continue;
+                }
+            }
+        }
+        let larger = usize::from(nodes[1].tets() > nodes[0].tets());
+        let cut = [larger, 1 - larger].into_iter().find_map(|side| Some((side, nodes[side].halves(&sources[side])?)));
+        let Some((side, halves)) = cut else { return Err(refusal(gpu, nodes[0].tets() + nodes[1].tets(), need, why)) };
+        for half in halves {
+            let mut next = nodes.clone();
+            next[side] = half.clone();
+            waiting.push((next, share / 2.0));
+        }
+    }
+    let overlap = &mut all.overlap;
+    for set in [&mut overlap.a, &mut overlap.b] {
+        set.sort_unstable();
+        set.dedup();
+    }
+    if let Some(found) = &mut overlap.pairs {
+        found.sort_unstable();
+        found.dedup();
+    }
+    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(all))
+}
+
+fn party(placed: &Placed) -> Party<'_> {
+    Party { mesh: &placed.mesh, tree: &placed.tree }
+}
+
+/// Whether the cells of two blocks are near enough for anything in them to touch.
+fn meet(sources: &[Source<'_>; 2], nodes: &[Rc<Node>; 2], apart: f64) -> bool {
+    let bounds = [0, 1].map(|i| nodes[i].block.bounds(&sources[i]));
+    let [Some([a_lo, a_hi]), Some([b_lo, b_hi])] = bounds else { return false };
+    (0..3).all(|c| a_lo[c] <= b_hi[c] + apart && b_lo[c] <= a_hi[c] + apart)
+}
+
+/// The overlap of two blocks in ids of the whole meshes. What is in device memory already stays there.
+fn visit(
+    gpu: &Gpu,
+    sources: &[Source<'_>; 2],
+    nodes: &[Rc<Node>; 2],
+    placed: &mut [Option<(Rc<Node>, Placed)>; 2],
+    pairs: bool,
+    took: &mut InBlocks,
+) -> Result<Overlapped> {
+    for (place, node) in placed.iter_mut().zip(nodes) {
+        place.take_if(|(there, _)| !Rc::ptr_eq(there, node));
+    }
+    for (place, (node, source)) in placed.iter_mut().zip(nodes.iter().zip(sources)) {
+        if place.is_none() {
+            *place = Some((node.clone(), took.build(|| node.block.place(gpu, source))?));
+        }
+    }
+    let [Some((_, a)), Some((_, b))] = placed else { return Ok(Overlapped::default()) };
+    let mut found = query::overlap(party(a), party(b), pairs, &|_, _| {})?;
+    log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
+    found.overlap.a.iter_mut().for_each(|t| *t = a.tet(*t));
+    found.overlap.b.iter_mut().for_each(|t| *t = b.tet(*t));
+    found.overlap.pairs.iter_mut().flatten().for_each(|[s, t]| (*s, *t) = (a.tet(*s), b.tet(*t)));
+    Ok(found)
+}
+
+fn merge(all: &mut Overlapped, found: Overlapped) {
+    all.stages.extend(found.stages);
+    all.submissions += found.submissions;
+    all.overlap.a.extend(found.overlap.a);
+    all.overlap.b.extend(found.overlap.b);
+    if let Some(pairs) = found.overlap.pairs {
+        all.overlap.pairs.get_or_insert_default().extend(pairs);
+    }
+    for (sum, effort) in all.overlap.effort.iter_mut().zip(found.overlap.effort) {
+        sum.by_vertex += effort.by_vertex;
+        sum.by_node += effort.by_node;
+        sum.searched += effort.searched;
+        sum.located += effort.located;
+        sum.narrow += effort.narrow;
+    }
+}

@@ -1,0 +1,122 @@
+//! Meshes that do not fit the memory allowed: in blocks, answers are those of the whole, and the memory is kept to.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+use olbvh::Error;
+use olbvh::blocks::{Points, locate, locate_all, overlap};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::query::{self, LocateOptions, Party, Path};
+
+const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
+
+/// Vertices, midpoints of edges, centres of faces and cells, points just outside and far outside.
+fn points(mesh: &Mesh, every: usize) -> Vec<[f32; 3]> {
+    let mean = |ids: &[u32]| [0, 1, 2].map(|c| ids.iter().map(|&v| mesh.points[v as usize][c]).sum::<f32>() / ids.len() as f32);
+    let valid = |ids: &&[u32; 4]| ids.iter().all(|&v| (v as usize) < mesh.points.len());
+    let of = |ids: &[u32; 4]| [mean(&ids[..1]), mean(&ids[1..3]), mean(&ids[..3]), mean(ids)];
+    let mut points: Vec<_> = mesh.tets.iter().filter(valid).step_by(every).flat_map(of).collect();
+    let out = |p: &[f32; 3], by: f32| p.map(|x| x * (1.0 + by) - by);
+    let outside: Vec<_> = points.iter().step_by(7).flat_map(|p| [out(p, 2e-6), out(p, 0.1), out(p, 9.0)]).collect();
+    points.extend(outside);
+    points.push([f32::NAN; 3]);
+    points
+}
+
+fn bits(values: &[f32]) -> Vec<u32> {
+    values.iter().map(|v| v.to_bits()).collect()
+}
+
+fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance, path, on): (f32, Path, On)) -> u32 {
+    let points = points(mesh, 3);
+    let how = LocateOptions { tolerance, path };
+    let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(gpu, &device, options).unwrap();
+    let asked = Points { mesh, options: *options, points: &points, how };
+    let mut most = 0;
+    for field in mesh.fields.iter().filter(|f| f.on == on) {
+        let field = (&field.values[..], field.on);
+        let whole = query::locate(&device, &tree, &points, Some(field), &how, QUIET).unwrap();
+        let found = locate(gpu, memory, &asked, Some(field), QUIET).unwrap();
+        let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
+        let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
+        assert_eq!(first, None, "{options:?}");
+        assert_eq!(bits(found.answer.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
+        assert_eq!(bits(&found.answer.values), bits(&whole.values));
+        assert!(found.peak <= memory && found.peak > memory / 4, "{} of {memory} bytes", found.peak);
+        println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
+        most = most.max(found.trees);
+    }
+    let how = LocateOptions { path: Path::Descent, ..how };
+    let whole = query::locate_all(&device, &tree, &points, &how, QUIET).unwrap();
+    assert_eq!(locate_all(gpu, memory, &Points { how, ..asked }, QUIET).unwrap().answer, whole);
+    most
+}
+
+/// With fields on points and cells, and cells that are bad.
+fn grid() -> Mesh {
+    let mut mesh = kuhn_jittered([14, 13, 12], 0.15, 5).unwrap();
+    for k in (0..mesh.tets.len()).step_by(997) {
+        mesh.tets[k][k % 4] = u32::MAX - k as u32 % 2;
+    }
+    let values = (0..mesh.tets.len()).map(|i| i as f32).collect();
+    mesh.fields.push(Field { name: "number".into(), on: On::Cells, values });
+    mesh
+}
+
+/// One test, since pipelines are compiled once for it.
+#[test]
+fn answers_are_those_of_the_whole() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = grid();
+    located(&gpu, &mesh);
+    refused(&gpu, &mesh);
+    overlapped(&gpu, &mesh);
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+fn located(gpu: &Gpu, mesh: &Mesh) {
+    for (alpha, assign, lists, how) in [
+        (0.0, Assign::Aabb, Lists::Boundary, (1e-5, Path::Sorted, On::Points)),
+        (1.0, Assign::Aabb, Lists::All, (0.01, Path::Runs, On::Cells)),
+    ] {
+        let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
+        let trees = check(gpu, mesh, &options, 768 << 10, how);
+        assert!(trees > 4, "{trees} trees");
+    }
+}
+
+/// What fits is not cut, and too little is refused with the sizes.
+fn refused(gpu: &Gpu, mesh: &Mesh) {
+    let options = BuildOptions::default();
+    let points = points(mesh, 100);
+    let asked = Points { mesh, options, points: &points, how: LocateOptions::default() };
+    assert_eq!(locate(gpu, 64 << 20, &asked, None, QUIET).unwrap().trees, 1);
+    let refused = locate(gpu, 1 << 14, &asked, None, QUIET).unwrap_err();
+    assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
+    // What it says would do does.
+    let said = refused.to_string();
+    let enough = said.split("allow ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
+    assert!(locate(gpu, enough, &asked, None, QUIET).unwrap().trees > 4, "{said}");
+}
+
+fn overlapped(gpu: &Gpu, a: &Mesh) {
+    let mut b = kuhn_jittered([9, 16, 9], 0.15, 8).unwrap();
+    b.points.iter_mut().for_each(|p| *p = [0.8 * p[0] + 0.3 * p[1] + 3.3, p[1] - 2.2, p[2] + 0.1 * p[0] + 9.1]);
+    for (pairs, lists) in [(false, Lists::Boundary), (true, Lists::All)] {
+        let options = BuildOptions { lists, ..BuildOptions::default() };
+        let devices = [a, &b].map(|mesh| DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
+        let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
+        let [x, y] = [0, 1].map(|i| Party { mesh: &devices[i], tree: &trees[i] });
+        let whole = query::overlap(x, y, pairs, QUIET).unwrap().overlap;
+        let memory = 2 << 20;
+        let found = overlap(gpu, memory, [a, &b], &options, pairs, QUIET).unwrap();
+        println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
+        assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
+        assert_eq!(found.answer.overlap.a, whole.a);
+        assert_eq!(found.answer.overlap.b, whole.b);
+        assert_eq!(found.answer.overlap.pairs, whole.pairs);
+    }
+}
