@@ -115,7 +115,7 @@ impl<'a> Source<'a> {
     }
 
     /// Two blocks for one, with about as many tetrahedra in either; `None` if that does not make it smaller.
-    pub(super) fn halves(&self, block: &Block) -> Option<[Block; 2]> {
+    pub(super) fn cut_in_two(&self, block: &Block) -> Option<[Block; 2]> {
         let span = block.span?;
         let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
         let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;

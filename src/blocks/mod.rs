@@ -67,7 +67,7 @@ const LEAST: usize = 1024;
 
 /// The halves of a block that is worth being cut.
 fn smaller(source: &Source<'_>, block: &Block) -> Option<[Block; 2]> {
-    if block.tets.len() > LEAST { source.halves(block) } else { None }
+    if block.tets.len() > LEAST { source.cut_in_two(block) } else { None }
 }
 
 /// Whether something failed for want of memory or room, so that less of the mesh may do.

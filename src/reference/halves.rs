@@ -1,10 +1,11 @@
 //! What an entry says of where in its leaf's cell it lies, so that a search passes most of a list over. Twin of `glsl/shared/halves.glsl`.
 //!
-//! A cell is cut in two along each axis. An entry is *near* a half that the quantized box of its primitive meets, once the box has grown by a cell of the
-//! finest grid all around: bit 2 c is the lower half along axis c, bit 2 c + 1 the upper one. The six bits stand above the primitive in the entry's word. A point that a
-//! primitive owns is near it, too: the primitive's box holds it, or it lies outside by at most three times the tolerance of the box (SPEC 3.1.4), which
-//! is less than a finest cell for tolerances below 2^-12. For larger ones boxes grow by more, and halves are not asked. On an axis so short beside the
-//! largest that normalised coordinates cannot tell its finest cells apart, everything is near.
+//! A cell is cut in two along each axis. An entry is *near* a half that the quantized box of its primitive meets, once the box has grown by a cell
+//! of the finest grid all around: bit 2 c is the lower half along axis c, bit 2 c + 1 the upper one. The six bits stand above the primitive in the
+//! entry's word. A point that a primitive owns is near it, too: the primitive's box holds it, or it lies outside by at most three times the
+//! tolerance of the box (SPEC 3.1.4), which is less than a finest cell for tolerances below 2^-12. For larger ones boxes grow by more, and halves
+//! are not asked; the octants of leaves still are, so that a point outside may be found under one α and not under another, as at the border of a
+//! leaf. On an axis so short beside the largest that normalised coordinates cannot tell its finest cells apart, everything is near.
 
 use super::grid::{Grid, MAX_LEVEL, unmorton};
 use super::vertices::{CellRange, Vertices};

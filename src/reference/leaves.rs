@@ -60,7 +60,7 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
 pub const OCTANTS_ASKED: usize = 16_384;
 
 /// The mask of a leaf with entries `listed`: bit d says that one of them is near to the octant of its cell with the 3-bit Morton digit d. All octants of
-/// leaves without boundary primitives, of long lists, and where entries have no halves.
+/// leaves without boundary primitives, of long lists, and where entries have no halves. In the others no point has an owner (tolerances below 2^-12).
 pub fn octants(listed: Range<usize>, boundary: bool, halves: &[u8]) -> u32 {
     if !boundary || halves.is_empty() || listed.len() > OCTANTS_ASKED {
         return if listed.is_empty() { 0 } else { ALL_OCTANTS };
