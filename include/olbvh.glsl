@@ -583,27 +583,25 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
 
-// The next entry of [i, end) that is near, `t` its primitive and `cell` the vertices. Most are not: they are passed over here, so that invocations wait for
-// each other less.
-uint olbvh_next_near(uint i, uint end, olbvh_Sought s, out uint t, out uvec4 cell) {
-    uint ids = olbvh_grid.at[0].ids;
-    for (; i < end; ++i) {
-        uint entry = olbvh_p.at[i];
-        if ((entry >> olbvh_ID_BITS & s.halves) != s.halves) continue;
-        t = entry & ids;
-        cell = olbvh_cells.at[t];
-        if (olbvh_is_near(cell, s)) break;
+// Of up to 32 entries from `begin` on, those before `end` that are near, a bit each. Most are not; each test is made for all of them before the next, so that
+// invocations wait for each other less.
+uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) {
+    uint ids = olbvh_grid.at[0].ids, count = min(32u, end - begin), left = 0u, olbvh_near = 0u;
+    for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] >> olbvh_ID_BITS & s.halves) == s.halves) << k;
+    for (; left != 0u; left &= left - 1u) {
+        if (olbvh_is_near(olbvh_cells.at[olbvh_p.at[begin + findLSB(left)] & ids], s)) olbvh_near |= left & -left;
     }
-    return i;
+    return olbvh_near;
 }
 
 // Looks at entries [begin, end) in order, ends at the first that contains the point.
 void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
-    uint t;
-    uvec4 cell;
-    for (uint i = olbvh_next_near(begin, end, s, t, cell); i < end && !best.inside; i = olbvh_next_near(i + 1u, end, s, t, cell)) {
-        olbvh_Tet tet = olbvh_load_tet(cell);
-        olbvh_consider(best, t, tet, olbvh_weights(tet, s.x));
+    for (; begin < end && !best.inside; begin += 32u) {
+        for (uint olbvh_near = olbvh_near_among(begin, end, s); olbvh_near != 0u && !best.inside; olbvh_near &= olbvh_near - 1u) {
+            uint t = olbvh_listed_tet(begin + findLSB(olbvh_near));
+            olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+            olbvh_consider(best, t, tet, olbvh_weights(tet, s.x));
+        }
     }
 }
 

@@ -75,12 +75,13 @@ void main() {
     }
     uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
     Sought sought = sought_at(g, at, x, 0.0);
-    uint t;
-    uvec4 cell;
-    for (uint e = next_near(begin, end, sought, t, cell); e < end; e = next_near(e + 1u, end, sought, t, cell)) {
-        if (!weights(load_tet(cell), x).inside) continue;
-        if (FILL != 0u && place < capacity) found.at[place] = t;
-        ++place;
+    for (; begin < end; begin += 32u) {
+        for (uint near = near_among(begin, end, sought); near != 0u; near &= near - 1u) {
+            uint t = listed_tet(begin + findLSB(near));
+            if (!weights(load_tet(cells.at[t]), x).inside) continue;
+            if (FILL != 0u && place < capacity) found.at[place] = t;
+            ++place;
+        }
     }
     places.at[i] = place;
 }

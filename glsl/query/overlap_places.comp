@@ -46,14 +46,15 @@ void main() {
             Sought sought = sought_at(g, x, normalise(g, x), 0.0);
             uvec2 range = entry_range(leaf);
             uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
-            uint t;
-            uvec4 cell;
-            for (uint e = next_near(begin, end, sought, t, cell); e < end; e = next_near(e + 1u, end, sought, t, cell)) {
-                if (!weights(load_tet(cell), sought.x).inside) continue;
-                places.at[i] = 1u;
-                atomicOr(around.at[t >> 5u], 1u << (t & 31u));
-                break;
+            bool inside = false;
+            for (; begin < end && !inside; begin += 32u) {
+                for (uint near = near_among(begin, end, sought); near != 0u && !inside; near &= near - 1u) {
+                    uint t = listed_tet(begin + findLSB(near));
+                    inside = weights(load_tet(cells.at[t]), sought.x).inside;
+                    if (inside) atomicOr(around.at[t >> 5u], 1u << (t & 31u));
+                }
             }
+            places.at[i] = uint(inside);
         }
     }
     located = subgroupAdd(located);

@@ -2,27 +2,25 @@
 
 #include "shared/candidates.glsl"
 
-// The next entry of [i, end) that is near, `t` its primitive and `cell` the vertices. Most are not: they are passed over here, so that invocations wait for
-// each other less.
-uint next_near(uint i, uint end, Sought s, out uint t, out uvec4 cell) {
-    uint ids = grid.at[0].ids;
-    for (; i < end; ++i) {
-        uint entry = p.at[i];
-        if ((entry >> ID_BITS & s.halves) != s.halves) continue;
-        t = entry & ids;
-        cell = cells.at[t];
-        if (is_near(cell, s)) break;
+// Of up to 32 entries from `begin` on, those before `end` that are near, a bit each. Most are not; each test is made for all of them before the next, so that
+// invocations wait for each other less.
+uint near_among(uint begin, uint end, Sought s) {
+    uint ids = grid.at[0].ids, count = min(32u, end - begin), left = 0u, near = 0u;
+    for (uint k = 0u; k < count; ++k) left |= uint((p.at[begin + k] >> ID_BITS & s.halves) == s.halves) << k;
+    for (; left != 0u; left &= left - 1u) {
+        if (is_near(cells.at[p.at[begin + findLSB(left)] & ids], s)) near |= left & -left;
     }
-    return i;
+    return near;
 }
 
 // Looks at entries [begin, end) in order, ends at the first that contains the point.
 void search(inout Best best, uint begin, uint end, Sought s) {
-    uint t;
-    uvec4 cell;
-    for (uint i = next_near(begin, end, s, t, cell); i < end && !best.inside; i = next_near(i + 1u, end, s, t, cell)) {
-        Tet tet = load_tet(cell);
-        consider(best, t, tet, weights(tet, s.x));
+    for (; begin < end && !best.inside; begin += 32u) {
+        for (uint near = near_among(begin, end, s); near != 0u && !best.inside; near &= near - 1u) {
+            uint t = listed_tet(begin + findLSB(near));
+            Tet tet = load_tet(cells.at[t]);
+            consider(best, t, tet, weights(tet, s.x));
+        }
     }
 }
 
