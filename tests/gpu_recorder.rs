@@ -226,6 +226,7 @@ fn construction() {
                 (false, Capacity::for_entries(60_000, 8)),
                 (true, Capacity::for_entries(60_000, 1)),
                 (true, Capacity::for_entries(tets, 0)),
+                (false, Capacity { candidates: 60_000, ..Capacity::for_entries(2 * tets, 2) }),
             ] {
                 let options = BuildOptions { assign, boxes, ..Default::default() };
                 let carve = |a: &mut Arena| {

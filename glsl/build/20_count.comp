@@ -2,9 +2,11 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes, 1 of 2: cells in the quantized box of every tetrahedron, or shares of up to SHARE of them, one at least; one more element for the total.
+// Codes, 1 of 2: cells in the quantized box of every tetrahedron, or shares of up to SHARE of them, one at least; one more element for the total. Where a
+// finer level has left marks, they are cleared on the way.
 layout(constant_id = 2) const uint SHARE = 1;
-ARGUMENTS(5)
+layout(constant_id = 3) const uint CLEAR = 0;
+ARGUMENTS(6)
     uint tets;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -12,14 +14,17 @@ BUFFER16(1, readonly, uvec4, quantized)
 BUFFER16(2, readonly, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, writeonly, uint, counts) // tets + 1
+BUFFER(5, writeonly, uint, marks)  // one bit per cell of the level
 #include "shared/cells.glsl"
 
 void main() {
     uint t = item_index();
     if (t > tets) return;
+    Grid g = grid.at[0];
+    uint words = CLEAR == 0u ? 0u : ((1u << 3u * g.level) + 31u) / 32u;
+    for (uint i = t; i < words; i += tets + 1u) marks.at[i] = 0u;
     uint n = 0u;
     if (t < tets) {
-        Grid g = grid.at[0];
         uvec3 size = coarser(finest_box(t), g.level).size;
         n = size.x * size.y * size.z;
         if (SHARE > 1u) n = max(n / SHARE + uint(n % SHARE != 0u), 1u);

@@ -2,6 +2,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
+#include "shared/groups.glsl"
 // From the number of entries to the length of the table of splits (STAGE 0); from the scanned table to NO and the dispatches of the
 // leaves and the levels (STAGE 1).
 layout(constant_id = 2) const uint STAGE = 0;
@@ -20,11 +21,8 @@ BUFFER(5, writeonly, uint, groups)         // x, y, z: per level 0…10, then th
 BUFFER(6, readonly, uint, node_total)      // total of the table's scan
 
 void plan(uint slot, uint items) {
-    uint g = items / EACH + uint(items % EACH != 0u);
-    bool fold = g > 65535u;
-    groups.at[3u * slot] = fold ? 32768u : g;
-    groups.at[3u * slot + 1u] = fold ? (g + 32767u) / 32768u : 1u;
-    groups.at[3u * slot + 2u] = 1u;
+    uvec3 size = groups_for(items, EACH);
+    for (uint c = 0u; c < 3u; ++c) groups.at[3u * slot + c] = size[c];
 }
 
 void main() {

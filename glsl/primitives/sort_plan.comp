@@ -1,5 +1,6 @@
 #version 460
 #include "shared/kernel.glsl"
+#include "shared/groups.glsl"
 #include "shared/sort.glsl"
 // From the number of pairs to what the passes need: workgroups, and the length of the table of counts.
 ARGUMENTS(3)
@@ -16,10 +17,7 @@ void main() {
     uint n = min(count, live.at[0]);
     uint tiles = sort_tiles(n, tile);
     uint stride = tiles == 0u ? 0u : sort_stride(tiles);
-    uint g = (stride + per_group - 1u) / per_group;
-    bool fold = g > 65535u;
-    groups.at[0] = fold ? 32768u : g;
-    groups.at[1] = fold ? (g + 32767u) / 32768u : 1u;
-    groups.at[2] = 1u;
+    uvec3 size = groups_for(stride, per_group);
+    for (uint c = 0u; c < 3u; ++c) groups.at[c] = size[c];
     table.at[0] = stride * DIGITS;
 }

@@ -28,7 +28,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
-use stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_fit, cmd_leaves, cmd_levels, cmd_splits, entries};
 
 /// Scratch memory of a whole build.
 #[derive(Clone, Copy, Debug)]
@@ -83,6 +83,7 @@ pub fn cmd_build(
     cmd_count(r, mesh, tree.grid, options, counts)?;
     if let Some(filter) = filter {
         cmd_filter(r, mesh, tree.grid, options, counts, filter)?;
+        cmd_fit(r, mesh, tree, capacity, options, counts, filter)?;
     }
     cmd_codes(r, mesh, tree, capacity, counts, filter.as_ref(), sorted)?;
     let entries = entries(capacity, counts, filter.as_ref());

@@ -9,9 +9,12 @@ use crate::primitives::{Arena, ScanScratch, SortScratch};
 /// Sizes that bound a build. A recorded one wants room for as many candidates as there are tetrahedra: [`super::BuildScratch::carve`] refuses less.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacity {
-    /// Cells in the quantized boxes of all tetrahedra, the entries of `Aabb`.
+    /// Cells in the quantized boxes of all tetrahedra, the entries of `Aabb`. They take scratch memory only, 12 bytes for every 32 where they are
+    /// filtered.
     pub candidates: u32,
-    /// Entries of the assignment chosen.
+    /// Entries of the assignment and the lists chosen. Where there is room for fewer than for candidates, a recorded build filters, counts, and filters the
+    /// next coarser level until they fit, which for each level down to the root's takes 17 dispatches, empty ones where they fit at once. One entry per
+    /// tetrahedron is enough for a tree, whatever the mesh.
     pub entries: u32,
     /// Nodes.
     pub nodes: u32,
@@ -148,6 +151,8 @@ pub struct FilterScratch {
     pub(crate) entries: BufferRef,
     pub(crate) arguments: BufferRef,
     pub(crate) seeds: Option<SeedScratch>,
+    /// Where entries may be too many.
+    pub(crate) tries: Option<TryScratch>,
     pub(crate) scan: ScanScratch,
 }
 
@@ -170,8 +175,26 @@ impl FilterScratch {
             entries: arena.words(1)?,
             arguments: arena.words(3)?,
             seeds,
+            tries: if capacity.entries < capacity.candidates { Some(TryScratch::carve(arena)?) } else { None },
             scan: ScanScratch::carve(gpu, arena, most)?,
         }))
+    }
+}
+
+/// What it takes to filter coarser levels until the entries fit.
+#[derive(Clone, Copy, Debug)]
+pub struct TryScratch {
+    /// Tetrahedra of the try and one, or 0 where there is none.
+    pub(crate) live: BufferRef,
+    /// Of its three dispatches over tetrahedra.
+    pub(crate) groups: BufferRef,
+    pub(crate) shares: BufferRef,
+    pub(crate) entries: BufferRef,
+}
+
+impl TryScratch {
+    fn carve(arena: &mut Arena) -> Result<Self> {
+        Ok(Self { live: arena.words(1)?, groups: arena.words(9)?, shares: arena.words(1)?, entries: arena.words(1)? })
     }
 }
 

@@ -25,6 +25,8 @@ pub(crate) enum Way {
     Tight,
     /// [`cmd_build`] with room for one entry less than the heuristic's level needs.
     Clipped,
+    /// [`cmd_build`] with room for all candidates, and for one entry less than the heuristic's level keeps of them.
+    Narrow,
     /// [`cmd_build`] with as much room as level 0 may need, and no more.
     Root,
     /// [`cmd_build`] within a budget of less than level 0: nothing is built, and the status says so.
@@ -40,6 +42,7 @@ impl Way {
             Self::Recorded => "recorded",
             Self::Tight => "tight",
             Self::Clipped => "clipped",
+            Self::Narrow => "narrow",
             Self::Root => "root",
             Self::Nothing => "nothing",
             Self::Shallow => "shallow",
@@ -62,7 +65,7 @@ pub(crate) struct BuildCase {
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, ..BuildOptions::default() };
     if case.way == Way::Owned {
-        return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), 10)?);
+        return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), u32::MAX, 10)?);
     }
     let (capacity, expected) = within(case.way, twin, &options)?;
     let budget = (case.way == Way::Nothing).then(|| Memory::most(&twin.sizes.entries, 0, case.boxes).total() - 1);
@@ -81,11 +84,14 @@ fn within(way: Way, twin: &mut Twin, options: &BuildOptions) -> Verdict<(Capacit
         Way::Clipped => (room.saturating_sub(1).max(tets), if options.lists == Lists::All { 10 } else { heuristic }),
         Way::Root | Way::Nothing => (tets, 10),
         Way::Shallow => (room, 2),
+        Way::Narrow => (room, heuristic),
         Way::Owned | Way::Recorded | Way::Tight => (room, 10),
     };
     let ample = way == Way::Recorded || way == Way::Tight;
     let fits = if ample { u32::MAX } else { entries };
-    let expected = Expected::new(twin, options, (way != Way::Nothing).then_some(fits), level)?;
+    let kept = if way == Way::Narrow { twin.built(options.assign, options.lists, heuristic)?.tree().p.len() as u32 } else { 0 };
+    let narrow = if way == Way::Narrow { kept.saturating_sub(1).max(tets) } else { u32::MAX };
+    let expected = Expected::new(twin, options, (way != Way::Nothing).then_some(fits), narrow, level)?;
     let capacity = match way {
         Way::Tight => Capacity {
             candidates: expected.status.candidates.max(tets),
@@ -94,6 +100,7 @@ fn within(way: Way, twin: &mut Twin, options: &BuildOptions) -> Verdict<(Capacit
             level: expected.status.level,
         },
         Way::Recorded => Capacity::for_entries(entries + entries / 2 + 100, level),
+        Way::Narrow => Capacity { candidates: entries, ..Capacity::for_entries(narrow, level) },
         _ => Capacity::for_entries(entries, level),
     };
     Ok((capacity, expected))

@@ -21,8 +21,8 @@ pub(crate) struct Expected {
 }
 
 impl Expected {
-    /// Within `room` candidates, `None`: not even those of the root, and down to `level` at most.
-    pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, room: Option<u32>, level: u32) -> Verdict<Self> {
+    /// Within `room` candidates, `None`: not even those of the root, `most` entries, and down to `level` at most.
+    pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, room: Option<u32>, most: u32, level: u32) -> Verdict<Self> {
         let sizes = twin.sizes;
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
         let mut status = BuildStatus { heuristic_level: heuristic, ..BuildStatus::default() };
@@ -33,11 +33,15 @@ impl Expected {
         }
         // A capacity of the deepest level that is allowed is a capacity for no deeper one (more entries at each), except where levels tie.
         let fits = |k: u32| k <= level && room.is_some_and(|room| sizes.entries[k as usize] <= u64::from(room));
-        let Some(chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
+        let Some(mut chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
             status.overflow = 1;
             return Ok(Self { offsets: Vec::new(), boxes: options.boxes, status, built: None });
         };
-        let built = twin.built(options.assign, options.lists, chosen)?;
+        let mut built = twin.built(options.assign, options.lists, chosen)?;
+        while chosen > 0 && built.tree().p.len() as u64 > u64::from(most) {
+            chosen -= 1;
+            built = twin.built(options.assign, options.lists, chosen)?;
+        }
         let tree = built.tree();
 
         let share = if options.assign == Assign::Aabb && options.lists == Lists::All { 1 } else { 32 };

@@ -1,0 +1,47 @@
+#version 460
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/groups.glsl"
+// Whether the entries that the filter kept fit. Where they do not, the next coarser level is counted and filtered: between two of these kernels stands a try,
+// whose dispatches are empty once it fits.
+layout(constant_id = 2) const uint EACH = 64; // items per workgroup of those dispatches
+ARGUMENTS(8)
+    uint tets;
+    uint capacity; // entries
+    uint first;    // not 0: nothing has been tried yet
+END_ARGUMENTS
+BUFFER16(0, READ_WRITE, Grid, grid)
+BUFFER(1, READ_WRITE, BuildStatus, status)
+BUFFER(2, writeonly, uint, shares)  // their number, and the entries, at the level that was filtered last
+BUFFER(3, READ_WRITE, uint, entries)
+BUFFER(4, readonly, uint, tried_shares) // the same two, of the try
+BUFFER(5, readonly, uint, tried_entries)
+BUFFER(6, READ_WRITE, uint, live)   // tetrahedra of the try and one, or 0
+BUFFER(7, writeonly, uint, groups)  // x, y, z: over tetrahedra and one, over words of a bit for each, over tetrahedra
+
+void plan(uint slot, uint items) {
+    uvec3 size = groups_for(items, EACH);
+    for (uint c = 0u; c < 3u; ++c) groups.at[3u * slot + c] = size[c];
+}
+
+void main() {
+    if (item_index() > 0u) return;
+    bool filtered = first != 0u || live.at[0] > 0u;
+    if (first == 0u && filtered) {
+        shares.at[0] = tried_shares.at[0];
+        entries.at[0] = tried_entries.at[0];
+    }
+    uint level = grid.at[0].level;
+    bool again = filtered && entries.at[0] > capacity && level > 0u;
+    if (again) {
+        --level;
+        grid.at[0].level = level;
+        status.at[0].level = level;
+        status.at[0].candidates = status.at[0].total[2u * level];
+    }
+    uint n = again ? tets : 0u;
+    live.at[0] = again ? tets + 1u : 0u;
+    plan(0u, again ? tets + 1u : 0u);
+    plan(1u, (n + 31u) / 32u);
+    plan(2u, n);
+}
