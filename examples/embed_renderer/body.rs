@@ -73,9 +73,9 @@ impl Body {
         let faces = surface(&mesh.tets);
         let triangles = host.filled("triangles", &faces, vk::BufferUsageFlags::INDEX_BUFFER)?;
 
-        // Sizes first: what the largest tree may need. Where a deformed body would need more, the device builds a coarser one.
+        // Sizes first: what most trees need. Where a deformed body would need more, the device builds a coarser one.
         let options = BuildOptions::default();
-        let capacity = Capacity::for_entries(24 * tets, 7);
+        let capacity = Capacity::usual(tets, 7);
         let carve_slot = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?));
         let carve_scratch = |a: &mut Arena| Ok((MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?));
         let device_buffer = |name: &str, size| host.buffer(name, size, USAGE, MemoryLocation::GpuOnly);

@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
-use crate::options::{Assign, BuildOptions, Lists};
+use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
 
 /// Sizes that bound a build. A recorded one wants room for as many candidates as there are tetrahedra: [`super::BuildScratch::carve`] refuses less.
@@ -27,6 +27,12 @@ impl Capacity {
     pub fn for_entries(entries: u32, level: u32) -> Self {
         let nodes = (1..=level).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
+    }
+
+    /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with lists where the boundary is; the trees of
+    /// others get coarser.
+    pub fn usual(tets: u32, level: u32) -> Self {
+        Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8), level) }
     }
 
     /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, so that whatever is built lies within them.

@@ -56,8 +56,8 @@ impl Body {
         let asked = gpu.upload("wgpu_frame.places", &places)?;
         let on_device = gpu.upload("wgpu_frame.field", &field)?;
 
-        // Sizes first: what the largest tree may need. Where the moved body would need more, the device builds a coarser one.
-        let (options, capacity) = (BuildOptions::default(), Capacity::for_entries(24 * tets, 7));
+        // Sizes first: what most trees need. Where the moved body would need more, the device builds a coarser one.
+        let (options, capacity) = (BuildOptions::default(), Capacity::usual(tets, 7));
         let carve = |a: &mut Arena| {
             let (arrays, tree) = (MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?);
             let (mesh, build) = (MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
