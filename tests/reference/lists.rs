@@ -7,6 +7,7 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Locator, order_of};
+use olbvh::reference::walk::STEPS;
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
@@ -50,8 +51,8 @@ fn entries_grow_with_the_surface() {
 }
 
 /// Points on faces, edges and vertices, an ulp away from them, along edges' extensions, and anywhere.
-fn adversarial(mesh: &Mesh, topology: &Topology, n: usize) -> Vec<[f32; 3]> {
-    let mut random = Random(23);
+fn adversarial(mesh: &Mesh, topology: &Topology, seed: u64, n: usize) -> Vec<[f32; 3]> {
+    let mut random = Random(seed);
     let grid = &topology.grid;
     let ulp = |x: f32, d: usize| [x.next_down(), x, x.next_up()][d];
     (0..n)
@@ -78,7 +79,7 @@ fn adversarial(mesh: &Mesh, topology: &Topology, n: usize) -> Vec<[f32; 3]> {
 
 fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
     let (mesh, topology) = prepared(mesh);
-    let points = adversarial(&mesh, &topology, n);
+    let points = adversarial(&mesh, &topology, 23, n);
     let (mut steps, mut detours) = (0, 0);
     for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (2.0, Assign::Planes)] {
         let [all, tree] = both(&mesh, &topology, alpha, assign);
@@ -107,6 +108,30 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
         (steps, detours) = (steps.max(s), detours.max(d));
     }
     (steps, detours)
+}
+
+/// No walk circles or loses its point. `OLBVH_TEST_POINTS=100000000` asks for so many, in a larger mesh.
+#[test]
+fn every_walk_ends() {
+    let asked = std::env::var("OLBVH_TEST_POINTS").ok().and_then(|n| n.parse::<usize>().ok());
+    let (n, side) = asked.map_or((40_000, 14), |n| (n, 40));
+    let (mesh, topology) = prepared(kuhn_jittered([side; 3], 0.2, 11).unwrap());
+    let tree = build(&mesh, &topology, &BuildOptions { lists: Lists::Boundary, ..options(1.0, Assign::Exact) }).unwrap();
+    let locator = Locator::new(&mesh, &topology, &tree);
+    let (mut walked, mut longest) = (0, 0);
+    for chunk in 0..n.div_ceil(1 << 20) {
+        let points = adversarial(&mesh, &topology, 23 + chunk as u64, (n - (chunk << 20)).min(1 << 20));
+        let walk = |&p: &[f32; 3]| {
+            assert_ne!(locator.locate(p).owner, NONE, "{p:?} is lost");
+            let Some(walk) = locator.walk(p) else { return (0, 0) };
+            assert!(walk.detours == 0 && walk.steps < STEPS, "{p:?}: {walk:?}");
+            (1, walk.steps)
+        };
+        let (walks, steps) = points.par_iter().map(walk).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1.max(b.1)));
+        (walked, longest) = (walked + walks, longest.max(steps));
+    }
+    println!("{walked} of {n} points walked to, the others searched in lists; the longest walk has {longest} steps");
+    assert!(walked > n / 4);
 }
 
 #[test]
