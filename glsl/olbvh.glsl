@@ -23,6 +23,7 @@
 #ifndef OLBVH_BINDING
 #define OLBVH_BINDING 0
 #endif
+#extension GL_EXT_control_flow_attributes : require
 #ifdef OLBVH_DESCRIPTORS
 #define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
     layout(set = OLBVH_SET, binding = OLBVH_BINDING + slot, std430) readonly buffer name##Block { T at[]; } name;

@@ -23,6 +23,7 @@
 #ifndef OLBVH_BINDING
 #define OLBVH_BINDING 0
 #endif
+#extension GL_EXT_control_flow_attributes : require
 #ifdef OLBVH_DESCRIPTORS
 #define OLBVH_BUFFER(slot, alignment, T, name)                                                                                  \
     layout(set = OLBVH_SET, binding = OLBVH_BINDING + slot, std430) readonly buffer name##Block { T at[]; } name;
@@ -754,7 +755,7 @@ bool olbvh_in_star(uint t) {
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
     uvec4 beside = olbvh_neighbours.at[t];
-    for (uint f = 0u; f < 4u; ++f) {
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
         if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_cells.at[u]), x))) olbvh_star[olbvh_star_size++] = u;
@@ -776,27 +777,20 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
 
 bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.olbvh_smallest >= olbvh_GAP); }
 
-// Part 1, from `t` for at most `most` steps; whether the owner is settled.
-bool olbvh_walk_towards(uint t, vec3 x, uint most, inout olbvh_Best best) {
-    uint arrivals = 0u;
-    for (uint s = 0u; s < most; ++s) {
+// Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
+bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout olbvh_Best best) {
+    for (; s < olbvh_STEPS; ++s) {
         olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
         olbvh_Weights w = olbvh_weights(tet, x);
-        if (w.clear) {
-            best = olbvh_Best(t, true, true, 0.0);
-            break;
-        }
-        if (olbvh_near(w)) {
-            olbvh_arrive(t, x, best);
-            if (olbvh_settled(best) || ++arrivals == olbvh_ARRIVALS) break;
-        }
+        if (w.clear) best = olbvh_Best(t, true, true, 0.0);
+        if (w.clear || (olbvh_near(w) && !leave)) return !w.clear;
+        leave = false;
         vec4 own = olbvh_own_weights(w, tet);
-        uint face = olbvh_outermost(own);
-        if (own[face] >= 0.0) break;
-        t = olbvh_neighbours.at[t][face];
-        if (t == olbvh_NONE) break;
+        uint face = olbvh_outermost(own), next = own[face] < 0.0 ? olbvh_neighbours.at[t][face] : olbvh_NONE;
+        if (next == olbvh_NONE) return false;
+        t = next;
     }
-    return olbvh_settled(best);
+    return false;
 }
 
 // Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
@@ -838,15 +832,25 @@ vec3 olbvh_room_point(olbvh_Room room, uint k) {
     return olbvh_p;
 }
 
-// Walks to a point x of a cell that is full of mesh, from its seed.
+// Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
+// kernels hold each part once.
 olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
     olbvh_Best best = olbvh_no_best();
-    if (olbvh_walk_towards(seed, x, olbvh_STEPS, best)) return best;
-    for (uint k = 0u; k < olbvh_DETOURS; ++k) {
-        vec3 by = olbvh_room_point(room, k);
-        uint t = k == 0u ? seed : olbvh_walk_leg(seed, room.centre, by);
-        olbvh_arrive(olbvh_walk_leg(t, by, x), x, best);
-        if (olbvh_settled(best)) break;
+    uint t = seed, s = 0u;
+    [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !olbvh_settled(best); ++way) {
+        if (way < olbvh_ARRIVALS) {
+            if (!olbvh_walk_towards(t, s, way > 0u, x, best)) {
+                way = olbvh_ARRIVALS - 1u;
+                continue;
+            }
+        } else {
+            uint k = way - olbvh_ARRIVALS;
+            vec3 by = olbvh_room_point(room, k);
+            t = seed;
+            // The first point to go by is the centre, where the walk begins.
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = olbvh_walk_leg(t, leg == 0u ? room.centre : by, leg == 0u ? by : x);
+        }
+        olbvh_arrive(t, x, best);
     }
     return best;
 }

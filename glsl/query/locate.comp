@@ -56,17 +56,16 @@ void main() {
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
     Point a = point_at(g, place);
-    Stand stand = stand_nowhere();
-    uint left = 0u; // steps that a stride may still take; 0: it has ended
+    uint from = NONE; // where the next stride begins
+    uint left = 0u;   // steps that it may still take; 0: it has ended
     bool in_leaf = slice > 0u; // whether it began in the point's leaf
     if (GUIDE == HINTS && slice == 0u) {
-        uint hint = guides.at[a.i];
-        if (hint != NONE) {
-            stand = stand_in(hint);
-            left = HINTED;
-        }
+        from = guides.at[a.i];
+        left = from == NONE ? 0u : HINTED;
     }
     while (place < end) {
+        Stand stand = stand_nowhere();
+        if (left > 0u) stand = stand_in(from);
         // As far as strides lead: point after point, each pass an answer or a step, so that invocations do not wait for each other.
         while (left > 0u && place < end) {
             Sides sides = sides_of(stand, a.x);
@@ -91,7 +90,7 @@ void main() {
         uvec2 range = leaf == NONE ? uvec2(0u) : entry_range(leaf);
         bool walks = walks_in(leaf, range);
         if (LISTS != 0u && !in_leaf && range.x < range.y) {
-            stand = stand_in(middle_of(range));
+            from = middle_of(range);
             left = STRIDE;
             in_leaf = true;
             continue;
@@ -111,7 +110,7 @@ void main() {
             a = point_at(g, place);
             // Where a list goes on in the next slice, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= SLICE);
-            if (known) stand = stand_in(owner);
+            from = owner;
             left = known ? HINTED : 0u;
             in_leaf = false;
         }

@@ -31,7 +31,7 @@ bool in_star(uint t) {
 void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     vec4 own = own_weights(w, tet);
     uvec4 beside = neighbours.at[t];
-    for (uint f = 0u; f < 4u; ++f) {
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
         if (near(weights(load_tet(cells.at[u]), x))) star[star_size++] = u;
@@ -53,27 +53,20 @@ void arrive(uint first, vec3 x, inout Best best) {
 
 bool settled(Best best) { return best.inside || (best.in_box && best.smallest >= GAP); }
 
-// Part 1, from `t` for at most `most` steps; whether the owner is settled.
-bool walk_towards(uint t, vec3 x, uint most, inout Best best) {
-    uint arrivals = 0u;
-    for (uint s = 0u; s < most; ++s) {
+// Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
+bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best best) {
+    for (; s < STEPS; ++s) {
         Tet tet = load_tet(cells.at[t]);
         Weights w = weights(tet, x);
-        if (w.clear) {
-            best = Best(t, true, true, 0.0);
-            break;
-        }
-        if (near(w)) {
-            arrive(t, x, best);
-            if (settled(best) || ++arrivals == ARRIVALS) break;
-        }
+        if (w.clear) best = Best(t, true, true, 0.0);
+        if (w.clear || (near(w) && !leave)) return !w.clear;
+        leave = false;
         vec4 own = own_weights(w, tet);
-        uint face = outermost(own);
-        if (own[face] >= 0.0) break;
-        t = neighbours.at[t][face];
-        if (t == NONE) break;
+        uint face = outermost(own), next = own[face] < 0.0 ? neighbours.at[t][face] : NONE;
+        if (next == NONE) return false;
+        t = next;
     }
-    return settled(best);
+    return false;
 }
 
 // Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
@@ -115,15 +108,25 @@ vec3 room_point(Room room, uint k) {
     return p;
 }
 
-// Walks to a point x of a cell that is full of mesh, from its seed.
+// Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
+// kernels hold each part once.
 Best walk_from_seed(uint seed, Room room, vec3 x) {
     Best best = no_best();
-    if (walk_towards(seed, x, STEPS, best)) return best;
-    for (uint k = 0u; k < DETOURS; ++k) {
-        vec3 by = room_point(room, k);
-        uint t = k == 0u ? seed : walk_leg(seed, room.centre, by);
-        arrive(walk_leg(t, by, x), x, best);
-        if (settled(best)) break;
+    uint t = seed, s = 0u;
+    [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !settled(best); ++way) {
+        if (way < ARRIVALS) {
+            if (!walk_towards(t, s, way > 0u, x, best)) {
+                way = ARRIVALS - 1u;
+                continue;
+            }
+        } else {
+            uint k = way - ARRIVALS;
+            vec3 by = room_point(room, k);
+            t = seed;
+            // The first point to go by is the centre, where the walk begins.
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = walk_leg(t, leg == 0u ? room.centre : by, leg == 0u ? by : x);
+        }
+        arrive(t, x, best);
     }
     return best;
 }
