@@ -402,8 +402,16 @@ olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
     return r;
 }
 
+float olbvh_least_of(vec4 w) { return min(min(w.x, w.y), min(w.z, w.w)); }
+
 // Whether no face says outside by more than the margin.
-bool olbvh_near(olbvh_Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
+bool olbvh_near(olbvh_Weights r) { return olbvh_least_of(r.w) >= -r.margin; }
+
+// Whether the point is that near to one face, and inside of all others by more.
+bool olbvh_near_one_face(olbvh_Weights r) {
+    uvec4 close = uvec4(lessThanEqual(r.w, vec4(r.margin)));
+    return olbvh_near(r) && close.x + close.y + close.z + close.w == 1u;
+}
 
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
@@ -420,6 +428,7 @@ struct olbvh_Sides {
     vec4 w;     // as in Weights, opposite to the vertices in their order here
     float sum;  // of them
     bool clear; // as in Weights
+    bool olbvh_near;  // no face says outside by more than the margin
 };
 
 olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
@@ -433,7 +442,9 @@ olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
     precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
-    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
+    float least = olbvh_least_of(r.w);
+    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && least > margin;
+    r.olbvh_near = least >= -margin;
     return r;
 }
 
@@ -639,7 +650,7 @@ const uint olbvh_DETOURS = 8u;   // points to go by
 const uint olbvh_ARRIVALS = 2u;  // stars that part 1 looks at
 const float olbvh_GAP = -7.62939453125e-6; // -2^-17
 
-// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
+// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells, vertices and neighbours.
 
 // The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
 struct olbvh_Stand {
@@ -721,18 +732,33 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
     return olbvh_step_on(s, at, e);
 }
 
-// Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.
+// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one; else NONE.
+uint olbvh_owner_at_face(olbvh_Stand s, vec3 x) {
+    olbvh_Tet tet = olbvh_tet_of(s);
+    olbvh_Weights here = olbvh_weights(tet, x);
+    uint u = olbvh_near_one_face(here) ? olbvh_neighbours.at[s.t][olbvh_outermost(olbvh_own_weights(here, tet))] : olbvh_NONE;
+    if (u == olbvh_NONE) return olbvh_NONE;
+    olbvh_Weights there = olbvh_weights(olbvh_load_tet(olbvh_cells.at[u]), x);
+    // The face weighs the same from either side.
+    if (!olbvh_near_one_face(there) || olbvh_least_of(there.w) != -olbvh_least_of(here.w)) return olbvh_NONE;
+    return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : olbvh_NONE;
+}
+
+// The owner of x where a stride ends: in a tetrahedron that holds it clearly, or at its face; else NONE.
+uint olbvh_owner_of(olbvh_Stand s, olbvh_Sides at, vec3 x) { return at.clear ? s.t : at.olbvh_near ? olbvh_owner_at_face(s, x) : olbvh_NONE; }
+
+// Goes from `t` towards x, and to its owner if that is not far, and if x does not lie near an edge; false, and anywhere, if not.
 bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     if (t == olbvh_NONE) return false;
     olbvh_Stand s = olbvh_stand_in(t);
-    bool found = false;
+    uint owner = olbvh_NONE;
     for (uint k = 0u; k < most; ++k) {
         olbvh_Sides at = olbvh_sides_of(s, x);
-        found = at.clear;
-        if (found || !olbvh_step_on(s, at)) break;
+        owner = olbvh_owner_of(s, at, x);
+        if (owner != olbvh_NONE || at.olbvh_near || !olbvh_step_on(s, at)) break;
     }
-    t = s.t;
-    return found;
+    t = owner;
+    return owner != olbvh_NONE;
 }
 
 // Cell of a leaf in normalised coordinates.

@@ -67,6 +67,7 @@ void main() {
         Stand stand = stand_nowhere();
         if (left > 0u) stand = stand_in(from);
         // As far as strides lead: point after point, each pass an answer or a step, so that invocations do not wait for each other.
+        bool at_face = false;
         while (left > 0u && place < end) {
             Sides sides = sides_of(stand, a.x);
             if (sides.clear) {
@@ -77,7 +78,8 @@ void main() {
                 left = HINTED;
                 in_leaf = false;
             } else {
-                left = step_on(stand, sides) ? left - 1u : 0u;
+                at_face = sides.near;
+                left = !at_face && step_on(stand, sides) ? left - 1u : 0u;
             }
         }
         if (place >= end) break;
@@ -85,6 +87,10 @@ void main() {
         if (slice > 0u) {
             vec4 state = barycentrics.at[a.i];
             best = Best(owners.at[a.i], state.x != 0.0, state.y != 0.0, state.z);
+        }
+        if (at_face) {
+            uint owner = owner_at_face(stand, a.x);
+            if (owner != NONE) best = Best(owner, true, true, 0.0);
         }
         uint leaf = !best.inside && near_bounds(g, a.at) ? find_leaf(g.level, quantize(g, a.at)) : NONE;
         uvec2 range = leaf == NONE ? uvec2(0u) : entry_range(leaf);

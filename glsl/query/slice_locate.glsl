@@ -48,14 +48,17 @@ void main() {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
             uint misses = 0u;
             for (; stands && state.next < count && work < budget; ++work) {
-                Sides sides = sides_of(stand, normalise(g, voxel_centre(plan, begin + state.next, y, k)));
-                if (sides.clear) {
-                    state.hint = stand.t;
-                    answers.at[line + state.next] = stand.t;
+                vec3 x = normalise(g, voxel_centre(plan, begin + state.next, y, k));
+                Sides sides = sides_of(stand, x);
+                uint owner = owner_of(stand, sides, x);
+                if (owner != NONE) {
+                    if (owner != stand.t) stand = stand_in(owner);
+                    state.hint = owner;
+                    answers.at[line + state.next] = owner;
                     ++state.next;
                     misses = 0u;
                 } else {
-                    stands = ++misses < WALK && step_on(stand, sides);
+                    stands = !sides.near && ++misses < WALK && step_on(stand, sides);
                 }
             }
             if (state.next >= count || work >= budget) break;

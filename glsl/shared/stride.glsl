@@ -1,4 +1,4 @@
-// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs tet.glsl, cells, vertices and neighbours.
+// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells, vertices and neighbours.
 
 // The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
 struct Stand {
@@ -80,16 +80,31 @@ bool step_on(inout Stand s, Sides at) {
     return step_on(s, at, e);
 }
 
-// Goes from `t` to the tetrahedron that holds x clearly, if it is not far; false, and anywhere, if not.
+// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one; else NONE.
+uint owner_at_face(Stand s, vec3 x) {
+    Tet tet = tet_of(s);
+    Weights here = weights(tet, x);
+    uint u = near_one_face(here) ? neighbours.at[s.t][outermost(own_weights(here, tet))] : NONE;
+    if (u == NONE) return NONE;
+    Weights there = weights(load_tet(cells.at[u]), x);
+    // The face weighs the same from either side.
+    if (!near_one_face(there) || least_of(there.w) != -least_of(here.w)) return NONE;
+    return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : NONE;
+}
+
+// The owner of x where a stride ends: in a tetrahedron that holds it clearly, or at its face; else NONE.
+uint owner_of(Stand s, Sides at, vec3 x) { return at.clear ? s.t : at.near ? owner_at_face(s, x) : NONE; }
+
+// Goes from `t` towards x, and to its owner if that is not far, and if x does not lie near an edge; false, and anywhere, if not.
 bool stride_to(inout uint t, vec3 x, uint most) {
     if (t == NONE) return false;
     Stand s = stand_in(t);
-    bool found = false;
+    uint owner = NONE;
     for (uint k = 0u; k < most; ++k) {
         Sides at = sides_of(s, x);
-        found = at.clear;
-        if (found || !step_on(s, at)) break;
+        owner = owner_of(s, at, x);
+        if (owner != NONE || at.near || !step_on(s, at)) break;
     }
-    t = s.t;
-    return found;
+    t = owner;
+    return owner != NONE;
 }

@@ -76,8 +76,16 @@ Weights weights(Tet t, vec3 p) {
     return r;
 }
 
+float least_of(vec4 w) { return min(min(w.x, w.y), min(w.z, w.w)); }
+
 // Whether no face says outside by more than the margin.
-bool near(Weights r) { return min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) >= -r.margin; }
+bool near(Weights r) { return least_of(r.w) >= -r.margin; }
+
+// Whether the point is that near to one face, and inside of all others by more.
+bool near_one_face(Weights r) {
+    uvec4 close = uvec4(lessThanEqual(r.w, vec4(r.margin)));
+    return near(r) && close.x + close.y + close.z + close.w == 1u;
+}
 
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 own_weights(Weights w, Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
@@ -94,6 +102,7 @@ struct Sides {
     vec4 w;     // as in Weights, opposite to the vertices in their order here
     float sum;  // of them
     bool clear; // as in Weights
+    bool near;  // no face says outside by more than the margin
 };
 
 Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
@@ -107,7 +116,9 @@ Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
     vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
     precise vec3 size = hi - lo;
     precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
-    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) > margin;
+    float least = least_of(r.w);
+    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && least > margin;
+    r.near = least >= -margin;
     return r;
 }
 

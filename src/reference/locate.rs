@@ -93,7 +93,7 @@ impl<'a> Locator<'a> {
     }
 
     /// As [`Locator::locate`], but first goes a few steps from `hint` (any number, such as the owner of the last point) towards the point, and takes the cell
-    /// that holds it clearly: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
+    /// that holds it clearly, or one of two beside a face: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
         let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.mesh.points.len() && !t[..i].contains(&v));
         let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };

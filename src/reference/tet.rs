@@ -62,6 +62,13 @@ pub struct Sides {
     pub sum: f32,
     /// As in [`Weights`]: rounding is far below the margin here too.
     pub clear: bool,
+    /// No face says outside by more than the margin.
+    pub near: bool,
+}
+
+/// The smallest of four weights.
+pub fn least_of(w: [f32; 4]) -> f32 {
+    w[0].min(w[1]).min(w[2].min(w[3]))
 }
 
 /// The sides of p on which the faces of a tetrahedron lie.
@@ -76,7 +83,8 @@ pub fn sides_of(v: [Vec3; 4], p: Vec3) -> Sides {
     let size = sub(hi, lo);
     let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
     let in_box = (0..3).all(|k| lo[k] <= 0.0 && 0.0 <= hi[k]);
-    Sides { w, sum: sum.abs(), clear: in_box && w[0].min(w[1]).min(w[2].min(w[3])) > margin }
+    let least = least_of(w);
+    Sides { w, sum: sum.abs(), clear: in_box && least > margin, near: least >= -margin }
 }
 
 impl Sides {
@@ -112,7 +120,7 @@ impl Tet {
         let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
         let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
         let in_box = (0..3).all(|k| lo[k] <= p[k] && p[k] <= hi[k]);
-        let least = w[0].min(w[1]).min(w[2].min(w[3]));
+        let least = least_of(w);
         let inside = in_box && self.volume() != 0.0 && least >= 0.0;
         let size = sub(hi, lo);
         let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
@@ -126,13 +134,17 @@ impl Weights {
         self.w.iter().all(|&w| w >= -self.margin)
     }
 
+    /// Whether the point is that near to one face, and inside of all others by more.
+    pub fn near_one_face(&self) -> bool {
+        self.near() && self.w.iter().filter(|&&w| w <= self.margin).count() == 1
+    }
+
     /// Smallest barycentric coordinate; −∞ (as `f32::MIN`) for a flat cell.
     pub fn smallest(&self) -> f32 {
         if self.sum <= 0.0 {
             return f32::MIN;
         }
-        let w = self.w[0].min(self.w[1]).min(self.w[2].min(self.w[3]));
-        w * reciprocal(self.sum)
+        least_of(self.w) * reciprocal(self.sum)
     }
 
     /// Barycentric coordinates in the caller's order of vertices.

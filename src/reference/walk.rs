@@ -6,7 +6,7 @@
 //!    crosses interior faces only, and each of them nearer to x than the one before. Rounding can still mislead where it meets an edge, so
 //! 3. the same again by way of other points of the cell, whose two segments meet other edges.
 //!
-//! Before all that, a *stride*: part 1 without a look at anything but cells that hold x clearly, as most points are held.
+//! Before all that, a *stride*: part 1 without a look at anything but cells that hold x clearly, as most points are held, or on one of their faces.
 //!
 //! Each part is bounded. Where all of them fail, the best of the tetrahedra in which they ended is the answer: no point is lost. A walk that comes
 //! near to x ends with the *star* of x: the tetrahedra reached across faces that x is so near to that rounding could put it on either side. The
@@ -15,7 +15,7 @@
 use super::boundary::NONE;
 use super::candidates::Best;
 use super::grid::reciprocal;
-use super::tet::{Sides, Tet, Vec3, Weights, sides_of};
+use super::tet::{Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::mesh::Mesh;
 
 /// Most tetrahedra of a star.
@@ -152,9 +152,34 @@ impl Walker<'_> {
         None
     }
 
-    /// The number of that tetrahedron.
+    /// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one.
+    fn owner_at_face(&self, stand: &Stand, x: Vec3) -> Option<u32> {
+        let (tet, here) = self.weights(stand.t, x);
+        if !here.near_one_face() {
+            return None;
+        }
+        let u = self.neighbours[stand.t as usize][outermost(tet.rank.map(|r| here.w[r]))];
+        if u == NONE {
+            return None;
+        }
+        let there = self.weights(u, x).1;
+        // The face weighs the same from either side.
+        let shared = there.near_one_face() && least_of(there.w) == -least_of(here.w);
+        let own = here.inside && (!there.inside || stand.t < u);
+        (shared && (own || there.inside)).then_some(if own { stand.t } else { u })
+    }
+
+    /// Goes from `t` towards x, to its owner if that is not far, and if x does not lie near an edge.
     pub fn stride_to(&self, t: u32, x: Vec3, most: u32) -> Option<u32> {
-        self.stride(t, x, most).map(|(stand, _)| stand.t)
+        let mut stand = self.stand_in(t)?;
+        for _ in 0..most {
+            let at = stand.sides(x);
+            if at.clear || at.near {
+                return if at.clear { Some(stand.t) } else { self.owner_at_face(&stand, x) };
+            }
+            stand = self.step_on(&stand, &at)?;
+        }
+        None
     }
 
     /// Part 1, from `t`; whether the owner is settled.
