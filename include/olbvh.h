@@ -1,4 +1,15 @@
 /* Finds things inside tetrahedral meshes on any GPU; see README.md.
+ *
+ * Functions return OLBVH_STATUS_OK or the code of an error, whose text olbvh_last_error gives. A handle keeps what it was made from alive, so the order of
+ * freeing means nothing. One handle may be used by many threads at a time, a recording by one. Structs and arrays are read during the call.
+ *
+ * Recording: olbvh_cmd_... append to a command buffer of the host's, of any queue family with compute, outside of a render pass. Nothing is submitted, waited
+ * for, allocated or read back. Sizes come first: a plan is measured, and for every query a function ..._parts tells how many bytes its memory takes and where
+ * in it the answers will be; parts of buffers begin at multiples of olbvh_plan_sizes.alignment, and all buffers have its usage flags. They are the host's and
+ * stay as long as commands that use them are executed. Where nothing else is said, a command reads what it is given in compute shaders, uses its memory in
+ * compute shaders and transfers, writes its answers in compute shaders, and no barrier stands before or behind it: the host records olbvh_cmd_barrier, or a
+ * barrier of its own, from compute shader and transfer writes to whatever reads the answers or uses the memory next.
+ *
  * Generated from src/capi by cbindgen; scripts/c_api --write writes it anew. */
 
 #ifndef OLBVH_H
@@ -142,9 +153,9 @@ typedef struct olbvh_tree_info_data {
  */
 typedef struct olbvh_host_device {
   /*
-   `vkGetInstanceProcAddr`.
+   `vkGetInstanceProcAddr`, cast to this type.
    */
-  const void *get_instance_proc_addr;
+  void (*get_instance_proc_addr)(void);
   /*
    `VkInstance`, of Vulkan 1.2 or later.
    */
@@ -162,7 +173,7 @@ typedef struct olbvh_host_device {
    */
   uint64_t queue;
   /*
-   Queue family with compute.
+   Queue family with compute; it needs nothing else.
    */
   uint32_t queue_family;
   /*
@@ -741,9 +752,11 @@ void olbvh_tree_free(struct olbvh_tree *tree);
 enum olbvh_status olbvh_tree_info(const struct olbvh_tree *tree, struct olbvh_tree_info_data *out);
 
 /*
- Works on a device of the host's, which outlives everything made from the handle.
+ Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a
+ host that reads or writes them on another family transfers their ownership.
  */
-enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host, struct olbvh_gpu **out);
+enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host,
+                                      struct olbvh_gpu **out);
 
 /*
  Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per

@@ -1,9 +1,5 @@
 //! Recording into a host's command buffer and memory, across the border to C: nothing is submitted, waited for or made.
-//!
-//! Every query has a struct that says what is asked and where, a function `…_parts` that tells how much memory it takes and where in it the answers will
-//! be, and one or two functions `olbvh_cmd_…`. Where nothing else is said, commands read what they are given in compute shaders, use their memory in compute
-//! shaders and transfers, write answers in compute shaders, and stand between no barriers: the host records `olbvh_cmd_barrier`, or a barrier of its own,
-//! before answers are read, and before memory is used again.
+//! The head of the header says what all of it has in common, see `.config/cbindgen.toml`.
 
 mod locate;
 mod overlap;
