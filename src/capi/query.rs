@@ -109,15 +109,17 @@ impl OlbvhVoxels {
 impl HeldMesh {
     /// As it lies on the device.
     fn download(&self) -> Result<Mesh> {
-        let (gpu, input) = (self.device.gpu(), self.device.input());
-        fn read<T: Pod>(gpu: &crate::gpu::Gpu, part: BufferRef, count: u32) -> Result<Vec<T>> {
-            let mut all = vec![T::zeroed(); count as usize];
-            if count > 0 {
-                gpu.download_ref(part, bytemuck::cast_slice_mut(&mut all))?;
-            }
-            Ok(all)
+        let input = self.device.input();
+        let (points, tets) = (self.download_part(input.positions, input.points)?, self.download_part(input.cells, input.tets)?);
+        Ok(Mesh::new(points, tets))
+    }
+
+    fn download_part<T: Pod>(&self, part: BufferRef, count: u32) -> Result<Vec<T>> {
+        let mut all = vec![T::zeroed(); count as usize];
+        if count > 0 {
+            self.device.gpu().download_ref(part, bytemuck::cast_slice_mut(&mut all))?;
         }
-        Ok(Mesh::new(read(gpu, input.positions, input.points)?, read(gpu, input.cells, input.tets)?))
+        Ok(all)
     }
 }
 

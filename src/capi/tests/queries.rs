@@ -99,6 +99,17 @@ fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
     Stage { scene, positions, _held: [cells, memory, scratch] }
 }
 
+fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
+    let mut all = vec![T::zeroed(); count];
+    let bytes = bytemuck::cast_slice_mut(&mut all);
+    gpu.download_ref(
+        BufferRef { buffer: vk::Buffer::from_raw(part.buffer), offset: part.offset, size: bytes.len() as u64, address: 0 },
+        bytes,
+    )
+    .unwrap();
+    all
+}
+
 /// All of it in one command buffer, after a rehearsal, twice.
 pub fn recorded(gpu: *mut OlbvhGpu) {
     let device = &handle(gpu, "gpu").unwrap().0;
@@ -209,16 +220,6 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     }
     assert_eq!(CALLS.get(), before, "calls made while recording");
 
-    fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
-        let mut all = vec![T::zeroed(); count];
-        let bytes = bytemuck::cast_slice_mut(&mut all);
-        gpu.download_ref(
-            BufferRef { buffer: vk::Buffer::from_raw(part.buffer), offset: part.offset, size: bytes.len() as u64, address: 0 },
-            bytes,
-        )
-        .unwrap();
-        all
-    }
     assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
     let [samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 7)[..] else { unreachable!() };
     assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
