@@ -6,12 +6,12 @@ use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{ALIGNMENT, Gpu, USAGE};
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, Lists};
 use crate::primitives::Arena;
 use crate::query::Scene;
 use crate::reference::grid::MAX_LEVEL;
 
-/// Entries per tetrahedron that there is room for where nothing else is asked for.
+/// Entries per tetrahedron that there is room for where nothing else is asked for and lists are whole.
 const ENTRIES: u32 = 24;
 
 /// What is known of a mesh and its tree before there is memory for them.
@@ -28,7 +28,8 @@ pub struct OlbvhPlan {
     pub level: u32,
     /// At least the entries of the longest leaf, 0: any number. Location takes a dispatch for every 16,384 of them.
     pub longest_leaf: u32,
-    /// How to build. Without a capacity there is room for 24 entries per tetrahedron, or for what the budget allows.
+    /// How to build. Without a capacity there is room for 8 entries per tetrahedron (24 where all are listed), or for what the budget allows; trees that need more
+    /// get coarser.
     pub build: OlbvhBuildOptions,
 }
 
@@ -80,8 +81,10 @@ impl OlbvhPlan {
             return Err(Error::Invalid(format!("level {} is beyond {MAX_LEVEL}", self.level)));
         }
         let capacity = match (options.capacity, options.budget.take()) {
+            (Some(entries), _) => Capacity::for_entries(entries, self.level),
             (None, Some(bytes)) => Capacity::for_bytes(bytes, self.level, &options)?,
-            (entries, _) => Capacity::for_entries(entries.unwrap_or(self.tets.saturating_mul(ENTRIES)), self.level),
+            (None, None) if options.lists == Lists::Boundary => Capacity::usual(self.tets, self.level),
+            (None, None) => Capacity::for_entries(self.tets.saturating_mul(ENTRIES), self.level),
         };
         Ok(Planned { options, capacity })
     }
