@@ -333,7 +333,8 @@ typedef struct olbvh_plan {
    */
   uint32_t longest_leaf;
   /*
-   How to build. Without a capacity there is room for 24 entries per tetrahedron, or for what the budget allows.
+   How to build. Without a capacity there is room for 8 entries per tetrahedron (24 where all are listed), or for what the budget allows; trees that need more
+   get coarser.
    */
   struct olbvh_build_options build;
 } olbvh_plan;
