@@ -142,9 +142,10 @@ fn frames(gpu: *mut OlbvhGpu) {
 fn a_c_host_records_by_address_and_asks() {
     let host = Host::new();
     // SAFETY: a function pointer for another.
-    let get_instance_proc_addr = unsafe { std::mem::transmute(host.entry.static_fn().get_instance_proc_addr as *const ()) };
+    let get =
+        unsafe { std::mem::transmute::<*const (), unsafe extern "C" fn()>(host.entry.static_fn().get_instance_proc_addr as *const ()) };
     let mut lent = OlbvhHostDevice {
-        get_instance_proc_addr,
+        get_instance_proc_addr: Some(get),
         instance: host.instance.handle().as_raw(),
         physical_device: host.physical.as_raw(),
         device: host.device.handle().as_raw(),
