@@ -1,4 +1,15 @@
 /* Finds things inside tetrahedral meshes on any GPU; see README.md.
+ *
+ * Functions return OLBVH_STATUS_OK or the code of an error, whose text olbvh_last_error gives. A handle keeps what it was made from alive, so the order of
+ * freeing means nothing. One handle may be used by many threads at a time, a recording by one. Structs and arrays are read during the call.
+ *
+ * Recording: olbvh_cmd_... append to a command buffer of the host's, of any queue family with compute, outside of a render pass. Nothing is submitted, waited
+ * for, allocated or read back. Sizes come first: a plan is measured, and for every query a function ..._parts tells how many bytes its memory takes and where
+ * in it the answers will be; parts of buffers begin at multiples of olbvh_plan_sizes.alignment, and all buffers have its usage flags. They are the host's and
+ * stay as long as commands that use them are executed. Where nothing else is said, a command reads what it is given in compute shaders, uses its memory in
+ * compute shaders and transfers, writes its answers in compute shaders, and no barrier stands before or behind it: the host records olbvh_cmd_barrier, or a
+ * barrier of its own, from compute shader and transfer writes to whatever reads the answers or uses the memory next.
+ *
  * Generated from src/capi by cbindgen; scripts/c_api --write writes it anew. */
 
 #ifndef OLBVH_H
@@ -132,7 +143,7 @@ typedef struct olbvh_tree_info_data {
    */
   double build_ms;
   /*
-   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses.
+   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order.
    */
   uint64_t address;
 } olbvh_tree_info_data;
@@ -142,9 +153,9 @@ typedef struct olbvh_tree_info_data {
  */
 typedef struct olbvh_host_device {
   /*
-   `vkGetInstanceProcAddr`.
+   `vkGetInstanceProcAddr`, cast to this type.
    */
-  const void *get_instance_proc_addr;
+  void (*get_instance_proc_addr)(void);
   /*
    `VkInstance`, of Vulkan 1.2 or later.
    */
@@ -162,7 +173,7 @@ typedef struct olbvh_host_device {
    */
   uint64_t queue;
   /*
-   Queue family with compute.
+   Queue family with compute; it needs nothing else.
    */
   uint32_t queue_family;
   /*
@@ -178,6 +189,124 @@ typedef struct olbvh_host_device {
    */
   uint32_t debug_utils;
 } olbvh_host_device;
+
+/*
+ What a picture shows; `olbvh_default_picture_settings` fills it.
+ */
+typedef struct olbvh_picture_settings {
+  /*
+   Pixels in a row.
+   */
+  uint32_t width;
+  /*
+   Rows.
+   */
+  uint32_t height;
+  /*
+   The camera, as `olbvh render --camera` takes it; null: it sees the whole mesh from an angle.
+   */
+  const char *camera;
+  /*
+   Name of a colour map, as `olbvh render --tf` takes it; null: the usual one.
+   */
+  const char *colors;
+  /*
+   Opacity, as `olbvh render --opacity` takes it; null: `olbvh_render` makes it fit the field, `olbvh_view_make` lets it rise with the value.
+   */
+  const char *opacity;
+  /*
+   Values of iso-surfaces, which are drawn instead of the volume.
+   */
+  float iso[8];
+  /*
+   How many of them there are; 0: the volume is drawn.
+   */
+  uint32_t iso_count;
+  /*
+   Values at the ends of the colour map; the first above the second: all values that the field has.
+   */
+  float range[2];
+  /*
+   Distance of two samples in units of the mesh; 0: 1/512 of its diagonal.
+   */
+  double step;
+  /*
+   Factor on the opacity: 2 is as opaque as twice the way through the mesh.
+   */
+  float opacity_scale;
+  /*
+   A ray ends once it is this opaque.
+   */
+  float termination;
+  /*
+   Not 0: surface and steep values are lit.
+   */
+  uint32_t shading;
+  /*
+   Opacity that a lit surface seen from the side has at least.
+   */
+  float outline;
+  /*
+   Direction to the light: right, up, towards the viewer.
+   */
+  float light[3];
+} olbvh_picture_settings;
+
+/*
+ Where the voxels of a stack of layers lie.
+ */
+typedef struct olbvh_voxels {
+  /*
+   Centre of voxel (0, 0) of layer 0.
+   */
+  float origin[3];
+  /*
+   From one voxel to the next in a row.
+   */
+  float across[3];
+  /*
+   From one row to the next.
+   */
+  float down[3];
+  /*
+   From one layer to the next.
+   */
+  float up[3];
+  /*
+   Half axes of a voxel's box.
+   */
+  float half[3][3];
+  /*
+   Voxels in a row.
+   */
+  uint32_t width;
+  /*
+   Rows of a layer.
+   */
+  uint32_t height;
+  /*
+   Layers.
+   */
+  uint32_t layers;
+} olbvh_voxels;
+
+/*
+ A stage that was timed.
+ */
+typedef struct olbvh_stage {
+  /*
+   Such as "build.levels".
+   */
+  char name[64];
+  /*
+   Query with the time of its begin.
+   */
+  uint32_t begin;
+  /*
+   Query with the time of its end.
+   */
+  uint32_t end;
+} olbvh_stage;
 
 /*
  What is known of a mesh and its tree before there is memory for them.
@@ -204,7 +333,8 @@ typedef struct olbvh_plan {
    */
   uint32_t longest_leaf;
   /*
-   How to build. Without a capacity there is room for 24 entries per tetrahedron, or for what the budget allows.
+   How to build. Without a capacity there is room for 8 entries per tetrahedron (24 where all are listed), or for what the budget allows; trees that need more
+   get coarser.
    */
   struct olbvh_build_options build;
 } olbvh_plan;
@@ -272,24 +402,6 @@ typedef struct olbvh_scene_arrays_data {
 } olbvh_scene_arrays_data;
 
 /*
- A stage that was timed.
- */
-typedef struct olbvh_stage {
-  /*
-   Such as "build.levels".
-   */
-  char name[64];
-  /*
-   Query with the time of its begin.
-   */
-  uint32_t begin;
-  /*
-   Query with the time of its end.
-   */
-  uint32_t end;
-} olbvh_stage;
-
-/*
  Points to locate, and where the answers go.
  */
 typedef struct olbvh_location {
@@ -310,6 +422,19 @@ typedef struct olbvh_location {
    */
   float tolerance;
   /*
+   0: each point by itself. 1: each around the owner of the one before, for more points than half the tetrahedra, of which each lies near the one
+   before. 2: so too, for points in no order, which are sorted first.
+   */
+  uint32_t path;
+  /*
+   For path 0, if not of no bytes: a word per point, a valid tetrahedron to begin with, such as the owner of the frame before, or 0xffffffff.
+   */
+  struct olbvh_buffer hints;
+  /*
+   For path 2: memory to sort in, of `olbvh_location_parts`.
+   */
+  struct olbvh_buffer memory;
+  /*
    A word per point: its owner, or 0xffffffff.
    */
   struct olbvh_buffer owners;
@@ -318,6 +443,250 @@ typedef struct olbvh_location {
    */
   struct olbvh_buffer barycentrics;
 } olbvh_location;
+
+/*
+ What memory location takes.
+ */
+typedef struct olbvh_location_parts_data {
+  /*
+   Bytes of `olbvh_location.memory`: 0 but for path 2.
+   */
+  uint64_t bytes;
+} olbvh_location_parts_data;
+
+/*
+ Memory of all owners of points, and where in it the answers are.
+ */
+typedef struct olbvh_owner_parts_data {
+  /*
+   Bytes of the memory.
+   */
+  uint64_t bytes;
+  /*
+   A word per point: the lowest of its owners, as location gives it.
+   */
+  struct olbvh_buffer owners;
+  /*
+   Four floats per point: coordinates in that one.
+   */
+  struct olbvh_buffer barycentrics;
+  /*
+   A word per point: where its owners end in the list; they begin where those of the point before end, the first at 0.
+   */
+  struct olbvh_buffer ends;
+  /*
+   A word: how many owners all points have together, whether or not there was room for them.
+   */
+  struct olbvh_buffer total;
+} olbvh_owner_parts_data;
+
+/*
+ Values on a mesh.
+ */
+typedef struct olbvh_field {
+  /*
+   A 32-bit float per point, or per tetrahedron.
+   */
+  struct olbvh_buffer values;
+  /*
+   0: per point, linear in a tetrahedron. Else: per tetrahedron.
+   */
+  uint32_t on_cells;
+} olbvh_field;
+
+/*
+ What a picture shows, for the device: `olbvh_view_make` fills it, and the host copies it as it is to where `olbvh_picture.view` lies.
+ */
+typedef struct olbvh_view {
+  /*
+   Rays, light, step, range of values, iso-surfaces.
+   */
+  uint32_t frame[64];
+  /*
+   The transfer function over the range of values: colour, and opacity of one step or of one surface.
+   */
+  float table[1024][4];
+  /*
+   Ranges of values outside of which nothing is to be seen, ascending and apart; behind the last stand such as no value lies in.
+   */
+  float drawn[512][2];
+  /*
+   How many of them there are.
+   */
+  uint32_t drawn_count;
+} olbvh_view;
+
+/*
+ How far a recording goes with work that takes as many dispatches as it takes: a dispatch looks at so much and no more, so that no device is kept
+ busy for long. The status of the query says what is left.
+ */
+typedef struct olbvh_rounds {
+  /*
+   Dispatches, one after the other; what is finished is passed over.
+   */
+  uint32_t count;
+  /*
+   Not 0: go on where an earlier recording of the same ended.
+   */
+  uint32_t resume;
+} olbvh_rounds;
+
+/*
+ What is drawn, and where. Contents are read when the commands are executed, so a new view or new values need no new recording.
+ */
+typedef struct olbvh_picture {
+  /*
+   Pixels in a row.
+   */
+  uint32_t width;
+  /*
+   Rows.
+   */
+  uint32_t height;
+  /*
+   Not 0: the iso-surfaces that the view has, instead of the volume.
+   */
+  uint32_t iso;
+  /*
+   With ranges: ranges of the view that are looked at, its `drawn_count` or more, up to 512.
+   */
+  uint32_t drawn_count;
+  /*
+   An `olbvh_view`.
+   */
+  struct olbvh_buffer view;
+  /*
+   What is shown.
+   */
+  struct olbvh_field field;
+  /*
+   Three floats per point of the mesh, normals of length up to 1 by which the volume is lit. Of no bytes: it is not lit.
+   */
+  struct olbvh_buffer normals;
+  /*
+   The ranges of the field that `olbvh_cmd_ranges` records: nodes without a value to be seen are skipped. Of no bytes: nothing is. The picture is the same.
+   */
+  struct olbvh_buffer ranges;
+  /*
+   Memory of `olbvh_picture_parts`.
+   */
+  struct olbvh_buffer memory;
+  /*
+   A round takes up to 1,024 samples of every ray. No round, from the beginning, prepares the picture and leaves it empty.
+   */
+  struct olbvh_rounds rounds;
+} olbvh_picture;
+
+/*
+ Memory of a picture, and where in it the answers are.
+ */
+typedef struct olbvh_picture_parts_data {
+  /*
+   Bytes of the memory.
+   */
+  uint64_t bytes;
+  /*
+   Per pixel, the upper row first, four floats: colour, multiplied by its opacity, and opacity.
+   */
+  struct olbvh_buffer colors;
+  /*
+   Words: samples taken, those in the mesh, those skipped, two words each, the lower first; then rays that need another round.
+   */
+  struct olbvh_buffer status;
+} olbvh_picture_parts_data;
+
+/*
+ Which voxels are sliced, and where the answers go.
+ */
+typedef struct olbvh_slicing {
+  /*
+   The whole stack.
+   */
+  struct olbvh_voxels voxels;
+  /*
+   Layer of the first row that is sliced now.
+   */
+  uint32_t layer;
+  /*
+   Number of that row in its layer.
+   */
+  uint32_t first;
+  /*
+   Rows; behind the last of a layer comes the first of the next.
+   */
+  uint32_t rows;
+  /*
+   As `olbvh_slice` takes it.
+   */
+  uint32_t linear;
+  /*
+   The field, or one whose values are of no bytes: none.
+   */
+  struct olbvh_field field;
+  /*
+   Memory of `olbvh_slicing_parts`.
+   */
+  struct olbvh_buffer memory;
+  /*
+   One is enough but where leaves hold thousands of tetrahedra.
+   */
+  struct olbvh_rounds rounds;
+} olbvh_slicing;
+
+/*
+ Memory of a slice, and where in it the answers are.
+ */
+typedef struct olbvh_slicing_parts_data {
+  /*
+   Bytes of the memory, 29 per voxel.
+   */
+  uint64_t bytes;
+  /*
+   A word per voxel, row by row, as `olbvh_slice` gives it.
+   */
+  struct olbvh_buffer answers;
+  /*
+   A float per voxel: the value, NaN where it is empty; not written without a field.
+   */
+  struct olbvh_buffer values;
+  /*
+   Words: runs of voxels and voxels that need another round, and until there are none nothing else is to be used; why all are empty (1: the boxes are flat,
+   2: they are more than twice as large as the mesh), or 0; voxels with their centre in the mesh, those that it merely touches, those that it does not.
+   */
+  struct olbvh_buffer status;
+} olbvh_slicing_parts_data;
+
+/*
+ Memory of the overlap of two meshes, and where in it the answers are.
+ */
+typedef struct olbvh_overlap_parts_data {
+  /*
+   Bytes of the memory.
+   */
+  uint64_t bytes;
+  /*
+   For A and for B a bit per tetrahedron, the lowest of a word first: it intersects the other mesh.
+   */
+  struct olbvh_buffer hits[2];
+  /*
+   For A and for B; the fifth word of either counts the tetrahedra that need another round, whose bits are 0.
+   */
+  struct olbvh_buffer status[2];
+} olbvh_overlap_parts_data;
+
+/*
+ Memory of the pairs of two meshes, and where in it the answers are.
+ */
+typedef struct olbvh_pair_parts_data {
+  /*
+   Bytes of the memory.
+   */
+  uint64_t bytes;
+  /*
+   Words 4 and 5: tetrahedra of A that need another round to be counted, and to have their pairs written. Words 8 and 9: pairs, the lower first.
+   */
+  struct olbvh_buffer status;
+} olbvh_pair_parts_data;
 
 #ifdef __cplusplus
 extern "C" {
@@ -344,13 +713,16 @@ enum olbvh_status olbvh_gpu_open(const char *device, struct olbvh_gpu **out);
 void olbvh_gpu_free(struct olbvh_gpu *gpu);
 
 /*
- Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted.
+ Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted. `reorder`, if not 0, brings points
+ and tetrahedra into the order of a Z curve on the way, which pays where they come in no order; all functions go on to take and to give the caller's numbers.
+ Of the tetrahedra that share a face, edge or vertex, the first along the curve owns its points then, not that of the lowest number.
  */
 enum olbvh_status olbvh_mesh_upload(const struct olbvh_gpu *gpu,
                                     const float *points,
                                     size_t point_count,
                                     const uint32_t *tets,
                                     size_t tet_count,
+                                    uint32_t reorder,
                                     struct olbvh_mesh **out);
 
 /*
@@ -381,6 +753,13 @@ void olbvh_tree_free(struct olbvh_tree *tree);
 enum olbvh_status olbvh_tree_info(const struct olbvh_tree *tree, struct olbvh_tree_info_data *out);
 
 /*
+ Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a
+ host that reads or writes them on another family transfers their ownership.
+ */
+enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host,
+                                      struct olbvh_gpu **out);
+
+/*
  Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
  point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
  `-tolerance`; below 0 means the default, 1e-5.
@@ -393,40 +772,42 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
                                float *barycentrics);
 
 /*
- Works on a device of the host's, which outlives everything made from the handle.
+ What pictures are like where nothing else is asked for.
  */
-enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host, struct olbvh_gpu **out);
+struct olbvh_picture_settings olbvh_default_picture_settings(void);
 
 /*
- Tells what memory a plan wants.
+ Draws a field: `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets four floats per pixel, the upper row first: colour
+ (sRGB from 0 to 1) multiplied by its opacity, and opacity; what is behind is the caller's.
  */
-enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
-                                     const struct olbvh_plan *plan,
-                                     struct olbvh_plan_sizes *out);
+enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
+                               const struct olbvh_picture_settings *settings,
+                               const float *values,
+                               uint32_t on_cells,
+                               float *pixels);
 
 /*
- A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
- measured. The host keeps the buffers as long as it records with the scene.
+ Slices a mesh conservatively: no voxel that it touches is left empty. `answers`, if not null, gets a word per voxel, layer by layer and row by row: the
+ tetrahedron of its centre; plus 2^31 the nearest that touches its box, if the centre lies in none; 0xffffffff if it is empty. `results`, if not null, gets a
+ float: the value of the field (`values` and `on_cells` as `olbvh_render` takes them) there, NaN where it is empty. A voxel that is merely touched gets the
+ value of the tetrahedron's nearest point or, if `linear` is not 0, its field continued to the centre.
  */
-enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
-                                    const struct olbvh_plan *plan,
-                                    struct olbvh_buffer positions,
-                                    struct olbvh_buffer cells,
-                                    struct olbvh_buffer memory,
-                                    struct olbvh_buffer scratch,
-                                    struct olbvh_scene **out);
+enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
+                              const struct olbvh_voxels *voxels,
+                              const float *values,
+                              uint32_t on_cells,
+                              uint32_t linear,
+                              uint32_t *answers,
+                              float *results);
 
 /*
- Lets a scene go, but not its buffers; null is allowed.
+ Finds the tetrahedra of either mesh that intersect the other, whose points lie in one space. Of `hits_a` and `hits_b` word i / 32 gets bit i % 32
+ set if tetrahedron i does; both have a word for 32 tetrahedra, the last of them perhaps for fewer. The trees are of one `olbvh_gpu`.
  */
-void olbvh_scene_free(struct olbvh_scene *scene);
-
-/*
- Tells where the arrays of a scene are. `field`, a float per point, may be null.
- */
-enum olbvh_status olbvh_scene_arrays(const struct olbvh_scene *scene,
-                                     const struct olbvh_buffer *field,
-                                     struct olbvh_scene_arrays_data *out);
+enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
+                                const struct olbvh_tree *b,
+                                uint32_t *hits_a,
+                                uint32_t *hits_b);
 
 /*
  Makes what commands are recorded with: one per frame in flight, used by one thread at a time.
@@ -467,6 +848,37 @@ enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
 enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
 
 /*
+ Tells what memory a plan wants.
+ */
+enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
+                                     const struct olbvh_plan *plan,
+                                     struct olbvh_plan_sizes *out);
+
+/*
+ A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
+ measured. The host keeps the buffers as long as it records with the scene.
+ */
+enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
+                                    const struct olbvh_plan *plan,
+                                    struct olbvh_buffer positions,
+                                    struct olbvh_buffer cells,
+                                    struct olbvh_buffer memory,
+                                    struct olbvh_buffer scratch,
+                                    struct olbvh_scene **out);
+
+/*
+ Lets a scene go, but not its buffers; null is allowed.
+ */
+void olbvh_scene_free(struct olbvh_scene *scene);
+
+/*
+ Tells where the arrays of a scene are. `field`, a float per point, may be null.
+ */
+enum olbvh_status olbvh_scene_arrays(const struct olbvh_scene *scene,
+                                     const struct olbvh_buffer *field,
+                                     struct olbvh_scene_arrays_data *out);
+
+/*
  Records the construction of a scene's tree for the positions there are then. Reads positions and cells in compute shaders, uses memory and scratch in
  compute shaders and transfers, and ends with a barrier as `olbvh_cmd_barrier` records it.
  */
@@ -474,11 +886,141 @@ enum olbvh_status olbvh_cmd_build(struct olbvh_recording *recording,
                                   const struct olbvh_scene *scene);
 
 /*
- Records the location of points: compute shaders read mesh, tree and points, and write the answers. No barrier before or after.
+ Tells what memory the location takes besides the answers.
+ */
+enum olbvh_status olbvh_location_parts(const struct olbvh_scene *scene,
+                                       const struct olbvh_location *location,
+                                       struct olbvh_location_parts_data *out);
+
+/*
+ Records the location of points.
  */
 enum olbvh_status olbvh_cmd_locate(struct olbvh_recording *recording,
                                    const struct olbvh_scene *scene,
                                    const struct olbvh_location *location);
+
+/*
+ Tells what memory all owners of the points take, and where in `memory` (of no bytes, as long as there is none) the answers are.
+ */
+enum olbvh_status olbvh_owner_parts(const struct olbvh_scene *scene,
+                                    const struct olbvh_location *location,
+                                    struct olbvh_buffer memory,
+                                    struct olbvh_owner_parts_data *out);
+
+/*
+ Records all owners of points: the tetrahedra that contain each, ascending, point by point, a word each in `found`. As many are written as that
+ holds; `ends` and `total` of `olbvh_owner_parts` are right in any case. Of the location, points, stride, count and tolerance are read.
+ */
+enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
+                                   const struct olbvh_scene *scene,
+                                   const struct olbvh_location *location,
+                                   struct olbvh_buffer memory,
+                                   struct olbvh_buffer found);
+
+/*
+ Records the values of a field at points that have been located: a float each in `values`, NaN without an owner. Of the location, count, owners and
+ barycentrics are read, by compute shaders.
+ */
+enum olbvh_status olbvh_cmd_interpolate(struct olbvh_recording *recording,
+                                        const struct olbvh_scene *scene,
+                                        const struct olbvh_location *location,
+                                        const struct olbvh_field *field,
+                                        struct olbvh_buffer values);
+
+/*
+ Works out what a picture shows of a mesh whose points lie within the box from `lo` to `hi`, three floats each: the camera is placed by it, and lengths are
+ measured by its diagonal. Without a range in the settings, values reach from 0 to 1.
+ */
+enum olbvh_status olbvh_view_make(const struct olbvh_picture_settings *settings,
+                                  const float *lo,
+                                  const float *hi,
+                                  struct olbvh_view *out);
+
+/*
+ Tells how many bytes the ranges of a field take.
+ */
+enum olbvh_status olbvh_range_bytes(const struct olbvh_scene *scene, uint64_t *out);
+
+/*
+ Records the smallest and the largest value of a field in every node of the tree into `ranges`; new values need this alone, not a new tree. Begins with a
+ transfer write, ends with a barrier as `olbvh_cmd_barrier` records it.
+ */
+enum olbvh_status olbvh_cmd_ranges(struct olbvh_recording *recording,
+                                   const struct olbvh_scene *scene,
+                                   const struct olbvh_field *field,
+                                   struct olbvh_buffer ranges);
+
+/*
+ Tells what memory a picture takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+ */
+enum olbvh_status olbvh_picture_parts(const struct olbvh_scene *scene,
+                                      const struct olbvh_picture *picture,
+                                      struct olbvh_picture_parts_data *out);
+
+/*
+ Records the drawing of a picture. Where nodes are skipped, the tree is read by transfers as well.
+ */
+enum olbvh_status olbvh_cmd_render(struct olbvh_recording *recording,
+                                   const struct olbvh_scene *scene,
+                                   const struct olbvh_picture *picture);
+
+/*
+ Tells what memory a slice takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+ */
+enum olbvh_status olbvh_slicing_parts(const struct olbvh_slicing *slicing,
+                                      struct olbvh_slicing_parts_data *out);
+
+/*
+ Records the slicing of rows of voxels. The status is written by transfers as well.
+ */
+enum olbvh_status olbvh_cmd_slice(struct olbvh_recording *recording,
+                                  const struct olbvh_scene *scene,
+                                  const struct olbvh_slicing *slicing);
+
+/*
+ Tells what memory the overlap of two meshes takes, and where in `memory` (of no bytes, as long as there is none) the answers are.
+ */
+enum olbvh_status olbvh_overlap_parts(const struct olbvh_scene *a,
+                                      const struct olbvh_scene *b,
+                                      struct olbvh_buffer memory,
+                                      struct olbvh_overlap_parts_data *out);
+
+/*
+ Records which tetrahedra of A intersect B and which of B intersect A; the points of both lie in one space. Three rounds are enough for most.
+ */
+enum olbvh_status olbvh_cmd_overlap(struct olbvh_recording *recording,
+                                    const struct olbvh_scene *a,
+                                    const struct olbvh_scene *b,
+                                    struct olbvh_buffer memory,
+                                    struct olbvh_rounds rounds);
+
+/*
+ Tells what memory the pairs of A with another mesh take, and where in `memory` (of no bytes, as long as there is none) the status is.
+ */
+enum olbvh_status olbvh_pair_parts(const struct olbvh_scene *a,
+                                   struct olbvh_buffer memory,
+                                   struct olbvh_pair_parts_data *out);
+
+/*
+ Records how many pairs of a tetrahedron of A and one of B touch; the tree over B has all lists (`lists` 0). But for `assign` 0, a pair counts once per
+ leaf that lists both.
+ */
+enum olbvh_status olbvh_cmd_count_pairs(struct olbvh_recording *recording,
+                                        const struct olbvh_scene *a,
+                                        const struct olbvh_scene *b,
+                                        struct olbvh_buffer memory,
+                                        struct olbvh_rounds rounds);
+
+/*
+ Records the pairs themselves, once they are counted: two words each in `found`, the tetrahedron of A and that of B, ascending by A. As many are written
+ as that holds. Begins with a barrier; if it goes on where an earlier recording ended, with a transfer write of the status.
+ */
+enum olbvh_status olbvh_cmd_list_pairs(struct olbvh_recording *recording,
+                                       const struct olbvh_scene *a,
+                                       const struct olbvh_scene *b,
+                                       struct olbvh_buffer memory,
+                                       struct olbvh_buffer found,
+                                       struct olbvh_rounds rounds);
 
 #ifdef __cplusplus
 }  // extern "C"

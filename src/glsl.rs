@@ -3,20 +3,23 @@
 //! # A page of guide
 //! 1. Make [`OLBVH`] available to your shader compiler as `olbvh.glsl` (it is checked in as `include/olbvh.glsl` as well), and include it in any stage
 //!    as the first thing after `#version`. Everything in it is called `olbvh_…` or `OLBVH_…`.
-//! 2. Fill a buffer with [`SceneBuffers::addresses`]. Its device address, a `uvec2`, is the tree: hand it to the shader as you like, call
-//!    `olbvh_open(tree)` once per invocation, and then
+//! 2. Fill a buffer with [`SceneBuffers::addresses`], once: they stay as long as the arrays lie where they are. Its device address, a `uvec2`, is the tree:
+//!    hand it to the shader as you like, call `olbvh_open(tree)` once per invocation, and then
 //!
 //!    | function | gives |
 //!    |---|---|
-//!    | `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)` | owner of a point or `OLBVH_NONE`, barycentric coordinates |
-//!    | `uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS])` | all that contain it |
-//!    | `float olbvh_value(uint owner, vec4 weights)` | value of the field |
+//!    | `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)` | owner of a point or `OLBVH_NONE`, barycentric coordinates; a tolerance of 1e-5 is usual |
+//!    | `uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS])` | how many contain it, and the first of them; `OLBVH_OWNERS` is 32 unless you define it |
+//!    | `float olbvh_value(uint owner, vec4 weights)` | value of the field, which has a float per point |
 //!    | `vec3 olbvh_gradient(uint owner)` | its gradient |
-//!    | `bool olbvh_traverse()` | the paper's traversal, with your `olbvh_visit_node` and `olbvh_visit_leaf`; define `OLBVH_TRAVERSE` |
+//!    | `bool olbvh_traverse()` | the paper's traversal, if you define `OLBVH_TRAVERSE`, and below the inclusion `bool olbvh_visit_node(olbvh_Node)` (descend?) and `bool olbvh_visit_leaf(olbvh_Node)` (done?) |
 //!
 //! 3. Without buffer addresses define `OLBVH_DESCRIPTORS`, and bind [`SceneBuffers::list`] as storage buffers of set `OLBVH_SET` from binding
-//!    `OLBVH_BINDING` on.
+//!    `OLBVH_BINDING` on; the argument of `olbvh_open` means nothing then.
 //! 4. Mesh and tree must be visible to your stage: after [`crate::build::cmd_build`] put a barrier from compute and transfer writes to shader reads.
+//!    On a queue of another family besides a semaphore and, with exclusive sharing, a transfer of ownership.
+//!
+//! From C `olbvh_scene_arrays` gives addresses and bindings, and `olbvh_tree_info` the tree of a mesh in memory of our own.
 //!
 //! Several trees: call `olbvh_open` again. Answers are the same bytes as those of [`crate::query::locate`]. A leaf's list is searched in one go, so on
 //! drivers that watch the time of a draw prefer a small α, or `Lists::Boundary`.

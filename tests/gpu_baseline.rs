@@ -7,9 +7,9 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
-use olbvh::query::{self, LocateOptions, Party, Structure};
+use olbvh::query::{self, Drawn, LocateOptions, Party, Structure};
 use olbvh::reference::boundary::NONE;
-use olbvh::render::{Bounds, Prepared, RenderSettings};
+use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh with both structures over it.
@@ -133,25 +133,32 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
     }
 }
 
-/// Pictures of numbers of points and cells, if there is something to see.
-fn check_picture(name: &str, b: &Both) -> u64 {
+/// A picture by either structure; `None` where there is nothing to see.
+fn same_picture(name: &str, b: &Both, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     let bounds = Bounds { lo: three(b.device.grid().lo), hi: three(b.device.grid().hi) };
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
+    let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
+    let prepared = Prepared::new(settings, &b.mesh, &bounds, &neighbours, valid, field).ok()?;
+    let normals = settings.shading.then_some(&prepared.normals[..]);
+    let draw =
+        |structure: Structure| query::render(&b.device, structure, &prepared.plan, (&field.values, field.on), normals, &|_, _| {}).unwrap();
+    let (expected, drawn) = (draw((&b.tree).into()), draw((&b.lbvh).into()));
+    let camera = &settings.camera;
+    // The octree skips what shows no surface; nothing is skipped of a function that shows every value.
+    assert!(expected.skipped_samples > 0 || expected.found_samples == drawn.found_samples, "{name}, {camera:?}: samples in the mesh");
+    assert!(expected.colors == drawn.colors, "{name}, {camera:?}: colours");
+    Some(drawn)
+}
+
+/// Pictures of numbers of points and cells, if there is something to see.
+fn check_picture(name: &str, b: &Both) -> u64 {
     let mut found = 0;
     for (camera, on, n) in [("iso", On::Points, b.mesh.points.len()), ("azimuth=100,elevation=-10,zoom=1.5", On::Cells, b.mesh.tets.len())]
     {
         let field = Field { name: "number".into(), on, values: (0..n).map(|i| (i % 17) as f32).collect() };
         let settings = RenderSettings { size: size(name, [28, 20]), camera: camera.parse().unwrap(), ..RenderSettings::default() };
-        let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
-        let Ok(prepared) = Prepared::new(&settings, &b.mesh, &bounds, &neighbours, valid, &field) else { continue };
-        let draw = |structure: Structure| {
-            query::render(&b.device, structure, &prepared.plan, (&field.values, on), Some(&prepared.normals), &|_, _| {}).unwrap()
-        };
-        let (expected, drawn) = (draw((&b.tree).into()), draw((&b.lbvh).into()));
-        assert_eq!(expected.found_samples, drawn.found_samples, "{name}, {camera}: samples in the mesh");
-        assert!(expected.colors == drawn.colors, "{name}, {camera}: colours");
-        found += drawn.found_samples;
+        found += same_picture(name, b, &settings, &field).map_or(0, |drawn| drawn.found_samples);
     }
     found
 }
@@ -212,6 +219,33 @@ fn everything(binding: Binding) {
     assert!(found > 10_000 && touched > 1000 && hits > 1000, "{found} samples, {touched} voxels, {hits} hits");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
+}
+
+/// Two surfaces that cut through cells: lit or not, and half transparent, so that those behind are seen.
+fn surfaces(binding: Binding) {
+    let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
+    let both = Both::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());
+    let values = both.mesh.points.iter().map(|p| p[0] * p[1] - p[2]).collect();
+    let field = Field { name: "saddle".into(), on: On::Points, values };
+    for shading in [true, false] {
+        let transfer = TransferFunction::default().with_opacity(vec![(0.0, 0.4), (1.0, 0.6)]).unwrap();
+        let settings = RenderSettings { size: [28, 20], iso: vec![3.0, 11.0], shading, transfer, ..RenderSettings::default() };
+        let drawn = same_picture("surfaces", &both, &settings, &field).unwrap();
+        let beyond_one = drawn.colors.iter().filter(|c| c[3] > 0.65).count();
+        assert!(beyond_one > 20 && drawn.colors.iter().any(|c| c[3] == 0.0), "{beyond_one} pixels with several surfaces");
+    }
+    let messages = gpu.validation_messages();
+    assert!(messages.is_empty(), "{messages:#?}");
+}
+
+#[test]
+fn surfaces_by_address() {
+    surfaces(Binding::Address);
+}
+
+#[test]
+fn surfaces_by_descriptors() {
+    surfaces(Binding::Descriptors);
 }
 
 #[test]

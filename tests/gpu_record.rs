@@ -7,6 +7,7 @@ mod host;
 use bytemuck::Pod;
 use host::Frame;
 use host::queries::Queries;
+use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::{Grid, OverlapStatus, RenderPlan, RenderStatus, RenderView, SliceStatus};
@@ -221,7 +222,10 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
     assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
 
-    picture_goes_on(&gpu, &searched);
+    let lbvh = Lbvh::build(&gpu, &device).unwrap();
+    picture_goes_on(&gpu, &searched, &mesh.points, false);
+    let surface = picture_goes_on(&gpu, &searched, &mesh.points, true);
+    assert!(surface == picture_goes_on(&gpu, &Searched::new(&device, &lbvh), &mesh.points, true), "a surface by either structure");
 
     let scene = Scene::new(&device, &tree);
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
@@ -250,15 +254,17 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
 }
 
-/// A picture in several recordings is that of one.
-fn picture_goes_on(gpu: &Gpu, searched: &Searched) {
-    let settings = RenderSettings { size: [4, 3], step: Some(0.2), ..RenderSettings::default() };
+/// A picture in several recordings is that of one: of the volume, or of a surface across it.
+fn picture_goes_on(gpu: &Gpu, searched: &Searched, points: &[[f32; 3]], iso: bool) -> Vec<[f32; 4]> {
+    let (surfaces, step) = if iso { (vec![0.7], 0.1) } else { (vec![], 0.2) };
+    let settings = RenderSettings { size: [4, 3], step: Some(step), iso: surfaces, ..RenderSettings::default() };
     let plan = Plan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();
     let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
     let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
-    let field = gpu.upload("olbvh.test.field", &vec![0.9f32; searched.mesh.input.points as usize]).unwrap();
+    let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();
+    let field = gpu.upload("olbvh.test.field", &values).unwrap();
     let field = (field.all(), On::Points);
-    let input = RenderInput { size: [4, 3], view: view.all(), iso: false, table: table.all(), field, normals: None, shown: None };
+    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, shown: None };
     let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
@@ -282,12 +288,13 @@ fn picture_goes_on(gpu: &Gpu, searched: &Searched) {
     assert!(rounds > 2 || searched.mesh.input.tets < 1000, "{rounds}");
     assert!(status.found[0] > 0 && colors.iter().any(|c| c[3] > 0.0));
     assert!(draw(Rounds::begin(rounds)) == (colors.clone(), status), "all rounds in one recording");
-    assert!(draw(Rounds::begin(rounds + 1)) == (colors, status), "a round more");
+    assert!(draw(Rounds::begin(rounds + 1)) == (colors.clone(), status), "a round more");
     if rounds > 1 {
         assert!(draw(Rounds::begin(rounds - 1)).1.unfinished > 0, "a round less");
     }
     let more = gpu.run("olbvh.test.round", |r| cmd_render(r, searched, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
     assert!(more.unwrap_err().to_string().contains("4×4 pixels"));
+    colors
 }
 
 /// What a recording cannot know beforehand is told by the status: boxes too large for the mesh, and a mesh of nothing.

@@ -21,7 +21,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("kernels", &["error", "gpu", "layout"]),
     ("primitives", &["error", "gpu", "kernels", "layout"]),
     ("build", &["error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
-    ("capi", &["build", "error", "glsl", "gpu", "mesh", "options", "primitives", "query", "reference"]),
+    ("capi", &["build", "error", "glsl", "gpu", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
     ("blocks", &["build", "error", "gpu", "layout", "mesh", "options", "primitives", "query", "reference"]),

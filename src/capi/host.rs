@@ -4,15 +4,14 @@ use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing};
 use crate::error::Error;
 use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice};
 use ash::vk::{self, Handle};
-use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 
 /// A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhHostDevice {
-    /// `vkGetInstanceProcAddr`.
-    pub get_instance_proc_addr: *const c_void,
+    /// `vkGetInstanceProcAddr`, cast to this type.
+    pub get_instance_proc_addr: Option<unsafe extern "C" fn()>,
     /// `VkInstance`, of Vulkan 1.2 or later.
     pub instance: u64,
     /// `VkPhysicalDevice`.
@@ -21,7 +20,7 @@ pub struct OlbvhHostDevice {
     pub device: u64,
     /// `VkQueue` of that family, which nobody else submits to while a function of olbvh runs.
     pub queue: u64,
-    /// Queue family with compute.
+    /// Queue family with compute; it needs nothing else.
     pub queue_family: u32,
     /// Not 0: the feature `bufferDeviceAddress` is enabled.
     pub buffer_addresses: u32,
@@ -31,18 +30,19 @@ pub struct OlbvhHostDevice {
     pub debug_utils: u32,
 }
 
-/// Works on a device of the host's, which outlives everything made from the handle.
+/// Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a
+/// host that reads or writes them on another family transfers their ownership.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
         let host = handle(host, "host")?;
         let null = [host.instance, host.physical_device, host.device, host.queue].contains(&0);
-        if null || host.get_instance_proc_addr.is_null() {
+        let Some(get) = host.get_instance_proc_addr.filter(|_| !null) else {
             return Err(missing("a handle of the host's device"));
-        }
+        };
         // SAFETY: the host passes handles of one living device, and the loader's function.
         let gpu = unsafe {
-            let get = std::mem::transmute::<*const c_void, vk::PFN_vkGetInstanceProcAddr>(host.get_instance_proc_addr);
+            let get = std::mem::transmute::<unsafe extern "C" fn(), vk::PFN_vkGetInstanceProcAddr>(get);
             let functions = ash::StaticFn { get_instance_proc_addr: get };
             let instance = ash::Instance::load(&functions, vk::Instance::from_raw(host.instance));
             let device = ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(host.device));

@@ -9,17 +9,17 @@
 #![allow(unsafe_code, reason = "the border to C")]
 
 mod host;
+mod query;
 mod record;
 #[cfg(test)]
 mod tests;
 
-use crate::build::{BadCells, DeviceMesh, MeshView, Tree};
+use crate::build::{BadCells, DeviceMesh, MeshInput, MeshView, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions};
-use crate::mesh::Mesh;
+use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{LocateOptions, locate};
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -49,11 +49,43 @@ pub enum OlbvhStatus {
 pub struct OlbvhGpu(Gpu);
 
 /// A mesh in the device's memory.
-pub struct OlbvhMesh(Arc<DeviceMesh>);
+pub struct OlbvhMesh(Arc<HeldMesh>);
+
+/// A mesh, and what its tetrahedra and points are called.
+struct HeldMesh {
+    device: DeviceMesh,
+    /// For each tetrahedron and each point its number with the caller, where that is another.
+    ids: Option<[Vec<u32>; 2]>,
+}
+
+impl HeldMesh {
+    /// The caller's number of a tetrahedron; what is none stays so.
+    fn cell(&self, tet: u32) -> u32 {
+        self.ids.as_ref().and_then(|[cells, _]| cells.get(tet as usize).copied()).unwrap_or(tet)
+    }
+
+    /// A field of the caller's in the order of the mesh.
+    fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
+        let (on, count) = on(on_cells, self.device.input());
+        let values = array(values, count as usize, "values")?;
+        let ids = self.ids.as_ref().map(|[cells, points]| if on == On::Points { points } else { cells });
+        Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().map(|&i| values[i as usize]).collect()), on))
+    }
+}
+
+/// What values belong to, and how many there are.
+fn on(on_cells: u32, mesh: &MeshInput) -> (On, u32) {
+    if on_cells == 0 { (On::Points, mesh.points) } else { (On::Cells, mesh.tets) }
+}
+
+/// What a tolerance below 0 stands for.
+fn tolerance(given: f32) -> f32 {
+    if given < 0.0 { TOLERANCE } else { given }
+}
 
 /// A tree over a mesh.
 pub struct OlbvhTree {
-    mesh: Arc<DeviceMesh>,
+    mesh: Arc<HeldMesh>,
     tree: Tree,
     /// What shaders get, see `olbvh.glsl`.
     addresses: Buffer,
@@ -110,7 +142,7 @@ pub struct OlbvhTreeInfo {
     pub bad_cells: u32,
     /// Milliseconds of device time.
     pub build_ms: f64,
-    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses.
+    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order.
     pub address: u64,
 }
 
@@ -227,7 +259,9 @@ pub extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
     release(gpu);
 }
 
-/// Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted.
+/// Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted. `reorder`, if not 0, brings points
+/// and tetrahedra into the order of a Z curve on the way, which pays where they come in no order; all functions go on to take and to give the caller's numbers.
+/// Of the tetrahedra that share a face, edge or vertex, the first along the curve owns its points then, not that of the lowest number.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_mesh_upload(
     gpu: *const OlbvhGpu,
@@ -235,6 +269,7 @@ pub extern "C" fn olbvh_mesh_upload(
     point_count: usize,
     tets: *const u32,
     tet_count: usize,
+    reorder: u32,
     out: *mut *mut OlbvhMesh,
 ) -> OlbvhStatus {
     border(|| {
@@ -243,8 +278,10 @@ pub extern "C" fn olbvh_mesh_upload(
         limit(tet_count)?;
         let points = array(points.cast::<[f32; 3]>(), point_count, "points")?.to_vec();
         let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?.to_vec();
-        let mesh = DeviceMesh::upload(&handle(gpu, "gpu")?.0, &Mesh::new(points, tets), BadCells::Skip)?;
-        give(out, OlbvhMesh(Arc::new(mesh)))
+        let mesh = Mesh::new(points, tets);
+        let mesh = if reorder == 0 { mesh } else { mesh.along_curve()? };
+        let device = DeviceMesh::upload(&handle(gpu, "gpu")?.0, &mesh, BadCells::Skip)?;
+        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids: mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from) })))
     })
 }
 
@@ -268,9 +305,10 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
         let mesh = handle(mesh, "mesh")?.0.clone();
         // SAFETY: null, or the caller's options.
         let options = unsafe { options.as_ref() }.map_or(Ok(BuildOptions::default()), OlbvhBuildOptions::read)?;
-        let gpu = mesh.gpu();
-        let tree = Tree::build(gpu, &mesh, &options)?;
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let device = &mesh.device;
+        let gpu = device.gpu();
+        let tree = Tree::build(gpu, device, &options)?;
+        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
         let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&view, tree.memory(), None).addresses()])?;
         give(out, OlbvhTree { mesh, tree, addresses })
     })
@@ -296,42 +334,10 @@ pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInf
             leaves: status.leaves,
             lo: corner(grid.lo),
             hi: corner(grid.hi),
-            bad_cells: mesh.status().bad,
+            bad_cells: mesh.device.status().bad,
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             address: addresses.all().address,
         };
         put(out, info)
-    })
-}
-
-/// Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
-/// point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
-/// `-tolerance`; below 0 means the default, 1e-5.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_locate(
-    tree: *const OlbvhTree,
-    points: *const f32,
-    count: usize,
-    tolerance: f32,
-    owners: *mut u32,
-    barycentrics: *mut f32,
-) -> OlbvhStatus {
-    border(|| {
-        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
-        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
-        if owners.is_null() && count > 0 {
-            return Err(missing("owners"));
-        }
-        let tolerance = if tolerance < 0.0 { TOLERANCE } else { tolerance };
-        let options = LocateOptions { tolerance, ..LocateOptions::default() };
-        let found = locate(mesh, tree, points, None, &options, &|_, _| {})?;
-        // SAFETY: the caller vouches for `count` owners and, unless null, four times as many floats.
-        unsafe {
-            std::ptr::copy_nonoverlapping(found.owners.as_ptr(), owners, found.owners.len());
-            if !barycentrics.is_null() {
-                std::ptr::copy_nonoverlapping(found.barycentrics.as_ptr().cast::<f32>(), barycentrics, 4 * found.barycentrics.len());
-            }
-        }
-        Ok(())
     })
 }

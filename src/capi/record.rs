@@ -1,19 +1,23 @@
 //! Recording into a host's command buffer and memory, across the border to C: nothing is submitted, waited for or made.
+//! The head of the header says what all of it has in common, see `.config/cbindgen.toml`.
 
-use super::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
-use crate::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+mod locate;
+mod overlap;
+mod render;
+mod scene;
+mod slice;
+
+#[cfg(test)]
+pub(super) use {locate::*, overlap::*, render::*, scene::*, slice::*};
+
+use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
 use crate::error::{Error, Result};
-use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, Gpu, Recorder, USAGE};
-use crate::options::{BuildOptions, TOLERANCE};
+use crate::gpu::{BufferRef, DescriptorPools, Gpu, Recorder};
+use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate};
-use crate::reference::grid::MAX_LEVEL;
+use crate::query::{Rounds, Scene};
 use ash::vk::{self, Handle};
 use std::ffi::c_char;
-
-/// Entries per tetrahedron that there is room for where nothing else is asked for.
-const ENTRIES: u32 = 24;
 
 /// A part of a buffer of the host's.
 #[repr(C)]
@@ -34,6 +38,31 @@ impl OlbvhBuffer {
         let Self { offset, size, address, .. } = *self;
         BufferRef { buffer: vk::Buffer::from_raw(self.buffer), offset, size, address }
     }
+
+    /// The part, which must have so many bytes.
+    fn holds(&self, bytes: u64, what: &str) -> Result<BufferRef> {
+        if self.size < bytes {
+            return Err(Error::Invalid(format!("{what} in {} bytes; {bytes} are needed", self.size)));
+        }
+        Ok(self.part())
+    }
+
+    /// The same; `None` of no bytes.
+    fn optional(&self, bytes: u64, what: &str) -> Result<Option<BufferRef>> {
+        if self.size == 0 { Ok(None) } else { self.holds(bytes, what).map(Some) }
+    }
+
+    /// The parts of this memory.
+    fn place<T>(self, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<T> {
+        carve(&mut Arena::new(self.part()))
+    }
+
+    /// The parts of this memory, and how many bytes they take. Of memory that is not there yet offsets count from its beginning.
+    fn carve<T>(self, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<(u64, T)> {
+        let bytes = Arena::measure(&carve)?;
+        let given = if self.size == 0 { Self { size: bytes, ..self } } else { self };
+        Ok((bytes, given.place(carve)?))
+    }
 }
 
 impl From<BufferRef> for OlbvhBuffer {
@@ -43,74 +72,38 @@ impl From<BufferRef> for OlbvhBuffer {
     }
 }
 
-/// What is known of a mesh and its tree before there is memory for them.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct OlbvhPlan {
-    /// Points.
-    pub points: u32,
-    /// 32-bit floats from one point to the next, at least 3.
-    pub stride: u32,
-    /// Tetrahedra.
-    pub tets: u32,
-    /// Deepest level that the leaves may have, up to 10.
-    pub level: u32,
-    /// At least the entries of the longest leaf, 0: any number. Location takes a dispatch for every 16,384 of them.
-    pub longest_leaf: u32,
-    /// How to build. Without a capacity there is room for 24 entries per tetrahedron, or for what the budget allows.
-    pub build: OlbvhBuildOptions,
-}
-
-/// What memory a plan wants.
+/// Values on a mesh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
-pub struct OlbvhPlanSizes {
-    /// Bytes of mesh and tree, kept as long as the tree is asked.
-    pub memory: u64,
-    /// Bytes in use while building only; frames in flight on one queue can share them.
-    pub scratch: u64,
-    /// Offsets of parts are multiples of this.
-    pub alignment: u64,
-    /// `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
-    pub usage: u32,
+pub struct OlbvhField {
+    /// A 32-bit float per point, or per tetrahedron.
+    pub values: OlbvhBuffer,
+    /// 0: per point, linear in a tetrahedron. Else: per tetrahedron.
+    pub on_cells: u32,
 }
 
-/// A mesh and its tree in memory of the host's.
-pub struct OlbvhScene {
-    scene: Scene,
-    planned: Planned,
-    mesh_scratch: MeshScratch,
-    build_scratch: BuildScratch,
+impl OlbvhField {
+    fn read(&self, scene: &Scene) -> Result<(BufferRef, On)> {
+        let (on, count) = super::on(self.on_cells, &scene.mesh.input);
+        Ok((self.values.holds(4 * u64::from(count), "a field")?, on))
+    }
 }
 
-/// Where the arrays of a scene are: what olbvh.glsl gets.
+/// How far a recording goes with work that takes as many dispatches as it takes: a dispatch looks at so much and no more, so that no device is kept
+/// busy for long. The status of the query says what is left.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
-pub struct OlbvhSceneArrays {
-    /// The content of the buffer whose address `olbvh_open` gets. By descriptors that buffer is the first of the bindings.
-    pub addresses: [u32; 22],
-    /// The buffers of the other bindings, in order.
-    pub bindings: [OlbvhBuffer; 10],
-    /// What was built, in words: level of the leaves, level that was asked for, candidates, entries, nodes, internal nodes, leaves, …
-    pub status: OlbvhBuffer,
-}
-
-/// Points to locate, and where the answers go.
-#[repr(C)]
-#[derive(Clone, Copy, Debug)]
-pub struct OlbvhLocation {
-    /// 32-bit floats, three of each point.
-    pub points: OlbvhBuffer,
-    /// Floats from one point to the next, at least 3.
-    pub stride: u32,
-    /// Points.
+pub struct OlbvhRounds {
+    /// Dispatches, one after the other; what is finished is passed over.
     pub count: u32,
-    /// As `olbvh_locate` takes it.
-    pub tolerance: f32,
-    /// A word per point: its owner, or 0xffffffff.
-    pub owners: OlbvhBuffer,
-    /// Four floats per point, in the order of the cell's vertices; zeroes without an owner.
-    pub barycentrics: OlbvhBuffer,
+    /// Not 0: go on where an earlier recording of the same ended.
+    pub resume: u32,
+}
+
+impl From<OlbvhRounds> for Rounds {
+    fn from(rounds: OlbvhRounds) -> Self {
+        Self { count: rounds.count, resume: rounds.resume != 0 }
+    }
 }
 
 /// Commands being recorded, and the descriptor sets they use: one per frame in flight.
@@ -141,100 +134,6 @@ impl Drop for OlbvhRecording {
         // SAFETY: both came from boxes, and the recorder that referred to them is gone.
         drop(unsafe { (Box::from_raw(self.pools), Box::from_raw(self.gpu)) });
     }
-}
-
-/// What a plan means.
-struct Planned {
-    options: BuildOptions,
-    capacity: Capacity,
-}
-
-impl OlbvhPlan {
-    fn read(&self) -> Result<Planned> {
-        let mut options = self.build.read()?;
-        if self.level > MAX_LEVEL {
-            return Err(Error::Invalid(format!("level {} is beyond {MAX_LEVEL}", self.level)));
-        }
-        let capacity = match (options.capacity, options.budget.take()) {
-            (None, Some(bytes)) => Capacity::for_bytes(bytes, self.level, &options)?,
-            (entries, _) => Capacity::for_entries(entries.unwrap_or(self.tets.saturating_mul(ENTRIES)), self.level),
-        };
-        Ok(Planned { options, capacity })
-    }
-
-    fn memory(&self, arena: &mut Arena, planned: &Planned) -> Result<(MeshArrays, TreeMemory)> {
-        Ok((MeshArrays::carve(arena, self.points, self.tets)?, TreeMemory::carve(arena, &planned.capacity, &planned.options)?))
-    }
-
-    fn scratch(&self, gpu: &Gpu, arena: &mut Arena, planned: &Planned) -> Result<(MeshScratch, BuildScratch)> {
-        let Planned { options, capacity } = planned;
-        Ok((MeshScratch::carve(arena, self.tets)?, BuildScratch::carve(gpu, arena, self.tets, capacity, options)?))
-    }
-}
-
-/// Tells what memory a plan wants.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPlan, out: *mut OlbvhPlanSizes) -> OlbvhStatus {
-    border(|| {
-        let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
-        let planned = plan.read()?;
-        let sizes = OlbvhPlanSizes {
-            memory: Arena::measure(|a| plan.memory(a, &planned))?,
-            scratch: Arena::measure(|a| plan.scratch(gpu, a, &planned))?,
-            alignment: ALIGNMENT,
-            usage: USAGE.as_raw(),
-        };
-        put(out, sizes)
-    })
-}
-
-/// A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
-/// measured. The host keeps the buffers as long as it records with the scene.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_place(
-    gpu: *const OlbvhGpu,
-    plan: *const OlbvhPlan,
-    positions: OlbvhBuffer,
-    cells: OlbvhBuffer,
-    memory: OlbvhBuffer,
-    scratch: OlbvhBuffer,
-    out: *mut *mut OlbvhScene,
-) -> OlbvhStatus {
-    border(|| {
-        let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
-        let OlbvhPlan { points, stride, tets, .. } = *plan;
-        let needed = (4 * (u64::from(stride) * u64::from(points.saturating_sub(1)) + 3), 16 * u64::from(tets));
-        if positions.size < needed.0 || cells.size < needed.1 {
-            let text =
-                format!("{} bytes of positions and {} of cells; the plan has {} and {}", positions.size, cells.size, needed.0, needed.1);
-            return Err(Error::Invalid(text));
-        }
-        let planned = plan.read()?;
-        let (arrays, tree) = plan.memory(&mut Arena::new(memory.part()), &planned)?;
-        let (mesh_scratch, build_scratch) = plan.scratch(gpu, &mut Arena::new(scratch.part()), &planned)?;
-        let input = MeshInput { positions: positions.part(), stride, points, cells: cells.part(), tets };
-        let longest_leaf = if plan.longest_leaf == 0 { tets } else { plan.longest_leaf };
-        let scene = Scene { mesh: MeshView { input, arrays }, tree, longest_leaf };
-        give(out, OlbvhScene { scene, planned, mesh_scratch, build_scratch })
-    })
-}
-
-/// Lets a scene go, but not its buffers; null is allowed.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_free(scene: *mut OlbvhScene) {
-    release(scene);
-}
-
-/// Tells where the arrays of a scene are. `field`, a float per point, may be null.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const OlbvhBuffer, out: *mut OlbvhSceneArrays) -> OlbvhStatus {
-    border(|| {
-        let scene = &handle(scene, "scene")?.scene;
-        // SAFETY: the caller passes null or a buffer.
-        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, unsafe { field.as_ref() }.map(OlbvhBuffer::part));
-        let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
-        put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status: scene.tree.status.into() })
-    })
 }
 
 /// Makes what commands are recorded with: one per frame in flight, used by one thread at a time.
@@ -308,35 +207,6 @@ pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStat
     recorded(recording, |r| {
         r.barrier("host → host");
         Ok(())
-    })
-}
-
-/// Records the construction of a scene's tree for the positions there are then. Reads positions and cells in compute shaders, uses memory and scratch in
-/// compute shaders and transfers, and ends with a barrier as `olbvh_cmd_barrier` records it.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let OlbvhScene { scene, planned, mesh_scratch, build_scratch } = handle(scene, "scene")?;
-        cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, mesh_scratch)?;
-        r.barrier("scene.mesh → scene.tree");
-        cmd_build(r, &scene.mesh, &scene.tree, &planned.capacity, &planned.options, build_scratch)
-    })
-}
-
-/// Records the location of points: compute shaders read mesh, tree and points, and write the answers. No barrier before or after.
-#[unsafe(no_mangle)]
-pub extern "C" fn olbvh_cmd_locate(
-    recording: *mut OlbvhRecording,
-    scene: *const OlbvhScene,
-    location: *const OlbvhLocation,
-) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let scene = &handle(scene, "scene")?.scene;
-        let OlbvhLocation { points, stride, count, tolerance, owners, barycentrics } = *handle(location, "location")?;
-        let input = PointInput { points: points.part(), stride, count, hints: None, order: None };
-        let output = LocateOutput { owners: owners.part(), barycentrics: barycentrics.part() };
-        let tolerance = if tolerance < 0.0 { TOLERANCE } else { tolerance };
-        cmd_locate(r, scene, &input, &output, &LocateOptions { tolerance, ..LocateOptions::default() })
     })
 }
 

@@ -2,6 +2,7 @@
 
 #[path = "../../tests/host/mod.rs"]
 mod host;
+mod queries;
 
 use super::host::{OlbvhHostDevice, olbvh_gpu_from_host};
 use super::record::*;
@@ -67,6 +68,9 @@ fn frames(gpu: *mut OlbvhGpu) {
         stride: 3,
         count: points,
         tolerance: -1.0,
+        path: 0,
+        hints: OlbvhBuffer::default(),
+        memory: OlbvhBuffer::default(),
         owners: owners_of,
         barycentrics: weights,
     };
@@ -132,14 +136,16 @@ fn frames(gpu: *mut OlbvhGpu) {
     assert!(arrays.bindings.iter().take(6).all(|b| b.buffer == memory.all().buffer.as_raw()));
     olbvh_recording_free(recording);
     olbvh_scene_free(scene);
-    olbvh_gpu_free(gpu);
 }
 
 #[test]
-fn a_c_host_records_by_address() {
+fn a_c_host_records_by_address_and_asks() {
     let host = Host::new();
+    // SAFETY: a function pointer for another.
+    let get =
+        unsafe { std::mem::transmute::<*const (), unsafe extern "C" fn()>(host.entry.static_fn().get_instance_proc_addr as *const ()) };
     let mut lent = OlbvhHostDevice {
-        get_instance_proc_addr: host.entry.static_fn().get_instance_proc_addr as *const _,
+        get_instance_proc_addr: Some(get),
         instance: host.instance.handle().as_raw(),
         physical_device: host.physical.as_raw(),
         device: host.device.handle().as_raw(),
@@ -149,7 +155,10 @@ fn a_c_host_records_by_address() {
         subgroup_size_control: u32::from(host.control),
         debug_utils: 0,
     };
-    frames(made(|out| olbvh_gpu_from_host(&raw const lent, out)));
+    let gpu = made(|out| olbvh_gpu_from_host(&raw const lent, out));
+    frames(gpu);
+    queries::owned(gpu);
+    olbvh_gpu_free(gpu);
     lent.queue = 0;
     let mut none = null_mut();
     assert_eq!(olbvh_gpu_from_host(&raw const lent, &raw mut none), OlbvhStatus::Invalid);
@@ -161,5 +170,8 @@ fn a_c_host_records_by_descriptors_and_makes_nothing() {
     let options = GpuOptions { binding: Some(crate::gpu::Binding::Descriptors), ..GpuOptions::default() };
     // SAFETY: the host's handles belong together and outlive the frames; the counted functions do what the device's own do.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
-    frames(Box::into_raw(Box::new(OlbvhGpu(gpu))));
+    let gpu = Box::into_raw(Box::new(OlbvhGpu(gpu)));
+    frames(gpu);
+    queries::recorded(gpu);
+    olbvh_gpu_free(gpu);
 }

@@ -80,6 +80,9 @@ impl Host {
             let needs = Requirements::check(&instance, physical);
             assert!(needs.missing.is_empty(), "{:?}", needs.missing);
             let family = needs.queue_family.unwrap().0;
+            let flags = instance.get_physical_device_queue_family_properties(physical)[family as usize].queue_flags;
+            let compute_only = std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|name| name.starts_with("lavapipe25compute"));
+            assert!(!compute_only || !flags.contains(vk::QueueFlags::GRAPHICS), "{flags:?}");
             let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
             let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(needs.buffer_addresses);
             let mut control =

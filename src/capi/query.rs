@@ -1,0 +1,270 @@
+//! The convenient calls: each asks a tree of olbvh's own, waits, and fills arrays of the caller's.
+
+use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, tolerance};
+use crate::error::{Error, Result};
+use crate::gpu::BufferRef;
+use crate::mesh::{Field, Mesh};
+use crate::query::{LocateOptions, Party, locate, overlap, render, slice};
+use crate::render::settings::MAX_ISO;
+use crate::render::{Bounds, Prepared, RenderSettings, TransferFunction};
+use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
+use bytemuck::Pod;
+use std::ffi::{CStr, c_char};
+
+/// What a picture shows; `olbvh_default_picture_settings` fills it.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OlbvhPictureSettings {
+    /// Pixels in a row.
+    pub width: u32,
+    /// Rows.
+    pub height: u32,
+    /// The camera, as `olbvh render --camera` takes it; null: it sees the whole mesh from an angle.
+    pub camera: *const c_char,
+    /// Name of a colour map, as `olbvh render --tf` takes it; null: the usual one.
+    pub colors: *const c_char,
+    /// Opacity, as `olbvh render --opacity` takes it; null: `olbvh_render` makes it fit the field, `olbvh_view_make` lets it rise with the value.
+    pub opacity: *const c_char,
+    /// Values of iso-surfaces, which are drawn instead of the volume.
+    pub iso: [f32; 8],
+    /// How many of them there are; 0: the volume is drawn.
+    pub iso_count: u32,
+    /// Values at the ends of the colour map; the first above the second: all values that the field has.
+    pub range: [f32; 2],
+    /// Distance of two samples in units of the mesh; 0: 1/512 of its diagonal.
+    pub step: f64,
+    /// Factor on the opacity: 2 is as opaque as twice the way through the mesh.
+    pub opacity_scale: f32,
+    /// A ray ends once it is this opaque.
+    pub termination: f32,
+    /// Not 0: surface and steep values are lit.
+    pub shading: u32,
+    /// Opacity that a lit surface seen from the side has at least.
+    pub outline: f32,
+    /// Direction to the light: right, up, towards the viewer.
+    pub light: [f32; 3],
+}
+
+/// Where the voxels of a stack of layers lie.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OlbvhVoxels {
+    /// Centre of voxel (0, 0) of layer 0.
+    pub origin: [f32; 3],
+    /// From one voxel to the next in a row.
+    pub across: [f32; 3],
+    /// From one row to the next.
+    pub down: [f32; 3],
+    /// From one layer to the next.
+    pub up: [f32; 3],
+    /// Half axes of a voxel's box.
+    pub half: [[f32; 3]; 3],
+    /// Voxels in a row.
+    pub width: u32,
+    /// Rows of a layer.
+    pub height: u32,
+    /// Layers.
+    pub layers: u32,
+}
+
+impl OlbvhPictureSettings {
+    pub(super) fn read(&self) -> Result<RenderSettings> {
+        // SAFETY: the caller passes null or a C string.
+        let text = |pointer: *const c_char| (!pointer.is_null()).then(|| unsafe { CStr::from_ptr(pointer) }.to_string_lossy());
+        let mut settings = RenderSettings {
+            size: [self.width, self.height],
+            iso: self.iso[..MAX_ISO.min(self.iso_count as usize)].to_vec(),
+            range: (self.range[0] <= self.range[1]).then_some(self.range),
+            step: (self.step != 0.0).then_some(self.step),
+            opacity_scale: self.opacity_scale,
+            termination: self.termination,
+            shading: self.shading != 0,
+            outline: self.outline,
+            light: self.light,
+            ..RenderSettings::default()
+        };
+        if self.iso_count as usize > MAX_ISO {
+            return Err(Error::Invalid(format!("{} iso-surfaces; give up to {MAX_ISO}", self.iso_count)));
+        }
+        if let Some(camera) = text(self.camera) {
+            settings.camera = camera.parse()?;
+        }
+        if let Some(colors) = text(self.colors) {
+            settings.transfer = TransferFunction::named(&colors)?;
+        }
+        if let Some(opacity) = text(self.opacity) {
+            settings.transfer = settings.transfer.with_opacity(TransferFunction::parse_opacity(&opacity)?)?;
+        }
+        Ok(settings)
+    }
+}
+
+impl OlbvhVoxels {
+    pub(super) fn read(&self) -> VoxelGrid {
+        let Self { origin, across, down, up, half, width, height, layers } = *self;
+        VoxelGrid { origin, across, down, up, half, size: [width, height], layers }
+    }
+}
+
+impl HeldMesh {
+    /// As it lies on the device.
+    fn download(&self) -> Result<Mesh> {
+        let input = self.device.input();
+        let (points, tets) = (self.download_part(input.positions, input.points)?, self.download_part(input.cells, input.tets)?);
+        Ok(Mesh::new(points, tets))
+    }
+
+    fn download_part<T: Pod>(&self, part: BufferRef, count: u32) -> Result<Vec<T>> {
+        let mut all = vec![T::zeroed(); count as usize];
+        if count > 0 {
+            self.device.gpu().download_ref(part, bytemuck::cast_slice_mut(&mut all))?;
+        }
+        Ok(all)
+    }
+}
+
+/// An array of the caller's to be filled.
+fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [T]> {
+    match (pointer.is_null(), count) {
+        (_, 0) => Ok(&mut []),
+        (true, _) => Err(missing(what)),
+        // SAFETY: the caller vouches for `count` elements that nobody else uses (see each function).
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) }),
+    }
+}
+
+/// Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
+/// point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
+/// `-tolerance`; below 0 means the default, 1e-5.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_locate(
+    tree: *const OlbvhTree,
+    points: *const f32,
+    count: usize,
+    tolerance: f32,
+    owners: *mut u32,
+    barycentrics: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
+        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
+        let owners = array_mut(owners, count, "owners")?;
+        let options = LocateOptions { tolerance: self::tolerance(tolerance), ..LocateOptions::default() };
+        let found = locate(&mesh.device, tree, points, None, &options, &|_, _| {})?;
+        owners.iter_mut().zip(found.owners).for_each(|(to, owner)| *to = mesh.cell(owner));
+        if !barycentrics.is_null() {
+            array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.copy_from_slice(&found.barycentrics);
+        }
+        Ok(())
+    })
+}
+
+/// What pictures are like where nothing else is asked for.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
+    let RenderSettings { size: [width, height], opacity_scale, termination, shading, outline, light, .. } = RenderSettings::default();
+    let [camera, colors, opacity] = [std::ptr::null(); 3];
+    let (iso, iso_count, range, step, shading) = ([0.0; 8], 0, [1.0, 0.0], 0.0, u32::from(shading));
+    OlbvhPictureSettings {
+        width,
+        height,
+        camera,
+        colors,
+        opacity,
+        iso,
+        iso_count,
+        range,
+        step,
+        opacity_scale,
+        termination,
+        shading,
+        outline,
+        light,
+    }
+}
+
+/// Draws a field: `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets four floats per pixel, the upper row first: colour
+/// (sRGB from 0 to 1) multiplied by its opacity, and opacity; what is behind is the caller's.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_render(
+    tree: *const OlbvhTree,
+    settings: *const OlbvhPictureSettings,
+    values: *const f32,
+    on_cells: u32,
+    pixels: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
+        let settings = handle(settings, "settings")?.read()?;
+        settings.check()?;
+        let [width, height] = settings.size.map(|n| n as usize);
+        let pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?;
+        let (values, on) = mesh.field(values, on_cells)?;
+        let field = Field { name: "values".into(), on, values };
+        let (device, grid) = (&mesh.device, tree.grid());
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let bounds = Bounds { lo: corner(grid.lo), hi: corner(grid.hi) };
+        let (neighbours, bad) = (device.neighbours()?, device.bad_cells()?);
+        let valid = |tet: usize| bad.binary_search(&(tet as u32)).is_err();
+        let prepared = Prepared::new(&settings, &mesh.download()?, &bounds, &neighbours, valid, &field)?;
+        let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
+        pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, &|_, _| {})?.colors);
+        Ok(())
+    })
+}
+
+/// Slices a mesh conservatively: no voxel that it touches is left empty. `answers`, if not null, gets a word per voxel, layer by layer and row by row: the
+/// tetrahedron of its centre; plus 2^31 the nearest that touches its box, if the centre lies in none; 0xffffffff if it is empty. `results`, if not null, gets a
+/// float: the value of the field (`values` and `on_cells` as `olbvh_render` takes them) there, NaN where it is empty. A voxel that is merely touched gets the
+/// value of the tetrahedron's nearest point or, if `linear` is not 0, its field continued to the centre.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_slice(
+    tree: *const OlbvhTree,
+    voxels: *const OlbvhVoxels,
+    values: *const f32,
+    on_cells: u32,
+    linear: u32,
+    answers: *mut u32,
+    results: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
+        let voxels = handle(voxels, "voxels")?.read();
+        voxels.check()?;
+        let count = usize::try_from(voxels.voxels()).map_err(|_| Error::TooLarge(format!("{} voxels", voxels.voxels())))?;
+        let mut answers = array_mut(answers, if answers.is_null() { 0 } else { count }, "answers")?.iter_mut();
+        let mut results = array_mut(results, if results.is_null() { 0 } else { count }, "results")?.iter_mut();
+        let field = if results.len() > 0 { Some(mesh.field(values, on_cells)?) } else { None };
+        let extrapolate = if linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
+        let mut sink = |band: Band| {
+            let touched = |kind: u8| if kind == TOUCHED { 1 << 31 } else { 0 };
+            let owners = band.owners.iter().zip(&band.kinds).map(|(&owner, &kind)| mesh.cell(owner) | touched(kind));
+            answers.by_ref().zip(owners).for_each(|(to, answer)| *to = answer);
+            results.by_ref().zip(&band.values).for_each(|(to, value)| *to = *value);
+            Ok(())
+        };
+        let field = field.as_ref().map(|(values, on)| (&values[..], *on));
+        slice(&mesh.device, tree, field, &voxels, extrapolate, &|_, _| {}, &mut sink)?;
+        Ok(())
+    })
+}
+
+/// Finds the tetrahedra of either mesh that intersect the other, whose points lie in one space. Of `hits_a` and `hits_b` word i / 32 gets bit i % 32
+/// set if tetrahedron i does; both have a word for 32 tetrahedra, the last of them perhaps for fewer. The trees are of one `olbvh_gpu`.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a: *mut u32, hits_b: *mut u32) -> OlbvhStatus {
+    border(|| {
+        let [a, b] = [handle(a, "a")?, handle(b, "b")?];
+        let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
+        let hits = [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?];
+        let [one, other] = [a, b].map(|t| Party { mesh: &t.mesh.device, tree: &t.tree });
+        let found = overlap(one, other, false, &|_, _| {})?.overlap;
+        for ((bits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
+            bits.fill(0);
+            for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {
+                bits[(cell / 32) as usize] |= 1 << (cell % 32);
+            }
+        }
+        Ok(())
+    })
+}

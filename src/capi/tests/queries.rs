@@ -1,0 +1,314 @@
+//! Every query as a C program asks it, recorded and owned: the same bytes as from Rust.
+
+use super::*;
+use crate::capi::query::*;
+use crate::gpu::Buffer;
+use crate::mesh::Field;
+use crate::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
+use crate::render::{Bounds, Plan, Prepared};
+use crate::slicing::{Band, Extrapolate};
+use bytemuck::Pod;
+
+const NOTHING: OlbvhBuffer = OlbvhBuffer { buffer: 0, offset: 0, size: 0, address: 0 };
+const LO: [f32; 3] = [-1.0; 3];
+const HI: [f32; 3] = [6.0, 5.0, 4.0];
+
+fn settings() -> OlbvhPictureSettings {
+    let (colors, opacity) = (c"viridis_r".as_ptr(), c"0:0,0.4:0,0.5:0.4,0.6:0,1:0".as_ptr());
+    OlbvhPictureSettings { width: 37, height: 30, colors, opacity, range: [-1.5, 5.0], ..olbvh_default_picture_settings() }
+}
+
+fn voxels() -> OlbvhVoxels {
+    let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
+    let half = [axis(0, 0.2), axis(1, 0.2), axis(2, 0.4)];
+    OlbvhVoxels { origin: LO, across: axis(0, 0.4), down: axis(1, 0.4), up: axis(2, 0.8), half, width: 17, height: 13, layers: 6 }
+}
+
+fn meshes() -> [Mesh; 2] {
+    let mut other = kuhn_jittered([3; 3], 0.3, 9).unwrap();
+    other.points.iter_mut().for_each(|p| *p = p.map(|x| x + 1.3));
+    [kuhn_jittered([5, 4, 3], 0.3, 1).unwrap(), other]
+}
+
+fn values(mesh: &Mesh) -> Vec<f32> {
+    mesh.points.iter().map(|p| p[0] - 0.5 * p[2]).collect()
+}
+
+/// What Rust finds.
+struct Expected {
+    colors: Vec<[f32; 4]>,
+    answers: Vec<u32>,
+    sliced: Vec<u32>,
+    hits: [Vec<u32>; 2],
+    pairs: Vec<[u32; 2]>,
+    owners: Vec<Vec<u32>>,
+    located: Vec<f32>,
+}
+
+fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 3]]>) -> Expected {
+    let values = values(&meshes[0]);
+    let field = Some((&values[..], On::Points));
+    let [mesh, other] = meshes.each_ref().map(|m| DeviceMesh::upload(gpu, m, BadCells::Skip).unwrap());
+    let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
+    let [tree, other_tree] = [&mesh, &other].map(|m| Tree::build(gpu, m, &options).unwrap());
+    let (mut answers, mut sliced) = (Vec::new(), Vec::new());
+    let mut sink = |band: Band| {
+        let answer = |(&owner, &kind): (&u32, &u8)| if kind == crate::slicing::TOUCHED { owner | 1 << 31 } else { owner };
+        answers.extend(band.owners.iter().zip(&band.kinds).map(answer));
+        sliced.extend(band.values.iter().map(|v| v.to_bits()));
+        Ok(())
+    };
+    slice(&mesh, &tree, field, &voxels().read(), Extrapolate::Linear, &|_, _| {}, &mut sink).unwrap();
+    let party = [Party { mesh: &mesh, tree: &tree }, Party { mesh: &other, tree: &other_tree }];
+    let [sets, pairs] = [false, true].map(|pairs| overlap(party[0], party[1], pairs, &|_, _| {}).unwrap().overlap);
+    let bits = |found: &[u32], mesh: &Mesh| {
+        let mut words = vec![0; mesh.tets.len().div_ceil(32)];
+        found.iter().for_each(|i| words[*i as usize / 32] |= 1 << (i % 32));
+        words
+    };
+    let points = &meshes[0].points;
+    Expected {
+        colors: render(&mesh, &tree, plan, (&values, On::Points), normals, &|_, _| {}).unwrap().colors,
+        answers,
+        sliced,
+        hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
+        pairs: pairs.pairs.unwrap(),
+        owners: locate_all(&mesh, &tree, points, &LocateOptions::default(), &|_, _| {}).unwrap(),
+        located: locate(&mesh, &tree, points, field, &LocateOptions::default(), &|_, _| {}).unwrap().values,
+    }
+}
+
+/// A scene of the host's, and the buffers it stands on.
+struct Stage {
+    scene: *mut OlbvhScene,
+    positions: Buffer,
+    _held: [Buffer; 3],
+}
+
+fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
+    let device = &handle(gpu, "gpu").unwrap().0;
+    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+    let build = OlbvhBuildOptions { lists: 0, ..olbvh_default_build_options() };
+    let plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build };
+    let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
+    let (positions, cells) = (device.upload("olbvh.test.positions", &mesh.points), device.upload("olbvh.test.cells", &mesh.tets));
+    let (positions, cells) = (positions.unwrap(), cells.unwrap());
+    let [memory, scratch] = [sizes.memory, sizes.scratch].map(|bytes| device.buffer("olbvh.test.memory", bytes).unwrap());
+    let [p, c, m, s] = [&positions, &cells, &memory, &scratch].map(|b| OlbvhBuffer::from(b.all()));
+    let scene = made(|out| olbvh_scene_place(gpu, &raw const plan, p, c, m, s, out));
+    Stage { scene, positions, _held: [cells, memory, scratch] }
+}
+
+fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
+    let mut all = vec![T::zeroed(); count];
+    let bytes = bytemuck::cast_slice_mut(&mut all);
+    gpu.download_ref(
+        BufferRef { buffer: vk::Buffer::from_raw(part.buffer), offset: part.offset, size: bytes.len() as u64, address: 0 },
+        bytes,
+    )
+    .unwrap();
+    all
+}
+
+/// All of it in one command buffer, after a rehearsal, twice.
+pub fn recorded(gpu: *mut OlbvhGpu) {
+    let device = &handle(gpu, "gpu").unwrap().0;
+    let meshes = meshes();
+    let settings = settings();
+    let view: OlbvhView = made(|out| olbvh_view_make(&raw const settings, LO.as_ptr(), HI.as_ptr(), out));
+    assert!((1..100).contains(&view.drawn_count));
+    let plan = Plan::new(&settings.read().unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
+    let normals = vec![[0.6, 0.0, 0.7f32]; meshes[0].points.len()];
+    let expected = expected(device, &meshes, &plan, Some(&normals));
+
+    let [a, b] = meshes.each_ref().map(|mesh| stage(gpu, mesh));
+    let count = meshes[0].points.len() as u32;
+    // SAFETY: a view is made of words.
+    let words = unsafe { std::slice::from_raw_parts((&raw const view).cast::<u32>(), size_of_val(&view) / 4) };
+    let view = device.upload("olbvh.test.view", words).unwrap();
+    let (values, normals) = (device.upload("olbvh.test.field", &values(&meshes[0])), device.upload("olbvh.test.normals", &normals));
+    let (values, normals) = (values.unwrap(), normals.unwrap());
+    let field = OlbvhField { values: values.all().into(), on_cells: 0 };
+    let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
+    let ranges = buffer(made(|out| olbvh_range_bytes(a.scene, out)));
+    let [once, four, eight] = [1, 4, 8].map(|count| OlbvhRounds { count, resume: 0 });
+
+    let mut picture = OlbvhPicture {
+        width: 37,
+        height: 30,
+        iso: 0,
+        drawn_count: 100,
+        view: view.all().into(),
+        field,
+        normals: normals.all().into(),
+        ranges: ranges.all().into(),
+        memory: NOTHING,
+        rounds: once,
+    };
+    let parts = |picture: &OlbvhPicture| -> OlbvhPictureParts { made(|out| olbvh_picture_parts(a.scene, picture, out)) };
+    let picture_memory = buffer(parts(&picture).bytes);
+    picture.memory = picture_memory.all().part(0, 1024).into();
+    let mut none = std::mem::MaybeUninit::uninit();
+    assert_eq!(olbvh_picture_parts(a.scene, &raw const picture, none.as_mut_ptr()), OlbvhStatus::Invalid);
+    picture.memory = picture_memory.all().into();
+    let picture_parts = parts(&picture);
+
+    let (voxels, linear) = (voxels(), 1);
+    let mut slicing = OlbvhSlicing { voxels, layer: 0, first: 0, rows: 13 * 6, linear, field, memory: NOTHING, rounds: once };
+    let parts = |slicing: &OlbvhSlicing| -> OlbvhSlicingParts { made(|out| olbvh_slicing_parts(slicing, out)) };
+    let slice_memory = buffer(parts(&slicing).bytes);
+    slicing.memory = slice_memory.all().into();
+    let slicing_parts = parts(&slicing);
+
+    let answers = buffer(16 * u64::from(count));
+    let owners = buffer(4 * u64::from(count));
+    let mut location = OlbvhLocation {
+        points: a.positions.all().into(),
+        stride: 3,
+        count,
+        tolerance: -1.0,
+        path: 2,
+        hints: NOTHING,
+        memory: NOTHING,
+        owners: owners.all().into(),
+        barycentrics: answers.all().into(),
+    };
+    let parts: OlbvhLocationParts = made(|out| olbvh_location_parts(a.scene, &raw const location, out));
+    let order = buffer(parts.bytes);
+    location.memory = order.all().into();
+    let interpolated = buffer(4 * u64::from(count));
+    let parts = |memory| -> OlbvhOwnerParts { made(|out| olbvh_owner_parts(a.scene, &raw const location, memory, out)) };
+    let owner_memory = buffer(parts(NOTHING).bytes);
+    let owner_parts = parts(owner_memory.all().into());
+    let lists = buffer(4 * expected.owners.iter().map(|l| l.len() as u64).sum::<u64>());
+
+    let parts = |memory| -> OlbvhOverlapParts { made(|out| olbvh_overlap_parts(a.scene, b.scene, memory, out)) };
+    let overlap_memory = buffer(parts(NOTHING).bytes);
+    let overlap_parts = parts(overlap_memory.all().into());
+    let parts = |memory| -> OlbvhPairParts { made(|out| olbvh_pair_parts(a.scene, memory, out)) };
+    let pair_memory = buffer(parts(NOTHING).bytes);
+    let pair_parts = parts(pair_memory.all().into());
+    let found = buffer(8 * expected.pairs.len() as u64);
+
+    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
+    let record = |commands: u64| {
+        ok(olbvh_recording_begin(recording, commands, 0, 0));
+        ok(olbvh_cmd_build(recording, a.scene));
+        ok(olbvh_cmd_build(recording, b.scene));
+        ok(olbvh_cmd_ranges(recording, a.scene, &raw const field, ranges.all().into()));
+        ok(olbvh_cmd_render(recording, a.scene, &raw const picture));
+        ok(olbvh_cmd_slice(recording, a.scene, &raw const slicing));
+        ok(olbvh_cmd_locate(recording, a.scene, &raw const location));
+        ok(olbvh_cmd_barrier(recording));
+        ok(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, interpolated.all().into()));
+        ok(olbvh_cmd_owners(recording, a.scene, &raw const location, owner_memory.all().into(), lists.all().into()));
+        ok(olbvh_cmd_overlap(recording, a.scene, b.scene, overlap_memory.all().into(), four));
+        ok(olbvh_cmd_count_pairs(recording, a.scene, b.scene, pair_memory.all().into(), eight));
+        ok(olbvh_cmd_list_pairs(recording, a.scene, b.scene, pair_memory.all().into(), found.all().into(), eight));
+        ok(olbvh_recording_end(recording));
+    };
+    record(0);
+    let before = CALLS.get();
+    for _ in 0..2 {
+        let frame = |r: &mut Recorder<'_>| {
+            ARMED.set(true);
+            record(r.commands().as_raw());
+            ARMED.set(false);
+            Ok(())
+        };
+        device.run("olbvh.test.queries", frame).unwrap();
+    }
+    assert_eq!(CALLS.get(), before, "calls made while recording");
+
+    assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
+    let [samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 7)[..] else { unreachable!() };
+    assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
+    assert_eq!(read::<u32>(device, slicing_parts.answers, 17 * 13 * 6), expected.answers);
+    assert_eq!(read::<u32>(device, slicing_parts.values, 17 * 13 * 6), expected.sliced);
+    let [0, 0, 0, inside, touched, empty] = read::<u32>(device, slicing_parts.status, 6)[..] else { panic!("voxels are left") };
+    assert!(inside > 100 && touched > 100 && empty > 100, "{inside} {touched} {empty}");
+    assert!(read::<f32>(device, interpolated.all().into(), count as usize) == expected.located);
+    let firsts: Vec<u32> = expected.owners.iter().map(|list| list[0]).collect();
+    assert_eq!((read(device, location.owners, firsts.len()), read(device, owner_parts.owners, firsts.len())), (firsts.clone(), firsts));
+    let all = expected.owners.concat();
+    assert_eq!((read::<u32>(device, owner_parts.total, 1)[0] as usize, read(device, lists.all().into(), all.len())), (all.len(), all));
+    let hits = [0, 1].map(|i| read::<u32>(device, overlap_parts.hits[i], expected.hits[i].len()));
+    assert!(hits == expected.hits && hits.iter().all(|words| words.iter().any(|&w| w != 0)));
+    let status: Vec<u32> = read(device, pair_parts.status, 10);
+    assert_eq!(status[4..6], [0; 2]);
+    assert_eq!(status[8..], [expected.pairs.len() as u32, 0]);
+    let mut pairs: Vec<[u32; 2]> = read(device, found.all().into(), expected.pairs.len());
+    pairs.sort_unstable();
+    assert!(pairs.len() > 100 && pairs == expected.pairs);
+
+    // Too small is told beforehand.
+    slicing.memory.size -= 256;
+    location.owners.size -= 1;
+    ok(olbvh_recording_begin(recording, 0, 0, 0));
+    assert_eq!(olbvh_cmd_slice(recording, a.scene, &raw const slicing), OlbvhStatus::Invalid);
+    assert_eq!(olbvh_cmd_locate(recording, a.scene, &raw const location), OlbvhStatus::Invalid);
+    assert!(message().contains("owners"), "{}", message());
+    olbvh_recording_free(recording);
+    olbvh_scene_free(a.scene);
+    olbvh_scene_free(b.scene);
+}
+
+/// As in Rust; and of a mesh in another order, which is brought back, the same but for who owns what is shared.
+pub fn owned(gpu: *mut OlbvhGpu) {
+    let device = &handle(gpu, "gpu").unwrap().0;
+    let [mesh, other] = meshes();
+    let settings = OlbvhPictureSettings { shading: 0, ..settings() };
+    let plan = |gpu: &OlbvhTree| {
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let bounds = Bounds { lo: corner(gpu.tree.grid().lo), hi: corner(gpu.tree.grid().hi) };
+        let (neighbours, field) =
+            (gpu.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
+        Prepared::new(&settings.read().unwrap(), &mesh, &bounds, &neighbours, |_| true, &field).unwrap().plan
+    };
+    let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
+        let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
+        let held: *mut OlbvhMesh = made(|out| olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out));
+        let tree = made(|out| olbvh_tree_build(held, null(), out));
+        olbvh_mesh_free(held);
+        tree
+    };
+    let middle = |t: &[u32; 4]| [0, 1, 2].map(|c| t.iter().map(|&v| mesh.points[v as usize][c] / 4.0).sum::<f32>());
+    let middles: Vec<[f32; 3]> = mesh.tets.iter().map(middle).collect();
+    let other_tree = tree_of(&other, 1);
+    let voxels = voxels();
+    let mut first = None;
+    for reorder in [0, 1] {
+        let tree = tree_of(&mesh, reorder);
+        let expected = first.get_or_insert_with(|| {
+            let plan = plan(handle(tree, "tree").unwrap());
+            expected(device, &[mesh.clone(), other.clone()], &plan, None)
+        });
+        let mut owners = vec![0; middles.len()];
+        ok(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut()));
+        assert!((0..).zip(&owners).all(|(tet, &owner)| tet == owner));
+        let values = values(&mesh);
+        let mut colors = vec![[0f32; 4]; 37 * 30];
+        ok(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast()));
+        let (mut answers, mut sliced) = (vec![0u32; 17 * 13 * 6], vec![0f32; 17 * 13 * 6]);
+        ok(olbvh_slice(tree, &raw const voxels, values.as_ptr(), 0, 1, answers.as_mut_ptr(), sliced.as_mut_ptr()));
+        let mut hits = expected.hits.clone().map(|words| vec![u32::MAX; words.len()]);
+        let [of_mesh, of_other] = &mut hits;
+        ok(olbvh_overlap(tree, other_tree, of_mesh.as_mut_ptr(), of_other.as_mut_ptr()));
+        assert!(hits == expected.hits, "reorder {reorder}");
+        let kinds = |answers: &[u32]| answers.iter().map(|&a| if a == u32::MAX { 2 } else { a >> 31 }).collect::<Vec<_>>();
+        assert_eq!(kinds(&answers), kinds(&expected.answers), "reorder {reorder}");
+        let same = answers.iter().zip(&expected.answers).filter(|(a, b)| a == b).count();
+        assert!(same == answers.len() || reorder == 1 && same > answers.len() * 9 / 10, "{same} of {}", answers.len());
+        assert!(colors == expected.colors || reorder == 1, "colours");
+        assert!(sliced.iter().map(|v| v.to_bits()).eq(expected.sliced.iter().copied()) || reorder == 1, "values");
+        let near = |a: &f32, b: u32| (a - f32::from_bits(b)).abs() < 1e-3 || a.is_nan();
+        assert!(sliced.iter().zip(&expected.sliced).filter(|(a, b)| near(a, **b)).count() > answers.len() * 9 / 10);
+        olbvh_tree_free(tree);
+    }
+    let mut none = OlbvhPictureSettings { iso_count: 9, ..settings };
+    assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
+    none = OlbvhPictureSettings { camera: c"nowhere".as_ptr(), ..settings };
+    assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
+    assert!(message().contains("nowhere"), "{}", message());
+    olbvh_tree_free(other_tree);
+}
