@@ -7,7 +7,7 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Locator, order_of};
-use olbvh::reference::walk::STEPS;
+use olbvh::reference::walk::{DETOURS, STEPS};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
@@ -118,21 +118,23 @@ fn every_walk_ends() {
     let (mesh, topology) = prepared(kuhn_jittered([side; 3], 0.2, 11).unwrap());
     let tree = build(&mesh, &topology, &BuildOptions { lists: Lists::Boundary, ..options(1.0, Assign::Exact) }).unwrap();
     let locator = Locator::new(&mesh, &topology, &tree);
-    let (mut walked, mut longest) = (0, 0);
+    let (mut walked, mut longest, mut detours) = (0, 0, 0);
     for chunk in 0..n.div_ceil(1 << 20) {
         let points = adversarial(&mesh, &topology, 23 + chunk as u64, (n - (chunk << 20)).min(1 << 20));
         let walk = |p: &[f32; 3]| {
             // What is an ulp away may lie outside, by more than the tolerance where cells are flat.
             let p = [0, 1, 2].map(|c| p[c].clamp(topology.grid.lo[c], topology.grid.hi[c]));
             assert_ne!(locator.locate(p).owner, NONE, "{p:?} is lost");
-            let Some(walk) = locator.walk(p) else { return (0, 0) };
-            assert!(walk.detours == 0 && walk.steps < STEPS, "{p:?}: {walk:?}");
-            (1, walk.steps)
+            let Some(walk) = locator.walk(p) else { return (0, 0, 0) };
+            assert!(walk.best.owner != NONE && walk.detours < DETOURS && walk.steps < STEPS, "{p:?}: {walk:?}");
+            (1, walk.steps, usize::from(walk.detours > 0))
         };
-        let (walks, steps) = points.par_iter().map(walk).reduce(|| (0, 0), |a, b| (a.0 + b.0, a.1.max(b.1)));
-        (walked, longest) = (walked + walks, longest.max(steps));
+        let (walks, steps, by) = points.par_iter().map(walk).reduce(|| (0, 0, 0), |a, b| (a.0 + b.0, a.1.max(b.1), a.2 + b.2));
+        (walked, longest, detours) = (walked + walks, longest.max(steps), detours + by);
     }
-    println!("{walked} of {n} points walked to, the others searched in lists; the longest walk has {longest} steps");
+    println!(
+        "{walked} of {n} points walked to, {detours} of them by way of another, the others searched in lists; longest walk {longest} steps"
+    );
     assert!(walked > n / 4);
 }
 
