@@ -53,6 +53,7 @@ fn slices_become_files() {
         &["slice", "kuhn:4,3,2", "-o", "x.png", "--owners"],
         &["slice", "kuhn:4,3,2", "-o", "x.svx", "--thickness", "0.1"],
         &["slice", "kuhn:4,3,2", "-o", "x.npy", "--size", "0x4"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--memory", "1GiB"],
     ] {
         let (code, _, text) = olbvh(folder, wrong);
         assert!(code == 2 && !text.is_empty(), "{wrong:?}: {code} {text}");

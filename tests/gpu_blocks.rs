@@ -2,12 +2,14 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::blocks::{Points, locate, locate_all, overlap};
+use olbvh::blocks::{Points, Stack, View, locate, locate_all, overlap, render, slice};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{self, LocateOptions, Party, Path};
+use olbvh::render::{RenderSettings, TransferFunction};
+use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 
 const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
@@ -73,6 +75,8 @@ fn answers_are_those_of_the_whole() {
     located(&gpu, &mesh);
     refused(&gpu, &mesh);
     overlapped(&gpu, &mesh);
+    sliced(&gpu, &mesh);
+    drawn(&gpu, &mesh);
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
@@ -118,5 +122,82 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         assert_eq!(found.answer.overlap.a, whole.a);
         assert_eq!(found.answer.overlap.b, whole.b);
         assert_eq!(found.answer.overlap.pairs, whole.pairs);
+    }
+}
+
+/// Voxels smaller and larger than cells, their centres on faces of cells and off, upright and oblique planes, inside and at the surface.
+fn sliced(gpu: &Gpu, mesh: &Mesh) {
+    let (wave, number) = (&mesh.fields[0], &mesh.fields[1]);
+    let stack = |plane, layers, size| SliceSettings { plane, layers, size, ..SliceSettings::default() };
+    let oblique = SliceSettings { at: Some(1.0), thickness: Some(1.3), ..stack(Plane::Normal([1.0, -2.0, 0.7]), 3, [41, 33]) };
+    let options = BuildOptions::default();
+    let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(gpu, &device, &options).unwrap();
+    for (field, extrapolate, settings) in [
+        (wave, Extrapolate::Nearest, SliceSettings { at: Some(6.0), ..stack(Plane::Axis(2), 1, [57, 51]) }),
+        (number, Extrapolate::Nearest, stack(Plane::Axis(0), 9, [13, 8])),
+        (wave, Extrapolate::Linear, oblique),
+    ] {
+        let corner = |v: [f32; 4]| [v[0] - 0.7, v[1] - 0.7, v[2]];
+        let voxels = &settings.voxels(corner(device.grid().lo), corner(device.grid().hi), mesh.origin).unwrap();
+        let values = Some((&field.values[..], field.on));
+        let mut whole = Tally::default();
+        let mut all = [Vec::new(), Vec::new()];
+        let gather = |all: &mut Vec<(u8, u32, u32)>, band: Band| {
+            let values = band.values.iter().map(|v| v.to_bits());
+            all.extend(band.kinds.iter().zip(&band.owners).zip(values).map(|((&kind, &owner), value)| (kind, owner, value)));
+        };
+        let mut sink = |band: Band| {
+            whole.add(&band.kinds);
+            gather(&mut all[0], band);
+            Ok(())
+        };
+        query::slice(&device, &tree, values, voxels, extrapolate, QUIET, &mut sink).unwrap();
+        let memory = 768 << 10;
+        let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate };
+        let mut sink = |band: Band| {
+            gather(&mut all[1], band);
+            Ok(())
+        };
+        let found = slice(gpu, memory, &asked, QUIET, &mut sink).unwrap();
+        println!("{settings:?}: {whole:?}, {} trees, peak {}", found.trees, found.peak);
+        let first = (0..all[0].len()).find(|&i| all[0].get(i) != all[1].get(i));
+        assert_eq!(first.map(|i| (i, all[0][i], all[1].get(i).copied())), None, "{settings:?}");
+        assert!(whole.inside > 100 && whole.touched > 50 && found.answer == whole, "{whole:?}");
+        assert!(found.trees > 2 && found.peak <= memory, "{} trees, {} bytes", found.trees, found.peak);
+    }
+}
+
+/// Parallel and spreading rays from several sides and from within, values that are not shown, surfaces.
+fn drawn(gpu: &Gpu, mesh: &Mesh) {
+    let wave = &mesh.fields[0];
+    let faint = TransferFunction::default().with_opacity(vec![(0.0, 0.1), (1.0, 0.3)]).unwrap();
+    let some = TransferFunction::default().with_opacity(vec![(0.0, 0.0), (0.6, 0.0), (0.7, 0.4), (0.8, 0.0)]).unwrap();
+    let middle = wave.range().map(|[lo, hi]| f32::midpoint(lo, hi)).unwrap();
+    for (camera, transfer, iso) in [
+        ("iso", &faint, vec![]),
+        ("azimuth=200,elevation=-35,ortho", &faint, vec![]),
+        ("front", &some, vec![]),
+        ("eye=6.5,6.1,5.2,target=1,2,12,fov=100", &faint, vec![]),
+        ("azimuth=70,elevation=40", &faint, vec![0.6 * middle, middle, 1.3 * middle]),
+    ] {
+        let settings = RenderSettings {
+            size: [41, 33],
+            camera: camera.parse().unwrap(),
+            transfer: transfer.clone(),
+            iso,
+            ..RenderSettings::default()
+        };
+        let options = BuildOptions::default();
+        let asked = View { mesh, options, field: wave, settings: &settings };
+        let (whole, took) = render(gpu, 64 << 20, &asked, QUIET).unwrap().apart();
+        assert_eq!(took.trees, 1);
+        let memory = 768 << 10;
+        let (found, took) = render(gpu, memory, &asked, QUIET).unwrap().apart();
+        println!("{camera}: {} samples, {} trees, peak {}", found.drawn.found_samples, took.trees, took.peak);
+        let first = (0..whole.drawn.colors.len()).find(|&i| bits(&whole.drawn.colors[i]) != bits(&found.drawn.colors[i]));
+        assert_eq!(first.map(|i| (i % 41, i / 41, whole.drawn.colors[i], found.drawn.colors[i])), None, "{camera}");
+        assert!(whole.drawn.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
+        assert!(took.trees > 4 && took.peak <= memory, "{} trees, {} bytes", took.trees, took.peak);
     }
 }

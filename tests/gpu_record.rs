@@ -199,7 +199,7 @@ fn rounds_go_on_where_they_ended() {
     };
     let rows = Rows { layer: 0, first: 0, count: 5 };
     let searched = Searched::new(&device, &tree);
-    let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest };
+    let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
     let carve = |a: &mut Arena| SliceMemory::carve(a, 5, 5);
     let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
@@ -264,7 +264,7 @@ fn picture_goes_on(gpu: &Gpu, searched: &Searched, points: &[[f32; 3]], iso: boo
     let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     let field = (field.all(), On::Points);
-    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, shown: None };
+    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, shown: None, part: None };
     let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();

@@ -6,6 +6,7 @@ use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
+use olbvh::reference::vertices::CellRange;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
 use olbvh::render::{Background, Bounds, RenderSettings, TransferFunction};
 
@@ -32,6 +33,31 @@ fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &Ren
 fn distance(a: &[u8], b: &[u8]) -> u8 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
+}
+
+/// Each sample belongs to one of two halves of the cells, on whatever axis they are cut.
+#[test]
+fn parts_share_the_samples() {
+    let mesh = grid([7, 6, 5]);
+    let topology = topology(&mesh).unwrap();
+    let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let mut crossed = 0;
+    for camera in ["iso", "azimuth=200,elevation=-35,ortho", "eye=-0.5,14,4,target=0,15,4,fov=100"] {
+        let settings = RenderSettings { size: [24, 20], termination: 1.0, ..settings(camera) };
+        let samples = |part| {
+            let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+            render(&scene.within(part), &|_, _| ()).found_samples
+        };
+        let all = samples(CellRange::WHOLE);
+        for axis in 0..3 {
+            let (mut low, mut high) = (CellRange::WHOLE, CellRange::WHOLE);
+            (low.hi[axis], high.lo[axis]) = (511, 512);
+            let [low, high] = [low, high].map(samples);
+            assert_eq!(low + high, all, "{camera}");
+            crossed += u32::from(low > 100 && high > 100);
+        }
+    }
+    assert!(crossed >= 6, "{crossed}");
 }
 
 #[test]

@@ -24,7 +24,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("capi", &["build", "error", "glsl", "gpu", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
-    ("blocks", &["build", "error", "gpu", "layout", "mesh", "options", "primitives", "query", "reference"]),
+    ("blocks", &["build", "error", "gpu", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),
     (
         "bench",

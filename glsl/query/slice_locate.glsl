@@ -8,6 +8,7 @@
 // cell of the one before and a short walk across faces from it, before it asks the structure. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 32;
 layout(constant_id = 3) const uint WALK = 6;
+layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
 ARGUMENTS(8 + STRUCTURE_BUFFERS)
     uint layer;
     uint first;  // number of the first row in that layer
@@ -26,6 +27,9 @@ BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
 BUFFER(7, READ_WRITE, SliceStatus, status) // zeroed
 STRUCTURE(8)
 #include "shared/structure_owner.glsl"
+#include "shared/part.glsl"
+
+bool is_ours(SlicePlan plan, Grid g, vec3 at) { return PART == 0u || in_part(plan.first_cell, plan.last_cell, quantize(g, at)); }
 
 void main() {
     uint i = item_index();
@@ -48,7 +52,9 @@ void main() {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
             uint misses = 0u;
             for (; stands && state.next < count && work < budget; ++work) {
-                vec3 x = normalise(g, voxel_centre(plan, begin + state.next, y, k));
+                vec3 at = voxel_centre(plan, begin + state.next, y, k);
+                if (!is_ours(plan, g, at)) break;
+                vec3 x = normalise(g, at);
                 Sides sides = sides_of(stand, x);
                 uint owner = owner_of(stand, sides, x);
                 if (owner != NONE) {
@@ -63,6 +69,11 @@ void main() {
             }
             if (state.next >= count || work >= budget) break;
             vec3 at = voxel_centre(plan, begin + state.next, y, k);
+            if (!is_ours(plan, g, at)) {
+                answers.at[line + state.next] = SLICE_PENDING;
+                ++state.next;
+                continue;
+            }
             OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
             uint owner;
             bool ended = find_owner(search, g, at, normalise(g, at), tolerance, work, budget, owner);

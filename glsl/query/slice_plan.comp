@@ -15,6 +15,8 @@ ARGUMENTS(2)
     uint width;
     uint height;
     uint layers;
+    uint first_cell;
+    uint last_cell;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, writeonly, SlicePlan, plans)
@@ -53,6 +55,8 @@ void main() {
     plan.height = height;
     plan.layers = layers;
     plan.listed = 0u;
+    plan.first_cell = first_cell;
+    plan.last_cell = last_cell;
     // 2 / scale: a half axis beyond is larger than twice the mesh, and need not be scaled.
     float most = uintBitsToFloat((255u << 23) - floatBitsToUint(g.scale));
     vec4 axes[3] = vec4[3](wide(half0), wide(half1), wide(half2)), normalised[3];

@@ -90,6 +90,10 @@ bool enters(Node node) { return is_boundary_node(node.index) && meets_range(node
 // Goes on with a voxel; true once it is done.
 bool measure_all(Grid g, vec3 centre, vec3 reach) {
     if (!reached_cells(g, centre, reach, lo, hi) || !is_boundary_node(0u)) return true;
+    // Beyond the cells of a block its lists and flags are not those of the whole mesh.
+    lo = max(lo, unpack_cell(plans.at[0].first_cell));
+    hi = min(hi, unpack_cell(plans.at[0].last_cell));
+    if (any(greaterThan(lo, hi))) return true;
     LeafWalk at = walk_from(state.code);
     uint leaf = WALK_PAUSED;
     for (uint work = 0u; work < budget;) {

@@ -10,7 +10,9 @@
 // Ray intervals (SPEC 3.3): from the first to the last boundary leaf that a ray meets, or in the binary tree the box of a boundary primitive.
 // Where values are transparent the marks of visible nodes stand in for the boundary flags.
 // Twin of src/reference/volume/interval.rs.
+// Of a block of a mesh, only samples in its cells: rays go on where they stand after the blocks in front of it.
 layout(constant_id = 2) const uint STACK = 8;
+layout(constant_id = 3) const uint PART = 0;
 ARGUMENTS(6 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
@@ -18,8 +20,8 @@ BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, cells)    // for the binary tree
 BUFFER16(2, readonly, vec4, vertices)  // for the binary tree
 BUFFER16(3, readonly, Frame, frames)
-BUFFER16(4, writeonly, RayState, states)
-BUFFER16(5, writeonly, vec4, colors)
+BUFFER16(4, READ_WRITE, RayState, states)
+BUFFER16(5, READ_WRITE, vec4, colors)
 STRUCTURE(6)
 
 Grid g;
@@ -103,6 +105,32 @@ bool starts_within() { return find_leaf(g.level, quantize(g, origin)) != NONE; }
 bool visit_all() { return traverse(g.level); }
 #endif
 
+// The first of the samples [k, end) that the block's cells are not ahead of; `past`: that lies behind them. Cells are monotone along a ray, so those between
+// the two are the block's.
+uint first_sample(vec3 way, uint k, uint end, bool past) {
+    uvec3 lo = unpack_cell(plan.first_cell), hi = unpack_cell(plan.last_cell);
+    bvec3 up = greaterThanEqual(way, vec3(0.0));
+    while (k < end) {
+        uint middle = k + (end - k) / 2u;
+        uvec3 q = quantize(g, sample_at(view, origin, way, middle));
+        bvec3 below = lessThan(q, lo), above = lessThan(hi, q);
+        bool reached = past ? any(mix(below, above, up)) : !any(mix(above, below, up));
+        if (reached) end = middle;
+        else k = middle + 1u;
+    }
+    return k;
+}
+
+// Where a ray that stands so goes on in the block, which it meets in the samples of `state`.
+RayState go_on(RayState state, RayState before, vec3 way) {
+    state.next = first_sample(way, max(state.next, before.next), state.end, false);
+    state.end = first_sample(way, state.next, state.end, true);
+    bool met = state.next < state.end;
+    if (!met) state.next = state.end = before.next;
+    state.last = state.next == before.next ? before.last : NONE;
+    return state;
+}
+
 void main() {
     uint i = item_index();
     if (i >= items) return;
@@ -111,23 +139,26 @@ void main() {
     uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
     RayState state = RayState(0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, NONE, 0u);
     if (pixel_of(i, size, pixel)) {
-        colors.at[pixel.y * size.x + pixel.x] = vec4(0.0);
+        uint place = pixel.y * size.x + pixel.x;
+        bool opaque = PART != 0u && colors.at[place].w >= view.termination;
+        if (PART == 0u) colors.at[place] = vec4(0.0);
         g = grid.at[0];
         vec3 way;
-        make_ray(view, pixel, origin, way);
+        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, way);
         inverse_way = inverse_of(way);
         first = 3.40282347e38;
         last = -1.0;
         bool within = all(lessThanEqual(g.lo.xyz, origin)) && all(lessThanEqual(origin, g.hi.xyz));
         if (within && starts_within()) first = last = 0.0;
         // Too many nodes to visit: all of the bounds, which holds every leaf.
-        if (!visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
-        if (first <= last) {
+        if (!opaque && !visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
+        if (first <= last && !opaque) {
             precise float begin = floor(clamp(first * view.inverse_step - 1.5, 0.0, MAX_SAMPLES));
             precise float end = floor(clamp(last * view.inverse_step + 1.5, 0.0, MAX_SAMPLES));
             state.next = uint(begin);
             state.end = uint(end);
         }
+        if (PART != 0u) state = go_on(state, states.at[i], way);
     }
     states.at[i] = state;
 }

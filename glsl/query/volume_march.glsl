@@ -179,7 +179,7 @@ void main() {
         pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
         uint place = pixel.y * plan.size[0] + pixel.x;
         sum = colors.at[place];
-        make_ray(view, pixel, origin, way);
+        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, way);
         halfway = vec3(0.0);
         if (SHADING != 0u) {
             precise vec3 h = view.to_light.xyz - way;

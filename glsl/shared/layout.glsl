@@ -67,7 +67,10 @@ struct RenderPlan {
     vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
     uint size[2];    // Width and height in pixels.
     uint visible_at; // Words of the flags before the marks of visible nodes, where there are any.
-    uint pad;        // Unused.
+    uint row;        // Row of the view that is the first one here.
+    uint first_cell; // The first cell of the finest grid whose samples are taken, 10 bits per axis, x lowest.
+    uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
+    uint pad[2];     // Unused.
 };
 
 // Where the march of a ray stands between two dispatches.
@@ -115,9 +118,9 @@ struct SlicePlan {
     uint layers; // Layers.
     uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
     uint listed; // Voxels of the band whose centre lies in no cell.
-    uint pad0;   // Unused.
-    uint pad1;   // Unused.
-    uint pad2;   // Unused.
+    uint first_cell; // The first cell of the finest grid that is looked at, 10 bits per axis, x lowest.
+    uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
+    uint pad;    // Unused.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.

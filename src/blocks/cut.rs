@@ -9,7 +9,7 @@ use crate::layout::Grid;
 use crate::mesh::{Mesh, On};
 use crate::options::{BuildOptions, Lists};
 use crate::primitives::Arena;
-use crate::reference::boundary::Topology;
+use crate::reference::boundary::{Topology, neighbours};
 use crate::reference::depth::measure;
 use crate::reference::grid::MAX_LEVEL;
 use crate::reference::vertices::{CellRange, Vertices};
@@ -23,7 +23,7 @@ pub(super) struct Source<'a> {
     pub(super) grid: Grid,
     /// With the level of all trees.
     pub(super) options: BuildOptions,
-    level: u32,
+    pub(super) level: u32,
     topology: Topology,
     vertices: Vertices,
 }
@@ -86,7 +86,7 @@ impl<'a> Source<'a> {
 
     /// What `cells` take of these tetrahedra.
     fn block(&self, cells: CellRange, among: &[u32]) -> Block {
-        let core: Vec<u32> = among.par_iter().copied().filter(|&t| common(&self.cells_of(t), &cells).is_some()).collect();
+        let core: Vec<u32> = among.par_iter().copied().filter(|&t| cells.common(&self.cells_of(t)).is_some()).collect();
         let marks = Marks::of(self.mesh, &core);
         // Whoever shares a face has three of its corners; the core has four.
         let beside = |t: &u32| self.mesh.tets[*t as usize].into_iter().filter(|&v| marks.holds(v)).count() >= 3;
@@ -95,11 +95,11 @@ impl<'a> Source<'a> {
             lo: [0, 1, 2].map(|c| a.lo[c].min(b.lo[c])),
             hi: [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])),
         };
-        let span = core.par_iter().filter_map(|&t| common(&self.cells_of(t), &cells)).reduce_with(union);
+        let span = core.par_iter().filter_map(|&t| cells.common(&self.cells_of(t))).reduce_with(union);
         let reach = tets.par_iter().map(|&t| self.cells_of(t)).reduce_with(union);
         let count = |t: &u32| {
             let own = self.cells_of(*t);
-            let crosses = common(&own, &cells) != Some(own);
+            let crosses = cells.common(&own) != Some(own);
             [u64::from(own.count()), if crosses { u64::from(own.count()) } else { 0 }]
         };
         let [candidates, crossing] = tets.par_iter().map(count).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
@@ -114,13 +114,24 @@ impl<'a> Source<'a> {
         Block { cells, span, tets: Rc::new(tets), size }
     }
 
-    /// Two blocks for one, with about as many tetrahedra in either; `None` if that does not make it smaller.
-    pub(super) fn cut_in_two(&self, block: &Block) -> Option<[Block; 2]> {
+    /// The tetrahedra across the faces of each, as [`crate::reference::boundary::Topology`] has them.
+    pub(super) fn neighbours(&self) -> Vec<[u32; 4]> {
+        neighbours(self.mesh, &self.topology.valid)
+    }
+
+    /// Whether a tetrahedron is not bad.
+    pub(super) fn is_valid(&self, tet: u32) -> bool {
+        self.topology.is_valid(tet)
+    }
+
+    /// Two blocks for one, with about as many tetrahedra in either; `None` if that does not make it smaller. They are cut behind a cell of the finest grid on
+    /// an axis that `may` allows.
+    pub(super) fn cut_in_two(&self, block: &Block, may: &dyn Fn(usize, u32) -> bool) -> Option<[Block; 2]> {
         let span = block.span?;
         let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
         let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;
         let mut numbers = vec![0usize; span.size()[axis] as usize];
-        for cells in block.tets.iter().filter_map(|&t| common(&self.cells_of(t), &span)) {
+        for cells in block.tets.iter().filter_map(|&t| span.common(&self.cells_of(t))) {
             numbers[(cells.lo[axis].midpoint(cells.hi[axis]) - span.lo[axis]) as usize] += 1;
         }
         let half = numbers.iter().sum::<usize>() / 2;
@@ -130,17 +141,13 @@ impl<'a> Source<'a> {
             sum < half
         });
         let at = (span.lo[axis] + below.count() as u32).min(span.hi[axis] - 1);
+        let near = [at, at.saturating_sub(1), at + 1].into_iter().filter(|at| (span.lo[axis]..span.hi[axis]).contains(at));
+        let at = near.into_iter().find(|at| may(axis, ((at + 1) << (MAX_LEVEL - self.level)) - 1))?;
         let (mut low, mut high) = (block.cells, block.cells);
         (low.hi[axis], high.lo[axis]) = (at, at + 1);
         let halves = [low, high].map(|cells| self.block(cells, &block.tets));
         halves.iter().all(|h| h.tets.len() < block.tets.len()).then_some(halves)
     }
-}
-
-/// What two ranges have in common.
-fn common(a: &CellRange, b: &CellRange) -> Option<CellRange> {
-    let range = CellRange { lo: [0, 1, 2].map(|c| a.lo[c].max(b.lo[c])), hi: [0, 1, 2].map(|c| a.hi[c].min(b.hi[c])) };
-    (0..3).all(|c| range.lo[c] <= range.hi[c]).then_some(range)
 }
 
 /// A box of cells and its tetrahedra.
@@ -195,7 +202,7 @@ impl Placed {
     }
 
     /// The values of a field that lie here.
-    pub(super) fn values<'v>(&self, values: &'v [f32], on: On) -> Cow<'v, [f32]> {
+    pub(super) fn values<'v, T: Copy + Send + Sync>(&self, values: &'v [T], on: On) -> Cow<'v, [T]> {
         let Some([points, tets]) = &self.ids else { return Cow::Borrowed(values) };
         let ids = if on == On::Points { points } else { tets };
         ids.par_iter().map(|&i| values[i as usize]).collect::<Vec<_>>().into()
@@ -216,9 +223,8 @@ impl Block {
         Some([[0, 1, 2].map(|c| at(c, span.lo[c])), [0, 1, 2].map(|c| at(c, span.hi[c] + 1))])
     }
 
-    /// Brings it to the device and builds its tree.
-    pub(super) fn place(&self, gpu: &Gpu, source: &Source<'_>) -> Result<Placed> {
-        let mesh = source.mesh;
+    /// A mesh of its own, and which points it has.
+    fn part(&self, mesh: &Mesh) -> (Mesh, Vec<u32>) {
         let marks = Marks::of(mesh, &self.tets);
         let points: Vec<u32> = (0..mesh.points.len() as u32).into_par_iter().filter(|&v| marks.holds(v)).collect();
         let mut before = Vec::with_capacity(marks.0.len());
@@ -228,7 +234,12 @@ impl Block {
         });
         let rank = |v: u32| before[v as usize / 32] + (marks.0[v as usize / 32] & ((1 << (v % 32)) - 1)).count_ones();
         let tets = self.tets.par_iter().map(|&t| mesh.tets[t as usize].map(rank)).collect();
-        let part = Mesh::new(points.par_iter().map(|&v| mesh.points[v as usize]).collect(), tets);
+        (Mesh::new(points.par_iter().map(|&v| mesh.points[v as usize]).collect(), tets), points)
+    }
+
+    /// Brings it to the device and builds its tree.
+    pub(super) fn place(&self, gpu: &Gpu, source: &Source<'_>) -> Result<Placed> {
+        let (part, points) = self.part(source.mesh);
         let mesh = DeviceMesh::upload_in(gpu, &part, BadCells::Skip, Some(&source.grid))?;
         let tree = Tree::build(gpu, &mesh, &source.options)?;
         Ok(Placed { mesh, tree, ids: Some([Rc::new(points), self.tets.clone()]) })
@@ -261,5 +272,39 @@ impl Size {
             TreeMemory::carve(a, &capacity, options)
         })?;
         Ok(kept + faces.max(tree))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mesh::kuhn_jittered;
+    use crate::reference::boundary::{NONE, topology};
+
+    /// Without those around it, the core would have boundary where it is cut.
+    #[test]
+    fn a_core_has_the_neighbours_and_the_boundary_of_the_whole() {
+        let mesh = kuhn_jittered([9, 8, 7], 0.2, 3).unwrap();
+        let whole = topology(&mesh).unwrap();
+        let source = Source::new(&mesh, &BuildOptions::default(), 1 << 30).unwrap();
+        let [low, high] = source.cut_in_two(&source.whole(), &|_, _| true).unwrap();
+        let [a, b] = source.cut_in_two(&low, &|_, _| true).unwrap();
+        let (mut checked, mut beside, mut needed) = (0, 0, 0);
+        for block in [a, b, high] {
+            let part = topology(&block.part(&mesh).0).unwrap();
+            for (i, &t) in block.tets.iter().enumerate() {
+                if block.cells.common(&source.cells_of(t)).is_none() {
+                    beside += 1;
+                    continue;
+                }
+                checked += 1;
+                let theirs = part.neighbours[i].map(|n| if n == NONE { n } else { block.tets[n as usize] });
+                assert_eq!((theirs, part.is_boundary(i as u32)), (whole.neighbours[t as usize], whole.is_boundary(t)), "{t}");
+            }
+            let core: Vec<u32> = block.tets.iter().copied().filter(|&t| block.cells.common(&source.cells_of(t)).is_some()).collect();
+            let alone = topology(&Block { tets: Rc::new(core.clone()), ..block }.part(&mesh).0).unwrap();
+            needed += (0..).zip(&core).filter(|&(i, &t)| alone.is_boundary(i) != whole.is_boundary(t)).count();
+        }
+        assert!(checked > mesh.tets.len() && beside > 100 && needed > 100, "{checked} {beside} {needed}");
     }
 }

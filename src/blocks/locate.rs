@@ -1,7 +1,7 @@
 //! Points located in blocks.
 
 use super::cut::{Placed, Source, least_bytes};
-use super::{InBlocks, is_full, refusal, smaller};
+use super::{InBlocks, check_field, is_full, refusal, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
@@ -40,12 +40,7 @@ pub fn locate(
     report: &dyn Fn(u64, u64),
 ) -> Result<InBlocks<Located>> {
     let (mesh, n) = (asked.mesh, asked.points.len());
-    if let Some((values, on)) = field {
-        let expected = if on == On::Points { mesh.points.len() } else { mesh.tets.len() };
-        if values.len() != expected {
-            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
-        }
-    }
+    check_field(mesh, field)?;
     let nan = f32::from_bits(0x7fc0_0000);
     let values = vec![nan; if field.is_some() { n } else { 0 }];
     let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, stages: Vec::new() };

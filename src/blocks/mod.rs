@@ -6,21 +6,31 @@
 //! order, the grid is that of the whole mesh, and the level is the whole tree's ([`crate::options::BuildOptions::level`]). Hence each point is asked of one block,
 //! and **answers are those of the whole tree**, tolerance and gaps between cells included.
 //!
+//! - A voxel has its centre in one block, and its box may reach into several: each names the closest primitive that it lists in its own cells.
+//! - A sample of a ray lies in one block, and those of a block follow each other. Blocks are drawn front to back.
+//! - Two meshes overlap where their blocks do.
+//!
 //! - A mesh that fits is not cut. Whether a block fits is estimated first; what turns out larger is given up and cut again.
 //! - The limit is kept by [`Gpu::with_memory`], which counts every buffer, transfers included.
-//! - The mesh itself lies in host memory as a whole, and beside it 6 bytes per point and 4 per tetrahedron.
+//! - The mesh itself lies in host memory as a whole, and beside it 6 bytes per point and 4 per tetrahedron; for a picture normals (12 bytes per point), rays
+//!   (48 bytes), and before it is drawn neighbours (16 bytes per tetrahedron, about three times that while they are matched).
 //! - The level may be coarser than asked for where the bits of its cells would take more than an eighth of the memory. In cells that overlap each other
 //!   [`crate::options::Lists::Boundary`] may name another of those that contain a point, as always.
 
 mod cut;
 mod locate;
 mod overlap;
+mod render;
+mod slice;
 
 pub use locate::{Points, locate, locate_all};
 pub use overlap::overlap;
+pub use render::{Picture, View, render};
+pub use slice::{Stack, slice};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::mesh::{Mesh, On};
 use cut::{Block, Source};
 use std::time::Instant;
 
@@ -67,7 +77,18 @@ const LEAST: usize = 1024;
 
 /// The halves of a block that is worth being cut.
 fn smaller(source: &Source<'_>, block: &Block) -> Option<[Block; 2]> {
-    if block.tets.len() > LEAST { source.cut_in_two(block) } else { None }
+    if block.tets.len() > LEAST { source.cut_in_two(block, &|_, _| true) } else { None }
+}
+
+/// Refuses a field that is not the mesh's.
+fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
+    let expected = |on| if on == On::Points { mesh.points.len() } else { mesh.tets.len() };
+    match field {
+        Some((values, on)) if values.len() != expected(on) => {
+            Err(Error::Invalid(format!("a field of {} values where the mesh has {}", values.len(), expected(on))))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// Whether something failed for want of memory or room, so that less of the mesh may do.

@@ -129,7 +129,7 @@ impl Gpu {
     /// [`Error::Memory`], or a failed Vulkan call.
     pub fn upload<T: Pod>(&self, name: &str, data: &[T]) -> Result<Buffer> {
         let mut buffer = Buffer::new(self, name, size_of_val(data) as u64)?;
-        self.write(&mut buffer, bytemuck::cast_slice(data))?;
+        self.write(&mut buffer, 0, data)?;
         Ok(buffer)
     }
 
@@ -138,10 +138,11 @@ impl Gpu {
         self.ledger().map_or(STAGING, |ledger| (ledger.limit() / STAGING_SHARE).clamp(1 << 16, STAGING))
     }
 
-    /// Writes bytes to the beginning of a buffer.
-    fn write(&self, buffer: &mut Buffer, bytes: &[u8]) -> Result<()> {
+    /// Writes data to a buffer, from byte `at` on.
+    pub(crate) fn write<T: Pod>(&self, buffer: &mut Buffer, at: u64, data: &[T]) -> Result<()> {
+        let bytes: &[u8] = bytemuck::cast_slice(data);
         if let Some(mapped) = buffer.mapped_mut() {
-            mapped[..bytes.len()].copy_from_slice(bytes);
+            mapped[at as usize..at as usize + bytes.len()].copy_from_slice(bytes);
             return Ok(());
         }
         let most = self.staging_bytes();
@@ -149,7 +150,7 @@ impl Gpu {
         for (i, chunk) in bytes.chunks(most as usize).enumerate() {
             let mapped = staging.mapped_mut().ok_or_else(|| Error::Invalid("upload memory is not mapped".into()))?;
             mapped[..chunk.len()].copy_from_slice(chunk);
-            let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(i as u64 * most, chunk.len() as u64));
+            let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(at + i as u64 * most, chunk.len() as u64));
             self.run("olbvh.upload.staging", |r| {
                 r.copy(from, to);
                 Ok(())

@@ -13,9 +13,11 @@ pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_int
 pub use order::{PointOrder, cmd_sort_points};
 pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
+pub(crate) use slice::Slicing;
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub use visible::{cmd_visible, visible_bytes};
-pub use volume::{Drawn, RenderInput, RenderMemory, Shown, cmd_render, render};
+pub(crate) use volume::{Canvas, Rays};
+pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::gpu::{BufferRef, Groups};

@@ -9,9 +9,10 @@
 //! ```
 
 mod stack;
+pub(crate) use stack::Slicing;
 pub use stack::{Sliced, slice};
 
-use super::{Rounds, Searched, dispatch};
+use super::{Rounds, Searched, Structure, dispatch};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -22,6 +23,7 @@ use crate::layout::{RunState, SlicePlan, SliceStatus, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
 use crate::primitives::{Arena, Count};
+use crate::reference::vertices::CellRange;
 use crate::slicing::{Extrapolate, RUN, Rows, VoxelGrid, WALK};
 use std::mem::offset_of;
 
@@ -41,6 +43,9 @@ pub struct SliceInput<'a> {
     pub field: Option<(BufferRef, On)>,
     /// What a touched voxel gets.
     pub extrapolate: Extrapolate,
+    /// Cells of the finest grid, whole leaves of an octree: nothing else is looked at, since the mesh is a block of another one. A voxel is inside then if its
+    /// centre lies in these cells, and touched by what their leaves list. `None`: the whole mesh.
+    pub part: Option<CellRange>,
 }
 
 impl SliceInput<'_> {
@@ -110,8 +115,11 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
     if u64::from(width) * u64::from(count) > memory.answers.size / 4 {
         return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels", memory.answers.size / 4)));
     }
+    if input.part.is_some() && matches!(searched.structure, Structure::Binary(_)) {
+        return Err(Error::Invalid("a part of a binary tree, which has no cells".into()));
+    }
     if !rounds.resume {
-        cmd_plan(r, searched, input.voxels, memory)?;
+        cmd_plan(r, searched, input, memory)?;
     }
     for round in 0..rounds.count {
         let fresh = u32::from(round == 0 && !rounds.resume);
@@ -126,17 +134,17 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
     cmd_values(r, searched, memory, input)
 }
 
-fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, voxels: &VoxelGrid, memory: &SliceMemory) -> Result<()> {
-    let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], layers } = *voxels;
-    let (grid, plans) = (searched.mesh.arrays.grid, memory.plan);
-    let arguments = PlanKernel { grid, plans, origin, across, down, up, half0, half1, half2, width, height, layers };
+fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
+    let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], layers } = *input.voxels;
+    let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, input.part.unwrap_or(CellRange::WHOLE).words());
+    let arguments = PlanKernel { grid, plans, origin, across, down, up, half0, half1, half2, width, height, layers, first_cell, last_cell };
     r.dispatch(&arguments, SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
 }
 
-fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>, begins: u32) -> Result<()> {
+fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, asked: &SliceInput<'_>, begins: u32) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let items = part.rows.count * part.voxels.size[0].div_ceil(RUN);
-    let (run, walk, lists) = (RUN, WALK, searched.lists());
+    let items = asked.rows.count * asked.voxels.size[0].div_ceil(RUN);
+    let (run, walk, part, lists) = (RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
     r.stage("query.slice_locate", |r| {
         dispatch!(r, items, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
             cells: input.cells,
@@ -146,13 +154,13 @@ fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMe
             states: memory.runs,
             answers: memory.answers,
             status: memory.status,
-            layer: part.rows.layer,
-            first: part.rows.first,
-            rows: part.rows.count,
+            layer: asked.rows.layer,
+            first: asked.rows.first,
+            rows: asked.rows.count,
             fresh: begins,
             budget: LOCATE_BUDGET,
             tolerance: TOLERANCE,
-        }, { run, walk })
+        }, { run, walk, part })
     })
 }
 

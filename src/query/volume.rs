@@ -8,6 +8,7 @@
 //! ```
 
 mod picture;
+pub(crate) use picture::{Canvas, Rays};
 pub use picture::{Drawn, render};
 
 use super::{Rounds, Searched, Structure, cmd_visible, dispatch, visible_bytes};
@@ -21,6 +22,7 @@ use crate::kernels::{
 use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
 use crate::mesh::On;
 use crate::primitives::Arena;
+use crate::reference::vertices::CellRange;
 use crate::render::TABLE_SIZE;
 use std::mem::offset_of;
 
@@ -48,6 +50,19 @@ pub struct RenderInput {
     pub normals: Option<BufferRef>,
     /// What need not be looked at; `None`: every sample in the mesh is taken. The picture is the same. A binary tree skips nothing.
     pub shown: Option<Shown>,
+    /// The mesh is a block of another one, and other blocks draw their part of the picture.
+    pub part: Option<RenderPart>,
+}
+
+/// A part of a picture, drawn by one block of a mesh. Blocks draw one after the other, so that whatever ray meets two of them meets the first one first. Colours and
+/// rays of [`RenderMemory`] are not begun but gone on with: before the first block, colours are 0, and so are rays but for [`RayState::last`], which
+/// is all ones.
+#[derive(Clone, Copy, Debug)]
+pub struct RenderPart {
+    /// Samples in these cells of the finest grid, whole leaves of an octree, are taken.
+    pub cells: CellRange,
+    /// Which row of the view is the first one here.
+    pub row: u32,
 }
 
 /// Values that are to be seen: nodes of an octree without any are skipped.
@@ -70,7 +85,8 @@ pub struct RenderMemory {
     pub status: BufferRef,
     /// [`RenderView`], [`RenderPlan`], and the transfer function.
     pub frame: BufferRef,
-    states: BufferRef,
+    /// [`RayState`] per ray, in blocks of 8×8 pixels, each along a Z curve.
+    pub rays: BufferRef,
     visible: Option<Visible>,
 }
 
@@ -101,7 +117,7 @@ impl RenderMemory {
             colors: arena.take(16 * pixels)?,
             status: arena.take(size_of::<RenderStatus>() as u64)?,
             frame: arena.take((size_of::<RenderView>() + size_of::<RenderPlan>() + 16 * TABLE_SIZE) as u64)?,
-            states: arena.take(size_of::<RayState>() as u64 * rays)?,
+            rays: arena.take(size_of::<RayState>() as u64 * rays)?,
             visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
         })
     }
@@ -130,8 +146,7 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memory: &RenderMemory, rounds: Rounds) -> Result<()> {
     let [width, height] = input.size;
     let rays = rays(input.size)?;
-    if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.states.size
-    {
+    if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.rays.size {
         return Err(Error::Invalid(format!("a picture of {width}×{height} pixels in memory of fewer")));
     }
     let visible = visible(searched, input, memory)?;
@@ -142,7 +157,7 @@ pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput
         cmd_plan(r, searched, input, memory, visible)?;
         r.barrier("render.plan → render.intervals");
         // Between surfaces that are not to be seen a field may jump where the mesh has a crack: that is looked at, whatever the tree.
-        cmd_intervals(r, searched, rays, memory, visible.filter(|_| !input.iso))?;
+        cmd_intervals(r, searched, rays, input, memory, visible.filter(|_| !input.iso))?;
     }
     for round in 0..rounds.count {
         if round > 0 {
@@ -172,6 +187,7 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memo
         r.copy(tree.flags.part(0, bits), flags);
         cmd_visible(r, tree, shown.ranges, (shown.drawn, shown.count), marks)?;
     }
+    let [first_cell, last_cell] = input.part.map_or(CellRange::WHOLE, |part| part.cells).words();
     let arguments = VolumePlan {
         grid: searched.mesh.arrays.grid,
         views: input.view,
@@ -180,23 +196,33 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memo
         width: input.size[0],
         height: input.size[1],
         visible_at: visible.map_or(0, |v| ((v.marks.offset - v.flags.offset) / 4) as u32),
+        row: input.part.map_or(0, |part| part.row),
+        first_cell,
+        last_cell,
     };
     let workgroup = r.gpu().target().each;
     r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, Groups::Count((TABLE_SIZE as u32).div_ceil(workgroup)))
 }
 
-fn cmd_intervals(r: &mut Recorder<'_>, searched: &Searched, rays: u32, memory: &RenderMemory, visible: Option<Visible>) -> Result<()> {
+fn cmd_intervals(
+    r: &mut Recorder<'_>,
+    searched: &Searched,
+    rays: u32,
+    input: &RenderInput,
+    memory: &RenderMemory,
+    visible: Option<Visible>,
+) -> Result<()> {
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
-    let (input, arrays, stack) = (&searched.mesh.input, &searched.mesh.arrays, STACK);
+    let (mesh, arrays, stack, part) = (&searched.mesh.input, &searched.mesh.arrays, STACK, u32::from(input.part.is_some()));
     r.stage("query.intervals", |r| {
         dispatch!(r, rays, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
-            cells: input.cells,
+            cells: mesh.cells,
             vertices: arrays.vertices,
             frames: memory.frame,
-            states: memory.states,
+            states: memory.rays,
             colors: memory.colors,
             items: rays,
-        }, { stack })
+        }, { stack, part })
     })
 }
 
@@ -220,7 +246,7 @@ fn cmd_march(
             field: field,
             normals: normals,
             frames: memory.frame,
-            states: memory.states,
+            states: memory.rays,
             colors: memory.colors,
             status: memory.status,
             items: rays,

@@ -182,7 +182,7 @@ fn face(ids: [u32; 4], i: usize) -> [u32; 3] {
 }
 
 /// Faces are bucketed by their smallest vertex, and equal ones found within a bucket.
-fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
+pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
     let faces_of = |t: usize| (0..4).map(move |i| (4 * t + i, face(mesh.tets[t], i)[0] as usize));
     let valid_tets = || (0..mesh.tets.len()).filter(|&t| bit(valid, t as u32));
     let mut ends = vec![0u32; mesh.points.len() + 1];

@@ -5,6 +5,7 @@ use super::leaf_walk::{meets, reached_cells, walk_leaves};
 use super::locate::{Location, Locator};
 use super::separate::{Closest, box_square, box_touches, closest, touch_slack};
 use super::tet::{Tet, Vec3, sub};
+use super::vertices::CellRange;
 use crate::error::Result;
 use crate::layout::SlicePlan;
 use crate::mesh::{Field, Mesh, On};
@@ -23,6 +24,7 @@ pub struct Slicer<'a> {
     extrapolate: Extrapolate,
     voxels: VoxelGrid,
     plan: SlicePlan,
+    part: CellRange,
 }
 
 /// A voxel's answer.
@@ -53,7 +55,24 @@ impl<'a> Slicer<'a> {
     ) -> Result<Self> {
         let plan = voxels.plan(&tree.grid)?;
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
-        Ok(Self { mesh, topology, tree, locator: Locator::new(mesh, topology, tree), normalised, field, extrapolate, voxels, plan })
+        Ok(Self {
+            mesh,
+            topology,
+            tree,
+            locator: Locator::new(mesh, topology, tree),
+            normalised,
+            field,
+            extrapolate,
+            voxels,
+            plan,
+            part: CellRange::WHOLE,
+        })
+    }
+
+    /// The same, where only these cells of the finest grid are looked at: centres in other cells belong to another block, and so do their lists.
+    #[must_use]
+    pub fn within(self, part: CellRange) -> Self {
+        Self { part, ..self }
     }
 
     /// The voxels of these rows.
@@ -77,6 +96,9 @@ impl<'a> Slicer<'a> {
         (begin..end)
             .map(|x| {
                 let centre = self.voxels.centre([x, y, layer]);
+                if !self.part.contains(self.tree.grid.quantize(centre)) {
+                    return self.touched(centre);
+                }
                 let location = self.locator.stride_to(centre, hint, WALK).unwrap_or_else(|| self.locator.locate(centre));
                 hint = location.owner;
                 match location.found() {
@@ -101,7 +123,9 @@ impl<'a> Slicer<'a> {
     fn touched(&self, centre: [f32; 3]) -> Voxel {
         let three = |v: [f32; 4]| [v[0], v[1], v[2]];
         let grid = &self.tree.grid;
-        let Some(cells) = reached_cells(grid, centre, three(self.plan.reach)) else { return NOTHING };
+        let Some(cells) = reached_cells(grid, centre, three(self.plan.reach)).and_then(|cells| cells.common(&self.part)) else {
+            return NOTHING;
+        };
         let x = grid.normalise(centre);
         let half = [self.plan.half0, self.plan.half1, self.plan.half2].map(three);
         let mut best = (f32::MAX, NONE);

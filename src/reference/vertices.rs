@@ -1,6 +1,6 @@
 //! What every stage needs of a vertex, computed once: its finest cell and its normalised coordinates (SPEC 2.1).
 
-use super::grid::Grid;
+use super::grid::{Grid, MAX_LEVEL};
 use super::tet::{Tet, Vec3};
 use crate::mesh::Mesh;
 use rayon::prelude::*;
@@ -40,7 +40,7 @@ impl Vertices {
     /// cells of the vertices bound those of every point between them.
     pub fn cells(&self, ids: [u32; 4], level: u32) -> CellRange {
         let q = ids.map(|id| self.cell[id as usize]);
-        let shift = super::grid::MAX_LEVEL - level;
+        let shift = MAX_LEVEL - level;
         let corner =
             |pick: fn(u16, u16) -> u16| [0, 1, 2].map(|c| u32::from(pick(pick(q[0][c], q[1][c]), pick(q[2][c], q[3][c]))) >> shift);
         CellRange { lo: corner(u16::min), hi: corner(u16::max) }
@@ -48,6 +48,27 @@ impl Vertices {
 }
 
 impl CellRange {
+    /// All cells of the finest grid.
+    pub const WHOLE: Self = Self { lo: [0; 3], hi: [(1 << MAX_LEVEL) - 1; 3] };
+
+    /// The first and the last cell in a word each, as kernels take cells of the finest grid.
+    pub fn words(&self) -> [u32; 2] {
+        [self.lo, self.hi].map(|[x, y, z]| x | y << MAX_LEVEL | z << (2 * MAX_LEVEL))
+    }
+
+    /// The same box of cells of a level in cells of the finest grid.
+    #[must_use]
+    pub fn finest(&self, level: u32) -> Self {
+        let shift = MAX_LEVEL - level;
+        Self { lo: self.lo.map(|k| k << shift), hi: self.hi.map(|k| ((k + 1) << shift) - 1) }
+    }
+
+    /// What two boxes have in common.
+    pub fn common(&self, other: &Self) -> Option<Self> {
+        let range = Self { lo: [0, 1, 2].map(|c| self.lo[c].max(other.lo[c])), hi: [0, 1, 2].map(|c| self.hi[c].min(other.hi[c])) };
+        (0..3).all(|c| range.lo[c] <= range.hi[c]).then_some(range)
+    }
+
     /// Number of cells per axis.
     pub fn size(&self) -> [u32; 3] {
         [0, 1, 2].map(|c| self.hi[c] - self.lo[c] + 1)

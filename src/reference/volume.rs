@@ -17,6 +17,7 @@ pub use skip::Skips;
 use super::boundary::Topology;
 use super::locate::Locator;
 use super::ranges::{ranges, visible};
+use super::vertices::CellRange;
 use crate::error::{Error, Result};
 use crate::mesh::{Field, Mesh, On};
 use crate::render::{Bounds, Plan, Prepared, RenderSettings};
@@ -54,6 +55,7 @@ pub struct Scene<'a> {
     /// Which nodes have something to see; `None` where no value of the field is transparent.
     pub(crate) visible: Option<Vec<u32>>,
     pub(crate) ranges_ms: f64,
+    part: CellRange,
     /// With tolerance 0: whether a point just outside counts would depend on the leaf that it lies in.
     pub(crate) locator: Locator<'a>,
 }
@@ -79,7 +81,7 @@ impl<'a> Scene<'a> {
         let visible = prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.drawn));
         let ranges_ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
         let locator = Locator::new(mesh, topology, tree).with_tolerance(0.0);
-        Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, locator })
+        Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, part: CellRange::WHOLE, locator })
     }
 
     /// The same with every sample in the mesh taken, transparent or not.
@@ -87,6 +89,12 @@ impl<'a> Scene<'a> {
     pub fn without_skipping(mut self) -> Self {
         self.visible = None;
         self
+    }
+
+    /// The same with samples in these cells of the finest grid alone, as a block draws them where none is in front of it.
+    #[must_use]
+    pub fn within(self, part: CellRange) -> Self {
+        Self { part, ..self }
     }
 
     /// What is drawn.
@@ -104,7 +112,7 @@ impl<'a> Scene<'a> {
 pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
     let [width, height] = plan.size;
-    let intervals = Intervals::new(scene.tree, scene.visible.as_deref().filter(|_| plan.iso.is_empty()), plan);
+    let intervals = Intervals::new(scene.tree, scene.visible.as_deref().filter(|_| plan.iso.is_empty()), plan).within(scene.part);
     let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();

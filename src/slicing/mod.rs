@@ -17,6 +17,8 @@ pub use settings::{Plane, SliceSettings};
 use crate::error::{Error, Result};
 use crate::layout::{Grid, SlicePlan};
 use crate::reference::grid::canonical;
+use crate::reference::vertices::CellRange;
+use glam::DVec3;
 
 /// Kind of a voxel that the mesh does not touch.
 pub const EMPTY: u8 = 0;
@@ -66,6 +68,35 @@ impl VoxelGrid {
     pub fn centre(&self, [x, y, k]: [u32; 3]) -> [f32; 3] {
         let (x, y, k) = (x as f32, y as f32, k as f32);
         [0, 1, 2].map(|c| ((self.origin[c] + k * self.up[c]) + y * self.down[c]) + x * self.across[c])
+    }
+
+    /// Whether the boxes of these voxels may meet the closed box `[lo, hi]` in a mesh of this grid: no face of either keeps them apart.
+    pub fn meets(&self, rows: Rows, [lo, hi]: [[f64; 3]; 2], grid: &Grid) -> bool {
+        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        let [x, y] = self.size.map(|n| f64::from(n) - 1.0);
+        let ([first, layer], [last, top]) = (rows.row(0, self.size[1]), rows.row(rows.count.saturating_sub(1), self.size[1]));
+        let [low, high] = if layer == top { [first, last].map(f64::from) } else { [0.0, y] };
+        let sides = [wide(self.across) * x, wide(self.down) * (high - low), wide(self.up) * f64::from(top - layer)];
+        let corner = wide(self.origin) + wide(self.up) * f64::from(layer) + wide(self.down) * low;
+        let (lo, hi) = (DVec3::from_array(lo), DVec3::from_array(hi));
+        let largest = (0..3).map(|c| f64::from(grid.hi[c]) - f64::from(grid.lo[c])).fold(0.0, f64::max);
+        // More than centres and boxes are off by rounding, and owners by the tolerance.
+        let half = (hi - lo) * 0.5 + DVec3::splat(largest / 1024.0) + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
+        let from_middle = corner - (lo + hi) * 0.5;
+        let normals = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| self.half_normal(i, j));
+        DVec3::AXES.into_iter().chain(normals).all(|d| {
+            let (at, along) = (from_middle.dot(d), sides.map(|side| side.dot(d)));
+            let begin = at + along.iter().map(|a| a.min(0.0)).sum::<f64>();
+            let end = at + along.iter().map(|a| a.max(0.0)).sum::<f64>();
+            let reach = half.dot(d.abs());
+            begin <= reach && -reach <= end
+        })
+    }
+
+    /// Perpendicular to two of the half axes.
+    fn half_normal(&self, i: usize, j: usize) -> DVec3 {
+        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        wide(self.half[i]).cross(wide(self.half[j])).normalize_or_zero()
     }
 
     /// Voxels of a layer.
@@ -125,6 +156,7 @@ impl VoxelGrid {
             height: self.size[1],
             layers: self.layers,
             refused: if large { 2 } else { u32::from(flat) },
+            last_cell: CellRange::WHOLE.words()[1],
             ..SlicePlan::default()
         }
     }
@@ -156,6 +188,14 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// The same rows, at most so many at a time, in a stack of layers of `height` rows.
+    pub fn parts(self, most: u32, height: u32) -> impl Iterator<Item = Self> + use<> {
+        (0..self.count).step_by(most.max(1) as usize).map(move |i| {
+            let [first, layer] = self.row(i, height);
+            Self { layer, first, count: most.min(self.count - i) }
+        })
+    }
+
     /// Row and layer of the i-th row.
     pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
         let at = self.first + i;

@@ -119,13 +119,13 @@ impl Queries {
         cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;
         let searched = Searched { mesh: self.scene.mesh, structure: Structure::Octree(self.scene.tree) };
         let field = Some((self.field.all(), On::Points));
-        let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };
+        let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest, part: None };
         cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
         let field = (self.field.all(), On::Points);
         cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
         let [view, table, drawn, normals] = self.drawn.each_ref().map(Buffer::all);
         let shown = Some(Shown { ranges: self.ranges, drawn, count: self.plan.drawn.len() as u32 + 1 });
-        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), shown };
+        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), shown, part: None };
         cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
         let other = Scene::new(&self.other, &self.other_tree);
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;

@@ -77,7 +77,9 @@ pub enum Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let message = match &error {
-            Error::Memory { .. } => format!("{error}; meshes that do not fit are taken in blocks by `locate` and `overlap` alone"),
+            Error::Memory { .. } => {
+                format!("{error}; meshes that do not fit are taken in blocks by `locate`, `render`, `slice` and `overlap`")
+            }
             _ => error.to_string(),
         };
         match error {

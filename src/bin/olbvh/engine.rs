@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, Points};
+use olbvh::blocks::{InBlocks, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
@@ -15,8 +15,8 @@ use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
-use olbvh::render::{Bounds, RenderSettings};
-use olbvh::slicing::{Band, Extrapolate, VoxelGrid};
+use olbvh::render::Bounds;
+use olbvh::slicing::Band;
 use olbvh::tree::Memory;
 
 /// So much of so much is done.
@@ -51,6 +51,10 @@ pub trait Engine {
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds out where they overlap.
     fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped>;
+    /// Builds a tree over a mesh and draws a field.
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>>;
+    /// Builds a tree over a mesh and slices it, band by band into `sink`.
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks>;
 }
 
 /// Two meshes, and what is asked of them.
@@ -67,10 +71,6 @@ pub struct Question<'a> {
 pub trait Built {
     /// What they are like.
     fn summary(&self) -> &Summary;
-    /// Draws a field.
-    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn>;
-    /// Slices the mesh, band by band into `sink`.
-    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()>;
 }
 
 /// A picture and what was found out for it.

@@ -4,7 +4,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::text::{bytes, grouped, milliseconds};
+use crate::text::{grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
@@ -95,13 +95,13 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), took }
     };
     drop(progress);
-    let InBlocks { trees, peak, build_seconds, .. } = done.took;
-    seconds -= build_seconds;
+    let took = done.took;
+    seconds -= took.build_seconds;
     let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
     let json = json!({
         "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": seconds,
         "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
-        "build_ms": build_seconds * 1e3, "blocks": trees, "peak_bytes": peak, "device": engine.name(),
+        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "device": engine.name(),
     });
     let text = format!(
         "{}: {} points, {} of them in the mesh; {} on {}, {} points a second{}\n",
@@ -111,11 +111,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         milliseconds(seconds * 1e3),
         engine.name(),
         grouped(per_second as u64),
-        if trees > 1 {
-            format!("; {trees} blocks within {}, built in {}", bytes(peak), milliseconds(build_seconds * 1e3))
-        } else {
-            String::new()
-        }
+        in_blocks(&took)
     );
     output::summary(common, &json, &text)
 }

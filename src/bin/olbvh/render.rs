@@ -2,9 +2,10 @@
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{self, Drawn};
-use crate::input::{self, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::text::{grouped, milliseconds};
+use crate::text::{grouped, in_blocks, milliseconds};
+use olbvh::blocks::View;
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, write_png};
 use olbvh::mesh::{Field, Mesh, On};
@@ -83,6 +84,8 @@ pub struct Args {
     termination: f32,
     #[command(flatten)]
     tree: TreeArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 /// Opacity points (a type of its own, lest a list be taken for repeated arguments).
@@ -102,21 +105,22 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let field = args.field(&loaded.mesh, common)?;
-    let built = engine.build(&loaded.mesh, &options)?;
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
-    let Drawn { picture, range: [lo, hi], step } = built.render(&field, &settings, &|done, total| progress.set(done, total))?;
+    let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
+    let (drawn, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.apart();
+    let Drawn { picture, range: [lo, hi], step } = drawn;
     drop(progress);
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
     let json = json!({
         "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi], "iso": settings.iso,
         "step": step, "samples": picture.samples, "skipped_samples": picture.skipped_samples, "found_samples": picture.found_samples,
         "ranges_ms": picture.ranges_ms, "interval_ms": picture.interval_ms, "march_ms": picture.march_ms,
-        "build_ms": built.summary().build_ms, "seconds": seconds, "device": engine.name(),
+        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "seconds": seconds, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}\n",
+        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
         args.output.display(),
         field.name,
         settings.size[0],
@@ -126,7 +130,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         grouped(picture.skipped_samples),
         milliseconds(picture.interval_ms),
         milliseconds(picture.march_ms),
-        engine.name()
+        engine.name(),
+        in_blocks(&took)
     );
     output::summary(common, &json, &text)
 }

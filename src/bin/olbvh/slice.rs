@@ -2,12 +2,14 @@
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
-use crate::input::{self, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
 use crate::slice_output::{Layers, Look};
-use crate::text::{grouped, milliseconds};
+use crate::text::{grouped, in_blocks, milliseconds};
+use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
-use olbvh::mesh::On;
+use olbvh::mesh::{Mesh, On};
+use olbvh::reference::boundary::valid_grid;
 use olbvh::render::{TransferFunction, transfer};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 use serde_json::json;
@@ -75,6 +77,8 @@ pub struct Args {
     unit: f64,
     #[command(flatten)]
     tree: TreeArgs,
+    #[command(flatten)]
+    memory: MemoryArgs,
 }
 
 const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, OutputFormat::Png, OutputFormat::Svx];
@@ -96,8 +100,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
-    let built = engine.build(mesh, &options)?;
-    let bounds = &built.summary().bounds;
+    let (lo, hi) = bounds(mesh);
     let mut settings = SliceSettings {
         plane: args.normal.map_or(Plane::Axis(args.axis), Plane::Normal),
         at: args.at,
@@ -107,9 +110,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         spacing: args.spacing,
     };
     if format == OutputFormat::Svx {
-        settings = settings.cubes(bounds.lo, bounds.hi, mesh.origin, args.layers.is_none())?;
+        settings = settings.cubes(lo, hi, mesh.origin, args.layers.is_none())?;
     }
-    let voxels = settings.voxels(bounds.lo, bounds.hi, mesh.origin)?;
+    let voxels = settings.voxels(lo, hi, mesh.origin)?;
     let range = args.range.or_else(|| field.and_then(olbvh::mesh::Field::range)).unwrap_or([0.0, 1.0]);
     let look = Look { colors, range, unit: args.unit, field: field.map(|f| (f.name.clone(), f.on)) };
     let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
@@ -120,18 +123,20 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         tally.add(&band.kinds);
         layers.band(band)
     };
-    built.slice(field, &voxels, args.extrapolate, &|done, total| progress.set(done, total), &mut sink)?;
+    let asked = Stack { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
+    let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
-    let seconds = start.elapsed().as_secs_f64();
+    let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
     let json = json!({
         "file": args.output.display().to_string(), "layers": voxels.layers, "width": voxels.size[0], "height": voxels.size[1],
         "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
-        "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": built.summary().build_ms, "device": engine.name(),
+        "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": took.build_seconds * 1e3, "blocks": took.trees,
+        "peak_bytes": took.peak, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} layers of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}\n",
+        "{}: {} layers of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
         args.output.display(),
         voxels.layers,
         voxels.size[0],
@@ -140,9 +145,16 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         grouped(tally.touched),
         grouped(tally.empty),
         milliseconds(seconds * 1e3),
-        engine.name()
+        engine.name(),
+        in_blocks(&took)
     );
     output::summary(common, &json, &text)
+}
+
+/// The corners of the box around the cells that are not bad.
+fn bounds(mesh: &Mesh) -> ([f32; 3], [f32; 3]) {
+    let (grid, corner) = (valid_grid(mesh), |c: [f32; 4]| [c[0], c[1], c[2]]);
+    (corner(grid.lo), corner(grid.hi))
 }
 
 fn axis(text: &str) -> Result<usize, String> {

@@ -1,5 +1,6 @@
 //! Aligned text for people.
 
+use olbvh::blocks::InBlocks;
 use std::fmt::Write as _;
 
 /// Longest label that values are aligned behind; a longer one moves its own value only.
@@ -65,6 +66,16 @@ pub fn milliseconds(ms: f64) -> String {
         _ if ms >= 60_000.0 => format!("{:.1} min", ms / 60_000.0),
         _ if ms >= 1000.0 => format!("{:.2} s", ms / 1000.0),
         _ => format!("{ms:.1} ms"),
+    }
+}
+
+/// How a mesh was taken in blocks, behind other text; nothing where it was not.
+pub fn in_blocks(took: &InBlocks) -> String {
+    let InBlocks { trees, peak, build_seconds, .. } = *took;
+    if trees > 1 {
+        format!("; {trees} blocks within {}, built in {}", bytes(peak), milliseconds(build_seconds * 1e3))
+    } else {
+        String::new()
     }
 }
 

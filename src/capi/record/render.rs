@@ -141,6 +141,7 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
             field: picture.field.read(scene)?,
             normals: picture.normals.optional(12 * u64::from(scene.mesh.input.points), "normals")?,
             shown: ranges.map(|ranges| Shown { ranges, drawn, count: picture.drawn_count.min(512) }),
+            part: None,
         };
         let memory = picture.memory.place(picture.carve(scene))?;
         let searched = Searched { mesh: scene.mesh, structure: Structure::Octree(scene.tree) };

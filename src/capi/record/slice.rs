@@ -63,7 +63,7 @@ pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const 
         let OlbvhSlicing { layer, first, rows, field, .. } = *slicing;
         let field = (field.values.size > 0).then(|| field.read(scene)).transpose()?;
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
-        let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate };
+        let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate, part: None };
         let memory = slicing.memory.place(|a| SliceMemory::carve(a, slicing.voxels.width, rows))?;
         cmd_slice(r, &Searched { mesh: scene.mesh, structure: Structure::Octree(scene.tree) }, &input, &memory, slicing.rounds.into())
     })

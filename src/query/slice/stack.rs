@@ -8,10 +8,14 @@ use crate::layout::SliceStatus;
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Searched, Structure};
-use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, TOUCHED, Tally, VoxelGrid, bands};
+use crate::reference::vertices::CellRange;
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
 
 /// Voxels of one band, unless a single row has more.
 const CHUNK: u64 = 1 << 20;
+/// Bytes of device memory per voxel of a band, transfers included, and a reserve.
+const PER_VOXEL: u64 = 40;
+const RESERVE: u64 = 1 << 14;
 /// Added to the owner of a touched voxel; see `glsl/shared/voxels.glsl`.
 const TOUCHED_BIT: u32 = 1 << 31;
 
@@ -30,27 +34,68 @@ pub struct Sliced {
     pub submissions: u32,
 }
 
-/// What the bands of a stack have in common.
-struct Job<'a> {
+/// A stack over a mesh and its tree: what its bands have in common, with memory of our own.
+pub(crate) struct Slicing<'a> {
     gpu: &'a Gpu,
     searched: Searched,
+    voxels: &'a VoxelGrid,
+    field: Option<(Buffer, On)>,
+    extrapolate: Extrapolate,
+    part: Option<CellRange>,
     memory: SliceMemory,
-    buffer: &'a Buffer,
+    buffer: Buffer,
+    /// Rows that are sliced at once.
+    pub(crate) rows: u32,
+    sliced: Sliced,
 }
 
-impl Job<'_> {
-    /// One band. Submissions are repeated until every voxel is done; usually one is enough.
-    fn band(&self, input: &SliceInput<'_>, sliced: &mut Sliced) -> Result<Band> {
-        let memory = &self.memory;
+impl<'a> Slicing<'a> {
+    /// Prepares slicing, as many rows at once as memory is left for. `part`: as [`SliceInput::part`].
+    ///
+    /// # Errors
+    /// As [`slice`].
+    pub(crate) fn new(
+        mesh: &'a DeviceMesh,
+        structure: impl Into<Structure>,
+        field: Option<(&[f32], On)>,
+        (voxels, extrapolate): (&'a VoxelGrid, Extrapolate),
+        part: Option<CellRange>,
+    ) -> Result<Self> {
+        let gpu = mesh.gpu();
+        voxels.plan(mesh.grid())?;
+        if let Some((values, on)) = field {
+            let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
+            if values.len() != expected as usize {
+                return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
+            }
+        }
+        let field = field.map(|(values, on)| Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))).transpose()?;
+        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE) / PER_VOXEL);
+        let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
+        let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size[0], rows);
+        let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
+        let memory = carve(&mut Arena::new(buffer.all()))?;
+        let (searched, sliced) = (Searched::new(mesh, structure), Sliced::default());
+        Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
+    }
+
+    /// One band of at most so many rows. Submissions are repeated until every voxel is done; usually one is enough.
+    ///
+    /// # Errors
+    /// As [`cmd_slice`], or a failed Vulkan call.
+    pub(crate) fn band(&mut self, rows: Rows) -> Result<Band> {
+        let (memory, sliced) = (&self.memory, &mut self.sliced);
+        let field = self.field.as_ref().map(|(buffer, on)| (buffer.all(), *on));
+        let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate, part: self.part };
         let mut rounds = Rounds::begin(1);
         let status = loop {
-            let ((), time) = self.gpu.run("olbvh.query.slice", |r| cmd_slice(r, &self.searched, input, memory, rounds))?;
+            let ((), time) = self.gpu.run("olbvh.query.slice", |r| cmd_slice(r, &self.searched, &input, memory, rounds))?;
             rounds = Rounds::resume(1);
             sliced.submissions += 1;
             sliced.locate_ms += time.milliseconds("query.slice_locate");
             sliced.touch_ms += time.milliseconds("query.slice_touch");
             sliced.values_ms += time.milliseconds("query.slice_values");
-            let status = self.gpu.download::<SliceStatus>(self.buffer, memory.status)?.first().copied().unwrap_or_default();
+            let status = self.gpu.download::<SliceStatus>(&self.buffer, memory.status)?.first().copied().unwrap_or_default();
             if status.locating + status.touching == 0 {
                 break status;
             }
@@ -59,9 +104,9 @@ impl Job<'_> {
         sliced.tally.touched += u64::from(status.touched);
         sliced.tally.empty += u64::from(status.empty);
         let words = 4 * u64::from(input.count());
-        let answers: Vec<u32> = self.gpu.download(self.buffer, memory.answers.part(0, words))?;
+        let answers: Vec<u32> = self.gpu.download(&self.buffer, memory.answers.part(0, words))?;
         let values = match input.field {
-            Some(_) => self.gpu.download(self.buffer, memory.values.part(0, words))?,
+            Some(_) => self.gpu.download(&self.buffer, memory.values.part(0, words))?,
             None => vec![f32::NAN; answers.len()],
         };
         let kind = |a: u32| match a {
@@ -71,7 +116,7 @@ impl Job<'_> {
         };
         let owner = |a: u32| if a == u32::MAX { a } else { a & !TOUCHED_BIT };
         let kinds = answers.iter().map(|&a| kind(a)).collect();
-        Ok(Band { rows: input.rows, values, kinds, owners: answers.into_iter().map(owner).collect() })
+        Ok(Band { rows, values, kinds, owners: answers.into_iter().map(owner).collect() })
     }
 }
 
@@ -90,32 +135,15 @@ pub fn slice(
     report: &dyn Fn(u64, u64),
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<Sliced> {
-    let gpu = mesh.gpu();
-    voxels.plan(mesh.grid())?;
-    if let Some((values, on)) = field {
-        let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-        if values.len() != expected as usize {
-            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
-        }
-    }
-    let uploaded = field.map(|(values, on)| Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))).transpose()?;
-    let width = voxels.size[0];
-    let most = bands(voxels, CHUNK).map(|rows| rows.count).max().unwrap_or(1);
-    let carve = |a: &mut Arena| SliceMemory::carve(a, width, most);
-    let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
-    let memory = carve(&mut Arena::new(buffer.all()))?;
-    let field = uploaded.as_ref().map(|(buffer, on)| (buffer.all(), *on));
-    let job = Job { gpu, searched: Searched::new(mesh, structure), memory, buffer: &buffer };
-    let mut sliced = Sliced::default();
+    let mut slicing = Slicing::new(mesh, structure, field, (voxels, extrapolate), None)?;
     let mut done = 0;
-    for rows in bands(voxels, CHUNK) {
-        let input = SliceInput { voxels, rows, field, extrapolate };
-        let band = job.band(&input, &mut sliced)?;
-        done += u64::from(input.count());
+    for rows in bands(voxels, u64::from(slicing.rows) * u64::from(voxels.size[0])) {
+        let band = slicing.band(rows)?;
+        done += band.kinds.len() as u64;
         sink(band)?;
         report(done, voxels.voxels());
     }
-    let Sliced { locate_ms, touch_ms, values_ms, submissions, .. } = sliced;
+    let Sliced { locate_ms, touch_ms, values_ms, submissions, .. } = slicing.sliced;
     log::debug!("slice: locate {locate_ms:.1} ms, touch {touch_ms:.1} ms, values {values_ms:.1} ms, {submissions} submissions");
-    Ok(sliced)
+    Ok(slicing.sliced)
 }

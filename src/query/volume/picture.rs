@@ -1,12 +1,14 @@
 //! A whole picture, drawn by the recorded form: memory of our own, a round per submission until every ray is done.
 
-use super::{RenderInput, RenderMemory, Shown, cmd_render};
+use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Shown, cmd_render};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
-use crate::layout::RenderStatus;
+use crate::gpu::{Buffer, BufferRef, Gpu};
+use crate::layout::{RayState, RenderStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Searched, Structure};
+use crate::reference::vertices::CellRange;
 use crate::render::Plan;
 
 /// What a drawn picture holds.
@@ -30,6 +32,162 @@ pub struct Drawn {
     pub submissions: u32,
 }
 
+/// The rays of a picture in host memory, between two blocks of a mesh.
+pub(crate) struct Rays {
+    /// Premultiplied colour and opacity, row 0 on top.
+    pub(crate) colors: Vec<[f32; 4]>,
+    /// As in [`RenderMemory::rays`].
+    states: Vec<RayState>,
+}
+
+impl Rays {
+    /// Before the first block.
+    ///
+    /// # Errors
+    /// [`Error::TooLarge`] for 2^31 pixels and more.
+    pub(crate) fn new(size: [u32; 2]) -> Result<Self> {
+        let fresh = RayState { last: u32::MAX, ..RayState::default() };
+        Ok(Self { colors: vec![[0.0; 4]; size[0] as usize * size[1] as usize], states: vec![fresh; super::rays(size)? as usize] })
+    }
+}
+
+/// A mesh, its tree and a field in device memory, ready to be drawn: a whole picture, or strips of one.
+pub(crate) struct Canvas<'a> {
+    gpu: &'a Gpu,
+    searched: Searched,
+    plan: &'a Plan,
+    field: (Buffer, On),
+    normals: Option<Buffer>,
+    uniforms: [Buffer; 3],
+    ranges: Option<BufferRef>,
+    memory: RenderMemory,
+    buffer: Buffer,
+    /// Rows of a strip.
+    rows: u32,
+    drawn: Drawn,
+}
+
+impl<'a> Canvas<'a> {
+    /// Prepares a picture; in strips, of as many rows as memory is left for.
+    ///
+    /// # Errors
+    /// As [`render`].
+    pub(crate) fn new(
+        mesh: &'a DeviceMesh,
+        structure: impl Into<Structure>,
+        plan: &'a Plan,
+        (values, on): (&[f32], On),
+        normals: Option<&[[f32; 3]]>,
+        in_strips: bool,
+    ) -> Result<Self> {
+        let gpu = mesh.gpu();
+        let searched = Searched::new(mesh, structure);
+        let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
+        if values.len() != expected as usize || normals.is_some_and(|n| n.len() != mesh.input().points as usize) {
+            return Err(Error::Invalid(format!(
+                "a field of {} values where the mesh has {expected}, or normals for another mesh",
+                values.len()
+            )));
+        }
+        let field = (gpu.upload("olbvh.query.field", values)?, on);
+        let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
+        let uniforms = [
+            gpu.upload("olbvh.query.view", &[plan.view()])?,
+            gpu.upload("olbvh.query.table", &plan.table)?,
+            gpu.upload("olbvh.query.drawn", &plan.drawn)?,
+        ];
+        let skipped = match &searched.structure {
+            Structure::Octree(tree) if plan.hides(values) => Some(tree),
+            _ => None,
+        };
+        let carve = |a: &mut Arena, rows: u32| {
+            let memory = RenderMemory::carve(a, [plan.size[0], rows], skipped.map(|tree| &tree.capacity))?;
+            Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
+        };
+        let mut rows = plan.size[1];
+        while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > gpu.memory_left() - gpu.memory_left() / 4 {
+            rows = rows.div_ceil(2).next_multiple_of(BLOCK);
+        }
+        let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
+        let (memory, ranges) = carve(&mut Arena::new(buffer.all()), rows)?;
+        let drawn = Drawn::default();
+        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, drawn };
+        canvas.gather_ranges()?;
+        Ok(canvas)
+    }
+
+    /// The field's values in every node, if any are skipped.
+    fn gather_ranges(&mut self) -> Result<()> {
+        if let (Structure::Octree(tree), Some(ranges)) = (&self.searched.structure, self.ranges) {
+            let field = (self.field.0.all(), self.field.1);
+            let ((), time) = self.gpu.run("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
+            self.drawn.ranges_ms += time.milliseconds("build.ranges");
+        }
+        Ok(())
+    }
+
+    /// Draws a picture of this size from the first row, or a part of one; `report` is told how many of its rays are done.
+    fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: &dyn Fn(u64, u64)) -> Result<()> {
+        let Self { gpu, searched, plan, memory, drawn, .. } = self;
+        let [view, table, shown] = self.uniforms.each_ref().map(Buffer::all);
+        let input = RenderInput {
+            size,
+            view,
+            iso: !plan.iso.is_empty(),
+            table,
+            field: (self.field.0.all(), self.field.1),
+            normals: self.normals.as_ref().map(Buffer::all),
+            shown: self.ranges.map(|ranges| Shown { ranges, drawn: shown, count: plan.drawn.len() as u32 }),
+            part,
+        };
+        let ((), time) = gpu.run("olbvh.query.intervals", |r| cmd_render(r, searched, &input, memory, Rounds::begin(0)))?;
+        drawn.ranges_ms += time.milliseconds("query.visible");
+        drawn.interval_ms += time.milliseconds("query.intervals");
+        let rays = u64::from(size[0]) * u64::from(size[1]);
+        let status = loop {
+            let ((), time) = gpu.run("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
+            drawn.march_ms += time.milliseconds("query.march");
+            drawn.submissions += 1;
+            let status = gpu.download::<RenderStatus>(&self.buffer, memory.status)?.first().copied().unwrap_or_default();
+            report(rays.saturating_sub(u64::from(status.unfinished)), rays);
+            if status.unfinished == 0 {
+                break status;
+            }
+        };
+        let wide = |w: [u32; 2]| u64::from(w[0]) | u64::from(w[1]) << 32;
+        drawn.samples += wide(status.samples);
+        drawn.skipped_samples += wide(status.skipped);
+        drawn.found_samples += wide(status.found);
+        Ok(())
+    }
+
+    /// Draws the samples in these cells, strip by strip; rows that do not meet the block, nor have anything left to see, are left out.
+    ///
+    /// # Errors
+    /// A failed Vulkan call, or no memory for transfers. What is done is in `rays`, and is not done again.
+    pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<Drawn> {
+        let [width, height] = self.plan.size;
+        for row in (0..height).step_by(self.rows as usize) {
+            let size = [width, self.rows.min(height - row)];
+            if !met.iter().skip(row as usize).take(size[1] as usize).any(|&met| met) {
+                continue;
+            }
+            let first = [row as usize * width as usize, super::rays([width, row])? as usize];
+            let pixels = first[0]..first[0] + size[0] as usize * size[1] as usize;
+            let items = first[1]..first[1] + super::rays(size)? as usize;
+            let RenderMemory { colors, rays: states, .. } = self.memory;
+            self.gpu.write(&mut self.buffer, colors.offset, &rays.colors[pixels.clone()])?;
+            self.gpu.write(&mut self.buffer, states.offset, &rays.states[items.clone()])?;
+            self.draw(size, Some(RenderPart { cells, row }), &|_, _| {})?;
+            let drawn = self.gpu.download(&self.buffer, colors.part(0, 16 * pixels.len() as u64))?;
+            let states = self.gpu.download(&self.buffer, states.part(0, (size_of::<RayState>() * items.len()) as u64))?;
+            rays.colors[pixels].copy_from_slice(&drawn);
+            rays.states[items].copy_from_slice(&states);
+        }
+        Ok(self.drawn)
+    }
+}
+
 /// Draws a plan of a field (values per point or per tetrahedron); `normals`: one per point, for shading. `report` is told how many rays
 /// are done.
 ///
@@ -39,60 +197,13 @@ pub fn render(
     mesh: &DeviceMesh,
     structure: impl Into<Structure>,
     plan: &Plan,
-    (values, on): (&[f32], On),
+    field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
     report: &dyn Fn(u64, u64),
 ) -> Result<Drawn> {
-    let gpu = mesh.gpu();
-    let searched = Searched::new(mesh, structure);
-    let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-    if values.len() != expected as usize || normals.is_some_and(|n| n.len() != mesh.input().points as usize) {
-        return Err(Error::Invalid(format!(
-            "a field of {} values where the mesh has {expected}, or normals for another mesh",
-            values.len()
-        )));
-    }
-    let field = gpu.upload("olbvh.query.field", values)?;
-    let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
-    let [table, drawn] =
-        [("olbvh.query.table", bytemuck::cast_slice(&plan.table)), ("olbvh.query.drawn", bytemuck::cast_slice(&plan.drawn))]
-            .map(|(name, words): (&str, &[f32])| gpu.upload(name, words));
-    let (table, drawn, view) = (table?, drawn?, gpu.upload("olbvh.query.view", &[plan.view()])?);
-    let skipped = match &searched.structure {
-        Structure::Octree(tree) if plan.hides(values) => Some(tree),
-        _ => None,
-    };
-    let carve = |a: &mut Arena| {
-        let memory = RenderMemory::carve(a, plan.size, skipped.map(|tree| &tree.capacity))?;
-        Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
-    };
-    let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(carve)?)?;
-    let (memory, ranges) = carve(&mut Arena::new(buffer.all()))?;
-    let shown = ranges.map(|ranges| Shown { ranges, drawn: drawn.all(), count: plan.drawn.len() as u32 });
-    let (field, normals) = ((field.all(), on), normals.as_ref().map(crate::gpu::Buffer::all));
-    let iso = !plan.iso.is_empty();
-    let input = RenderInput { size: plan.size, view: view.all(), iso, table: table.all(), field, normals, shown };
-    let ((), time) = gpu.run("olbvh.query.intervals", |r| {
-        if let (Some(tree), Some(ranges)) = (skipped, ranges) {
-            cmd_ranges(r, &searched.mesh, tree, field, ranges)?;
-        }
-        cmd_render(r, &searched, &input, &memory, Rounds::begin(0))
-    })?;
-    let ranges_ms = skipped.map_or(0.0, |_| time.milliseconds("build.ranges") + time.milliseconds("query.visible"));
-    let mut drawn = Drawn { ranges_ms, interval_ms: time.milliseconds("query.intervals"), ..Drawn::default() };
+    let mut canvas = Canvas::new(mesh, structure, plan, field, normals, false)?;
+    canvas.draw(plan.size, None, report)?;
     let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
-    let status = loop {
-        let ((), time) = gpu.run("olbvh.query.march", |r| cmd_render(r, &searched, &input, &memory, Rounds::resume(1)))?;
-        drawn.march_ms += time.milliseconds("query.march");
-        drawn.submissions += 1;
-        let status = gpu.download::<RenderStatus>(&buffer, memory.status)?.first().copied().unwrap_or_default();
-        report(rays.saturating_sub(u64::from(status.unfinished)), rays);
-        if status.unfinished == 0 {
-            break status;
-        }
-    };
-    let wide = |w: [u32; 2]| u64::from(w[0]) | u64::from(w[1]) << 32;
-    (drawn.samples, drawn.skipped_samples, drawn.found_samples) = (wide(status.samples), wide(status.skipped), wide(status.found));
-    drawn.colors = gpu.download(&buffer, memory.colors.part(0, 16 * rays))?;
-    Ok(drawn)
+    let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;
+    Ok(Drawn { colors, ..canvas.drawn })
 }

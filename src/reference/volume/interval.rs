@@ -3,6 +3,7 @@
 use super::skip::inverse_of;
 use crate::reference::boundary::bit;
 use crate::reference::leaves::{Box6, cell_box};
+use crate::reference::vertices::CellRange;
 use crate::render::{MAX_SAMPLES, Plan, interval_slack};
 use crate::tree::TreeArrays;
 
@@ -11,7 +12,9 @@ pub struct Intervals<'a> {
     tree: &'a TreeArrays,
     /// One bit per node: to be looked at.
     nodes: &'a [u32],
-    inverse_step: f32,
+    plan: &'a Plan,
+    /// Samples in other cells of the finest grid are not taken.
+    part: CellRange,
     /// Boxes are larger by this, so that rounding of samples, boxes and rays loses nothing.
     slack: [f32; 3],
 }
@@ -21,14 +24,20 @@ type Node = (u32, u32, u32);
 
 impl<'a> Intervals<'a> {
     /// Prepares the rays of `plan`. `visible`: which nodes have something to see.
-    pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &Plan) -> Self {
-        let (slack, inverse_step) = (interval_slack(&tree.grid), plan.inverse_step());
-        Self { tree, nodes: visible.unwrap_or(&tree.boundary), inverse_step, slack }
+    pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &'a Plan) -> Self {
+        Self { tree, nodes: visible.unwrap_or(&tree.boundary), plan, part: CellRange::WHOLE, slack: interval_slack(&tree.grid) }
+    }
+
+    /// The same for samples in these cells of the finest grid alone.
+    #[must_use]
+    pub fn within(self, part: CellRange) -> Self {
+        Self { part, ..self }
     }
 
     /// The samples `[begin, end)` of a ray (origin, unit direction) that the mesh can hold: from the first to the last leaf with the
     /// boundary flag (or with something to see) whose box the ray meets, and one more on either side. A ray that starts in a leaf of the mesh starts at 0.
-    pub fn of(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [u32; 2] {
+    pub fn of(&self, ray: ([f32; 3], [f32; 3])) -> [u32; 2] {
+        let (origin, direction) = ray;
         let inverse = inverse_of(direction);
         let grid = &self.tree.grid;
         let (mut first, mut last) = (f32::MAX, -1.0f32);
@@ -57,8 +66,29 @@ impl<'a> Intervals<'a> {
         }
         // Sample k lies at (k + ½)·Δ.
         let number = |x: f32| x.clamp(0.0, MAX_SAMPLES as f32).floor();
-        let (begin, end) = (number(first * self.inverse_step - 1.5), number(last * self.inverse_step + 1.5));
-        [begin as u32, end as u32]
+        let inverse_step = self.plan.inverse_step();
+        let (begin, end) = (number(first * inverse_step - 1.5) as u32, number(last * inverse_step + 1.5) as u32);
+        if self.part == CellRange::WHOLE {
+            return [begin, end];
+        }
+        let begin = self.first_sample(ray, begin, end, false);
+        [begin, self.first_sample(ray, begin, end, true)]
+    }
+
+    /// The first of the samples `[k, end)` that the cells of the part are not ahead of; `past`: that lies behind them. Cells are monotone along a ray.
+    fn first_sample(&self, ray: ([f32; 3], [f32; 3]), mut k: u32, mut end: u32, past: bool) -> u32 {
+        let CellRange { lo, hi } = self.part;
+        while k < end {
+            let middle = k.midpoint(end);
+            let q = self.tree.grid.quantize(self.plan.sample(ray, middle));
+            let is_off = |c: usize| if (ray.1[c] >= 0.0) == past { hi[c] < q[c] } else { q[c] < lo[c] };
+            if (0..3).any(is_off) == past {
+                end = middle;
+            } else {
+                k = middle + 1;
+            }
+        }
+        k
     }
 
     /// Where a ray enters and leaves a box, `None` if it misses it; never before its origin.

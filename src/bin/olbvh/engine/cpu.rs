@@ -1,7 +1,7 @@
 //! The reference implementation as an engine.
 
 use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
-use olbvh::blocks::{InBlocks, Points};
+use olbvh::blocks::{InBlocks, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
@@ -13,8 +13,8 @@ use olbvh::reference::overlap::{Side, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
-use olbvh::render::{Bounds, RenderSettings};
-use olbvh::slicing::{Extrapolate, VoxelGrid, bands};
+use olbvh::render::Bounds;
+use olbvh::slicing::bands;
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -44,13 +44,13 @@ impl Engine for Cpu {
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
-        on_host(asked, memory, |tree| tree.locate(asked.points, field, &asked.how, report))
+        on_host((asked.mesh, &asked.options), memory, |tree| Ok(tree.locate(asked.points, field, &asked.how, report)))
     }
 
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
-        on_host(asked, memory, |tree| {
+        on_host((asked.mesh, &asked.options), memory, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
-            each(asked.points, |p| locator.owners(p), report)
+            Ok(each(asked.points, |p| locator.owners(p), report))
         })
     }
 
@@ -68,6 +68,28 @@ impl Engine for Cpu {
         report(1, 1);
         Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64(), trees: 2 })
     }
+
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
+        on_host((asked.mesh, &asked.options), memory, |tree| {
+            let scene = Scene::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
+            let picture = volume::render(&scene, report);
+            Ok(Drawn { picture, range: scene.range(), step: scene.plan().step })
+        })
+    }
+
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
+        let Stack { field, voxels, extrapolate, .. } = *asked;
+        on_host((asked.mesh, &asked.options), memory, |tree| {
+            let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
+            let mut done = 0;
+            for rows in bands(voxels, CHUNK as u64) {
+                sink(slicer.band(rows))?;
+                done += u64::from(rows.count) * u64::from(voxels.size[0]);
+                report(done, voxels.voxels());
+            }
+            Ok(())
+        })
+    }
 }
 
 /// A limit means nothing here.
@@ -78,10 +100,14 @@ fn no_memory(memory: Option<u64>) -> Result<()> {
 }
 
 /// An answer of the whole mesh.
-fn on_host<T>(asked: &Points<'_>, memory: Option<u64>, answer: impl FnOnce(&CpuTree<'_>) -> T) -> Result<InBlocks<T>> {
+fn on_host<T>(
+    (mesh, options): (&Mesh, &BuildOptions),
+    memory: Option<u64>,
+    answer: impl FnOnce(&CpuTree<'_>) -> Result<T>,
+) -> Result<InBlocks<T>> {
     no_memory(memory)?;
-    let tree = CpuTree::new(asked.mesh, &asked.options)?;
-    Ok(InBlocks { answer: answer(&tree), trees: 1, peak: 0, build_seconds: tree.summary.build_ms / 1e3 })
+    let tree = CpuTree::new(mesh, options)?;
+    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.summary.build_ms / 1e3 })
 }
 
 impl<'a> CpuTree<'a> {
@@ -132,23 +158,6 @@ impl<'a> CpuTree<'a> {
 impl Built for CpuTree<'_> {
     fn summary(&self) -> &Summary {
         &self.summary
-    }
-
-    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {
-        let scene = Scene::new(self.mesh, &self.topology, &self.tree, field, settings)?;
-        let picture = volume::render(&scene, report);
-        Ok(Drawn { picture, range: scene.range(), step: scene.plan().step })
-    }
-
-    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()> {
-        let slicer = Slicer::new(self.mesh, &self.topology, &self.tree, field, *voxels, extrapolate)?;
-        let mut done = 0;
-        for rows in bands(voxels, CHUNK as u64) {
-            sink(slicer.band(rows))?;
-            done += u64::from(rows.count) * u64::from(voxels.size[0]);
-            report(done, voxels.voxels());
-        }
-        Ok(())
     }
 }
 

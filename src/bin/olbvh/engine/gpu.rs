@@ -2,7 +2,7 @@
 
 use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, Points};
+use olbvh::blocks::{self, InBlocks, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
@@ -11,8 +11,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query;
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::volume::Picture;
-use olbvh::render::{Bounds, Prepared, RenderSettings};
-use olbvh::slicing::{Extrapolate, VoxelGrid};
+use olbvh::render::Bounds;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -49,13 +48,8 @@ fn cache_file() -> Option<PathBuf> {
     Some(folder.join("olbvh").join(concat!("pipelines-", env!("CARGO_PKG_VERSION"), ".bin")))
 }
 
-/// A mesh and its tree in device memory.
-struct DeviceTree<'a> {
-    mesh: &'a Mesh,
-    device: DeviceMesh,
-    tree: Tree,
-    summary: Summary,
-}
+/// A mesh and its tree, measured.
+struct Measured(Summary);
 
 impl Engine for Device {
     fn name(&self) -> String {
@@ -93,7 +87,7 @@ impl Engine for Device {
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
         };
-        Ok(Box::new(DeviceTree { mesh, device, tree, summary }))
+        Ok(Box::new(Measured(summary)))
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
@@ -114,32 +108,24 @@ impl Engine for Device {
         let seconds = start.elapsed().as_secs_f64() - found.build_seconds;
         Ok(Overlapped { overlap: found.answer.overlap, build_seconds: found.build_seconds, seconds, trees: found.trees })
     }
-}
 
-impl Built for DeviceTree<'_> {
-    fn summary(&self) -> &Summary {
-        &self.summary
-    }
-
-    fn render(&self, field: &Field, settings: &RenderSettings, report: Report<'_>) -> Result<Drawn> {
-        let neighbours = self.device.neighbours()?;
-        let valid = |tet: usize| self.summary.bad.binary_search_by_key(&(tet as u32), |b| b.0).is_err();
-        let Prepared { plan, normals, range, .. } = Prepared::new(settings, self.mesh, &self.summary.bounds, &neighbours, valid, field)?;
-        let normals = (!normals.is_empty()).then_some(normals.as_slice());
-        let drawn = query::render(&self.device, &self.tree, &plan, (&field.values, field.on), normals, report)?;
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
+        let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.apart();
         let [width, height] = plan.size;
         let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
         let pixels = rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
         let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
-        Ok(Drawn {
-            picture: Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms },
-            range,
-            step: plan.step,
-        })
+        let picture = Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms };
+        Ok(took.with(Drawn { picture, range, step: plan.step }))
     }
 
-    fn slice(&self, field: Option<&Field>, voxels: &VoxelGrid, extrapolate: Extrapolate, report: Report<'_>, sink: Sink<'_>) -> Result<()> {
-        let field = field.map(|f| (f.values.as_slice(), f.on));
-        query::slice(&self.device, &self.tree, field, voxels, extrapolate, report, sink).map(|_| ())
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
+        Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.apart().1)
+    }
+}
+
+impl Built for Measured {
+    fn summary(&self) -> &Summary {
+        &self.0
     }
 }

@@ -1,0 +1,192 @@
+//! Pictures in blocks, from the front to the back: of the two sides of a cut, the one that rays come from is drawn first, so each ray meets its blocks in
+//! order, and goes on in one where it stood after the last. A sample is taken by the block that has its cell. Between blocks, rays are in host memory.
+
+use super::cut::{Block, Placed, Source, least_bytes};
+use super::{InBlocks, LEAST, check_field, is_full, refusal};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::layout::Grid;
+use crate::mesh::{Field, Mesh, On};
+use crate::options::BuildOptions;
+use crate::query::{self, Canvas, Drawn, Rays};
+use crate::render::{Bounds, Plan, Prepared, RenderSettings};
+use rayon::prelude::*;
+
+/// A field of a mesh that may not fit the device.
+#[derive(Clone, Copy, Debug)]
+pub struct View<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// How its trees are built.
+    pub options: BuildOptions,
+    /// What is drawn.
+    pub field: &'a Field,
+    /// How it is drawn.
+    pub settings: &'a RenderSettings,
+}
+
+/// A picture, and what it shows.
+#[derive(Clone, Debug)]
+pub struct Picture {
+    /// Its colours.
+    pub drawn: Drawn,
+    /// What they are made by.
+    pub plan: Plan,
+    /// The field's values at the ends of the transfer function.
+    pub range: [f32; 2],
+}
+
+/// Draws a picture as [`query::render`] does, within `memory` bytes of device memory. `report` is told how much of how much is done.
+///
+/// # Errors
+/// As [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory is too little for the
+/// smallest of blocks.
+pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Picture>> {
+    let View { mesh, ref options, field, settings } = *asked;
+    check_field(mesh, Some((&field.values, field.on)))?;
+    let gpu = &gpu.with_memory(memory);
+    let mut took = InBlocks::default();
+    if least_bytes(gpu, mesh, options)? <= memory {
+        let placed = took.build(|| Placed::whole(gpu, mesh, options));
+        match placed.and_then(|placed| render_whole(&placed, asked, report)) {
+            Err(e) if is_full(&e) => log::info!("in blocks, since the whole does not fit: {e}"),
+            other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
+        }
+    }
+    let source = Source::new(mesh, options, memory)?;
+    // Light and opacity of a volume depend on what is on the surface, those of surfaces inside do not.
+    let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
+    let prepared = Prepared::new(settings, mesh, &bounds(&source.grid), &neighbours, |t| source.is_valid(t as u32), field)?;
+    drop(neighbours);
+    let mut rays = Rays::new(prepared.plan.size)?;
+    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, drawn: Drawn::default(), took };
+    let mut waiting = vec![(source.whole(), 1.0)];
+    let mut done = 0.0;
+    while let Some((block, share)) = waiting.pop() {
+        match job.visit(&block, &mut rays)? {
+            None => {
+                done += share;
+                report((done * 1e6) as u64, 1_000_000);
+            }
+            Some([near, far]) => waiting.extend([(far, share / 2.0), (near, share / 2.0)]),
+        }
+    }
+    let Job { drawn, took, .. } = job;
+    let drawn = Drawn { colors: rays.colors, ..drawn };
+    let Prepared { plan, range, .. } = prepared;
+    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { drawn, plan, range }))
+}
+
+fn render_whole(placed: &Placed, asked: &View<'_>, report: &dyn Fn(u64, u64)) -> Result<Picture> {
+    let (Placed { mesh, tree, .. }, View { field, settings, .. }) = (placed, asked);
+    let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
+    let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
+    let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
+    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &bounds(tree.grid()), &neighbours, valid, field)?;
+    drop(neighbours);
+    let normals = (!normals.is_empty()).then_some(normals.as_slice());
+    let drawn = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;
+    Ok(Picture { drawn, plan, range })
+}
+
+fn bounds(grid: &Grid) -> Bounds {
+    let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+    Bounds { lo: corner(grid.lo), hi: corner(grid.hi) }
+}
+
+/// A picture that is drawn in blocks.
+struct Job<'a> {
+    gpu: &'a Gpu,
+    memory: u64,
+    source: &'a Source<'a>,
+    field: &'a Field,
+    prepared: &'a Prepared,
+    drawn: Drawn,
+    took: InBlocks,
+}
+
+impl Job<'_> {
+    /// Draws a block, or cuts it: the nearer part, then the farther one.
+    fn visit(&mut self, block: &Block, rays: &mut Rays) -> Result<Option<[Block; 2]>> {
+        let met = self.rows_met(block, rays);
+        if !met.contains(&true) {
+            return Ok(None);
+        }
+        let need = block.bytes(self.gpu, &self.source.options)?;
+        let mut why = None;
+        if need <= self.memory {
+            match self.draw(block, &met, rays) {
+                Err(e) if is_full(&e) => why = Some(e),
+                other => return other.map(|()| None),
+            }
+        }
+        let order = |axis: usize, last: u32| low_first(&self.prepared.plan, &self.source.grid, axis, last);
+        let may = |axis: usize, last: u32| order(axis, last).is_some();
+        let halves = if block.tets.len() > LEAST { self.source.cut_in_two(block, &may) } else { None };
+        let Some([low, high]) = halves else { return Err(refusal(self.gpu, block.tets.len(), need, why)) };
+        let finest = low.cells.finest(self.source.level).hi;
+        let axis = (0..3).find(|&c| low.cells.hi[c] < high.cells.lo[c]).unwrap_or(0);
+        Ok(Some(if order(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
+    }
+
+    /// Draws what a block has of the picture. What is done if this fails is not done again by its parts.
+    fn draw(&mut self, block: &Block, met: &[bool], rays: &mut Rays) -> Result<()> {
+        let (Field { values, on, .. }, Prepared { plan, normals, .. }) = (self.field, self.prepared);
+        let placed = self.took.build(|| block.place(self.gpu, self.source))?;
+        let (values, normals) = (placed.values(values, *on), (!normals.is_empty()).then(|| placed.values(normals, On::Points)));
+        let canvas = Canvas::new(&placed.mesh, &placed.tree, plan, (&values, *on), normals.as_deref(), true)?;
+        let part = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;
+        let all = &mut self.drawn;
+        all.samples += part.samples;
+        all.skipped_samples += part.skipped_samples;
+        all.found_samples += part.found_samples;
+        all.ranges_ms += part.ranges_ms;
+        all.interval_ms += part.interval_ms;
+        all.march_ms += part.march_ms;
+        all.submissions += part.submissions;
+        log::debug!("a block of {} tetrahedra, {} samples", block.tets.len(), part.samples);
+        Ok(())
+    }
+
+    /// The rows of the picture with rays that may meet a block and are not opaque yet.
+    fn rows_met(&self, block: &Block, rays: &Rays) -> Vec<bool> {
+        let plan = &self.prepared.plan;
+        let [width, height] = plan.size;
+        let Some([lo, hi]) = block.bounds(self.source) else { return vec![false; height as usize] };
+        // More than rounding takes samples out of their cells.
+        let more = self.source.extent() / 1024.0;
+        let meets = |x: u32, y: u32| {
+            let (origin, way) = plan.rays.ray(x, y);
+            let mut reach = [0.0, f64::MAX];
+            for c in 0..3 {
+                let (from, way) = (f64::from(origin[c]), f64::from(way[c]));
+                let [a, b] = [lo[c] - more - from, hi[c] + more - from];
+                if way == 0.0 {
+                    reach[1] = if a <= 0.0 && 0.0 <= b { reach[1] } else { -1.0 };
+                } else {
+                    reach = [reach[0].max((a / way).min(b / way)), reach[1].min((a / way).max(b / way))];
+                }
+            }
+            reach[0] <= reach[1]
+        };
+        let seen = |x: u32, y: u32| rays.colors[(y as usize) * width as usize + x as usize][3] < plan.termination;
+        (0..height).into_par_iter().map(|y| (0..width).any(|x| seen(x, y) && meets(x, y))).collect()
+    }
+}
+
+/// Whether the cells up to `last` on an axis come before those behind it on all rays that meet both; `None` if on some they do, and on some they do not.
+fn low_first(plan: &Plan, grid: &Grid, axis: usize, last: u32) -> Option<bool> {
+    let [width, height] = plan.size;
+    // Cells are monotone along a ray, so where it begins and its direction tell what it can meet.
+    let goes = |x: u32, y: u32| {
+        let (origin, way) = plan.rays.ray(x, y);
+        let low = grid.quantize(origin)[axis] <= last;
+        [way[axis] > 0.0 && low, way[axis] < 0.0 && !low]
+    };
+    let either = |a: [bool; 2], b: [bool; 2]| [a[0] || b[0], a[1] || b[1]];
+    let row = |y: u32| (0..width).fold([false; 2], |all, x| either(all, goes(x, y)));
+    match (0..height).into_par_iter().map(row).reduce(|| [false; 2], either) {
+        [true, true] => None,
+        [_, down] => Some(!down),
+    }
+}

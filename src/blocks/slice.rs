@@ -1,0 +1,196 @@
+//! Slices in blocks. The centre of a voxel is looked for in the block that has its cell; where it lies in no tetrahedron, every block that the voxel's box
+//! reaches into names the closest of those that touch it in its own cells, and the closest of all counts. As many layers as host memory is given for share the
+//! trees, since a tree takes longer than a layer.
+
+use super::cut::{Block, Placed, Source, least_bytes};
+use super::{InBlocks, check_field, is_full, refusal, smaller};
+use crate::error::{Error, Result};
+use crate::gpu::Gpu;
+use crate::mesh::{Field, Mesh};
+use crate::options::BuildOptions;
+use crate::query::{self, Slicing};
+use crate::reference::separate::closest;
+use crate::reference::tet::sub;
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
+use rayon::prelude::*;
+use std::cell::Cell;
+use std::rc::Rc;
+
+/// Voxels that share the trees of a mesh in blocks, 9 bytes of host memory each.
+const BATCH: u64 = 1 << 24;
+
+/// A stack of layers through a mesh that may not fit the device.
+#[derive(Clone, Copy, Debug)]
+pub struct Stack<'a> {
+    /// The mesh.
+    pub mesh: &'a Mesh,
+    /// How its trees are built.
+    pub options: BuildOptions,
+    /// A field.
+    pub field: Option<&'a Field>,
+    /// The voxels.
+    pub voxels: &'a VoxelGrid,
+    /// What a touched voxel gets.
+    pub extrapolate: Extrapolate,
+}
+
+/// Slices a mesh as [`query::slice`] does, within `memory` bytes of device memory. Hands the voxels to `sink` band by band, in order; `report` is told how
+/// many are done.
+///
+/// # Errors
+/// As [`query::slice`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+pub fn slice(
+    gpu: &Gpu,
+    memory: u64,
+    asked: &Stack<'_>,
+    report: &dyn Fn(u64, u64),
+    sink: &mut dyn FnMut(Band) -> Result<()>,
+) -> Result<InBlocks<Tally>> {
+    let Stack { mesh, ref options, field, voxels, extrapolate } = *asked;
+    let values = field.map(|f| (f.values.as_slice(), f.on));
+    check_field(mesh, values)?;
+    let gpu = &gpu.with_memory(memory);
+    let mut took = InBlocks::default();
+    let tally = Cell::new(Tally::default());
+    let mut sink = |band: Band| {
+        let mut sum = tally.get();
+        sum.add(&band.kinds);
+        tally.set(sum);
+        sink(band)
+    };
+    if least_bytes(gpu, mesh, options)? <= memory {
+        let whole = took.build(|| Placed::whole(gpu, mesh, options));
+        let sliced = whole
+            .and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink).map(|_| ()));
+        match sliced {
+            Err(e) if is_full(&e) && tally.get() == Tally::default() => log::info!("in blocks, since the whole does not fit: {e}"),
+            other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
+        }
+    }
+    let source = Source::new(mesh, options, memory)?;
+    voxels.plan(&source.grid)?;
+    let mut job = Job { gpu, memory, asked, source: &source, blocks: vec![source.whole()], placed: None, took, done: 0.0, report };
+    for rows in bands(voxels, BATCH) {
+        sink(job.batch(rows)?)?;
+    }
+    let took = InBlocks { peak: gpu.memory_peak(), ..job.took };
+    Ok(took.with(tally.get()))
+}
+
+/// A stack that is sliced in blocks.
+struct Job<'a> {
+    gpu: &'a Gpu,
+    memory: u64,
+    asked: &'a Stack<'a>,
+    source: &'a Source<'a>,
+    /// What the mesh is cut into so far; the last one may be in device memory.
+    blocks: Vec<Block>,
+    placed: Option<(Rc<Vec<u32>>, Placed)>,
+    took: InBlocks,
+    /// Voxels, also where only some of the blocks have been asked.
+    done: f64,
+    report: &'a dyn Fn(u64, u64),
+}
+
+impl Job<'_> {
+    /// Slices these rows by all blocks that they meet. A block that does not fit after all is cut, and its parts are asked again, which changes nothing.
+    fn batch(&mut self, rows: Rows) -> Result<Band> {
+        let voxels = self.asked.voxels;
+        let n = rows.count as usize * voxels.size[0] as usize;
+        let mut all = Band { rows, values: vec![f32::NAN; n], kinds: vec![EMPTY; n], owners: vec![u32::MAX; n] };
+        let (begun, end) = (self.done, self.done + n as f64);
+        // From the last one on: it may be there already.
+        let blocks = std::mem::take(&mut self.blocks);
+        let share = n as f64 / blocks.len() as f64;
+        let mut waiting: Vec<(Block, f64)> = blocks.into_iter().map(|block| (block, share)).collect();
+        log::debug!("rows {rows:?} from {begun} voxels on");
+        while let Some((block, share)) = waiting.pop() {
+            let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
+            let need = if met { block.bytes(self.gpu, &self.source.options)? } else { 0 };
+            let tried = if !met {
+                Ok(())
+            } else if need <= self.memory {
+                self.visit(&block, &mut all)
+            } else {
+                Err(None)
+            };
+            match tried {
+                Err(Some(e)) if !is_full(&e) => return Err(e),
+                Err(why) => {
+                    let Some([low, high]) = smaller(self.source, &block) else {
+                        return Err(refusal(self.gpu, block.tets.len(), need, why));
+                    };
+                    waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
+                }
+                Ok(()) => {
+                    self.done += share;
+                    (self.report)(self.done as u64, voxels.voxels());
+                    self.blocks.push(block);
+                }
+            }
+        }
+        self.done = end;
+        Ok(all)
+    }
+
+    /// Asks a block.
+    fn visit(&mut self, block: &Block, all: &mut Band) -> Result<(), Option<Error>> {
+        let Stack { field, voxels, extrapolate, .. } = *self.asked;
+        let (grid, level) = (&self.source.grid, self.source.level);
+        self.placed.take_if(|(tets, _)| !Rc::ptr_eq(tets, &block.tets));
+        if self.placed.is_none() {
+            let placed = self.took.build(|| block.place(self.gpu, self.source))?;
+            self.placed = Some((block.tets.clone(), placed));
+        }
+        let (Some((_, placed)), Some(bounds)) = (&self.placed, block.bounds(self.source)) else { return Ok(()) };
+        let here = field.map(|f| (placed.values(&f.values, f.on), f.on));
+        let here = here.as_ref().map(|(values, on)| (&values[..], *on));
+        let mut slicing = Slicing::new(&placed.mesh, &placed.tree, here, (voxels, extrapolate), Some(block.cells.finest(level)))?;
+        let width = voxels.size[0] as usize;
+        let mut at = 0;
+        for rows in all.rows.parts(slicing.rows, voxels.size[1]) {
+            let n = rows.count as usize * width;
+            if voxels.meets(rows, bounds, grid) {
+                let mut band = slicing.band(rows)?;
+                band.owners.iter_mut().for_each(|t| *t = placed.tet(*t));
+                merge(self.source, voxels, all, at, &band);
+            }
+            at += n;
+        }
+        log::debug!("a block of {} tetrahedra", block.tets.len());
+        Ok(())
+    }
+}
+
+/// Adds what a block says of some voxels, from number `at` on.
+fn merge(source: &Source<'_>, voxels: &VoxelGrid, all: &mut Band, at: usize, band: &Band) {
+    let (width, height) = (voxels.size[0] as usize, voxels.size[1]);
+    let to = at..at + band.kinds.len();
+    let rows = all.kinds[to.clone()].par_chunks_mut(width).zip(all.owners[to.clone()].par_chunks_mut(width));
+    rows.zip(all.values[to].par_chunks_mut(width)).enumerate().for_each(|(row, ((kinds, owners), values))| {
+        let [y, layer] = band.rows.row(row as u32, height);
+        for x in 0..width {
+            let i = row * width + x;
+            let wins = match (kinds[x], band.kinds[i]) {
+                (INSIDE, _) | (_, EMPTY) => false,
+                (TOUCHED, TOUCHED) => is_closer(source, voxels.centre([x as u32, y, layer]), band.owners[i], owners[x]),
+                _ => true,
+            };
+            if wins {
+                (kinds[x], owners[x], values[x]) = (band.kinds[i], band.owners[i], band.values[i]);
+            }
+        }
+    });
+}
+
+/// Whether tetrahedron `t` is closer to a voxel's centre than `other`, as the kernel compares them.
+fn is_closer(source: &Source<'_>, centre: [f32; 3], t: u32, other: u32) -> bool {
+    let Source { mesh, grid, .. } = source;
+    let centre = grid.normalise(centre);
+    let square = |t: u32| {
+        let mut ids = mesh.tets[t as usize];
+        ids.sort_unstable();
+        closest(&ids.map(|v| sub(grid.normalise(mesh.points[v as usize]), centre))).square
+    };
+    t != other && (square(t), t) < (square(other), other)
+}
