@@ -3,7 +3,7 @@
 //! ```text
 //! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits   (once per mesh)
 //! 1 depth    estimate per tetrahedron → level l                                                            Eq. 11–12
-//! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds] · emit (code, primitive) · stable radix sort    Eq. 1–6
+//! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds · fit] · emit (code, primitive) · stable radix sort    Eq. 1–6
 //! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
 //! 4 leaves   boundary flags, halves of the entries, octants, boxes                                          Alg. 1
 //!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
