@@ -62,8 +62,8 @@ impl BuildScratch {
 }
 
 /// Records a whole build within `capacity`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
-/// more entries, a coarser one is built, down to the root alone, which every capacity that [`BuildScratch::carve`] took has room for; `tree.status` says
-/// what was, and of a budget that is too small for the root that nothing was.
+/// more entries, a coarser one is built, down to the root alone, which has no more entries than there are tetrahedra; `tree.status` says what was, and that
+/// nothing was where a budget or [`Capacity::entries`] is too small for the root.
 ///
 /// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
 /// write, behind it stands a barrier to compute, transfer and indirect reads.

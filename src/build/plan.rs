@@ -13,7 +13,7 @@ pub struct Capacity {
     /// filtered.
     pub candidates: u32,
     /// Entries of the assignment and the lists chosen. Where there is room for fewer than for candidates, a recorded build filters, counts, and filters the
-    /// next coarser level until they fit, which for each level down to the root's takes 17 dispatches, empty ones where they fit at once. One entry per
+    /// next coarser level until they fit, which for each level down to the root's takes up to 17 dispatches, empty ones where they fit at once. One entry per
     /// tetrahedron is enough for a tree, whatever the mesh.
     pub entries: u32,
     /// Nodes.

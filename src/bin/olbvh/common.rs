@@ -78,7 +78,9 @@ impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         let message = match &error {
             Error::Memory { .. } => {
-                format!("{error}; meshes that do not fit are taken in blocks by `locate`, `render`, `slice` and `overlap`")
+                format!(
+                    "{error}; `locate`, `render`, `slice` and `overlap` take meshes that do not fit in blocks, smaller ones with a smaller --memory"
+                )
             }
             _ => error.to_string(),
         };
