@@ -32,7 +32,8 @@ RenderView view;
 RenderPlan plan;
 #include "shared/skip.glsl"
 
-const uint WALK = 6u; // steps of a walk across faces before the structure is asked
+const uint WALK = 6u;   // steps of a walk across faces before the structure is asked
+const uint BURST = 32u; // passes before rays that wait for the structure are served
 
 // The ray, and where it stands.
 vec3 origin, way, halfway;
@@ -140,10 +141,14 @@ void add_surfaces(uint k, float before, float value) {
     }
 }
 
+// Whether the tree is to be asked first how far there is nothing to see.
+bool is_to_look() { return SKIP != 0u && state.next >= state.check; }
+
 void pass_by() {
     state.last = NONE;
     state.next += ahead;
     skipped += ahead - 1u;
+    ahead = 1u;
     ++samples;
 }
 
@@ -188,15 +193,28 @@ void main() {
             halfway = unit;
         }
         vec3 inverse_way = SKIP != 0u ? inverse_of(way) : vec3(0.0);
-        bool stands = state.hint != NONE;
+        bool stands = state.hint != NONE && state.cursor == 0u;
         if (stands) enter(state.hint);
+        ahead = 1u;
         uint misses = 0u; // steps of the walk to the next sample
         uint known = state.check >> 30u; // of the best candidate
         state.check &= 0x3fffffffu;
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
-            ahead = 1u;
+            // As far as the walk leads, without a look at the tree: a pass is a sample, after a step if one is needed.
+            for (uint pass = 0u; pass < BURST && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
+                vec3 x = normalise(g, sample_at(view, origin, way, state.next));
+                Sides sides = sides_of(stand, x);
+                if (!sides.clear) {
+                    stands = ++misses < WALK && go_on(sides);
+                    if (stands) sides = sides_of(stand, x);
+                }
+                if (stands && sides.clear) {
+                    misses = 0u;
+                    take(sides);
+                }
+            }
 #ifndef BINARY_TREE
-            if (SKIP != 0u && state.next >= state.check) {
+            if (state.next < state.end && is_to_look()) {
                 bool hidden;
                 uint behind = stretch_end(g, origin, way, inverse_way, state.next, state.end, hidden);
                 if (!hidden) {
@@ -204,31 +222,17 @@ void main() {
                 } else if (ISO != 0u) {
                     // The stretch is on one side of every surface: its first and its last sample tell all.
                     ahead = max(behind - state.next, 2u) - 1u;
+                    state.check = state.next + 1u;
                 } else {
                     stands = stands && behind - state.next < WALK;
                     skipped += behind - state.next;
                     state.next = behind;
-                    continue;
                 }
             }
 #endif
+            if (stands || state.next >= state.end || is_to_look()) continue;
             vec3 at = sample_at(view, origin, way, state.next);
             vec3 x = normalise(g, at);
-            // The cell of the last sample, or one a few steps away, if it holds the sample clearly.
-            if (stands && state.cursor == 0u) {
-                Sides sides = sides_of(stand, x);
-                if (!sides.clear) {
-                    stands = ++misses < WALK && go_on(sides);
-                    if (stands) sides = sides_of(stand, x);
-                }
-                if (stands) {
-                    if (sides.clear) {
-                        misses = 0u;
-                        take(sides);
-                    }
-                    continue;
-                }
-            }
             misses = 0u;
             uint owner = NONE;
             // Outside of the bounds there is nothing to ask for.
@@ -249,6 +253,7 @@ void main() {
                 pass_by();
             }
         }
+        if (ahead > 1u) state.check = state.next; // to be found out again
         state.check |= known << 30u;
         state.hint = stands ? stand.t : NONE;
         unfinished = uint(state.next < state.end);
