@@ -37,6 +37,7 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint NONE = OLBVH_NONE;
+#include "shared/records.glsl"
 #include "shared/layout.glsl"
 
 OLBVH_BUFFER(0, 8, SceneAddresses, scene)
@@ -91,7 +92,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, sought_at(g, place, x, tolerance));
     uint owner = decide(best, leaf, tolerance);
     if (owner == NONE) return NONE;
-    Tet tet = load_tet(cells.at[owner]);
+    Tet tet = load_tet(words(cells.at[owner]));
     weights_of_owner = barycentric(weights(tet, x), tet.rank);
     return owner;
 }
@@ -115,7 +116,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
         uint t = by_walk ? star[i] : listed_tet(i);
-        if (!weights(load_tet(cells.at[t]), x).inside) continue;
+        if (!weights(load_tet(words(cells.at[t])), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
     }
@@ -124,14 +125,14 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
 
 // Value of the field, which has one value per point of the mesh, in a tetrahedron.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
-    uvec4 v = cells.at[owner];
+    uvec4 v = words(cells.at[owner]);
     return dot(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
 }
 
 // Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
 vec3 olbvh_gradient(uint owner) {
-    uvec4 v = cells.at[owner];
-    vec3 a = vertices.at[v.x].xyz, e1 = vertices.at[v.y].xyz - a, e2 = vertices.at[v.z].xyz - a, e3 = vertices.at[v.w].xyz - a;
+    uvec4 v = words(cells.at[owner]);
+    vec3 a = floats(vertices.at[v.x]).xyz, e1 = floats(vertices.at[v.y]).xyz - a, e2 = floats(vertices.at[v.z]).xyz - a, e3 = floats(vertices.at[v.w]).xyz - a;
     // Normalised coordinates lie in [0, 2^41).
     const float UNIT = 1.0 / 1099511627776.0;
     e1 *= UNIT;

@@ -37,6 +37,20 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint olbvh_NONE = OLBVH_NONE;
+// Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
+// many fetches (OLBVH_WIDE).
+#if defined(OLBVH_WIDE) && !defined(OLBVH_GLSL)
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#define FLOATS u64vec2
+#define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
+uvec4 olbvh_words(u64vec2 record) { return uvec4(unpack32(record.x), unpack32(record.y)); }
+vec4 olbvh_floats(u64vec2 record) { return uintBitsToFloat(olbvh_words(record)); }
+#else
+#define FLOATS vec4
+#define RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
+uvec4 olbvh_words(uvec4 record) { return record; }
+vec4 olbvh_floats(vec4 record) { return record; }
+#endif
 // Every struct that host and device share; build.rs reflects this file into src/layout.rs, comments included.
 
 // The grid of a mesh (SPEC 2.1).
@@ -278,10 +292,10 @@ bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid, clamped into the grid.
+// Cell of the finest grid, clamped into the grid. By signed integers, since drivers for CPUs convert to unsigned ones lane by lane.
 uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     precise vec3 q = floor(olbvh_from_corner(g, x) * g.inv.xyz);
-    return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
+    return uvec3(ivec3(clamp(q, vec3(0.0), vec3(1023.0))));
 }
 
 // A finest cell in one word.
@@ -518,7 +532,7 @@ uvec2 olbvh_entry_range(uint leaf) {
 // Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
 
 olbvh_Tet olbvh_load_tet(uvec4 ids) {
-    return olbvh_make_tet(ids, olbvh_vertices.at[ids.x].xyz, olbvh_vertices.at[ids.y].xyz, olbvh_vertices.at[ids.z].xyz, olbvh_vertices.at[ids.w].xyz);
+    return olbvh_make_tet(ids, olbvh_floats(olbvh_vertices.at[ids.x]).xyz, olbvh_floats(olbvh_vertices.at[ids.y]).xyz, olbvh_floats(olbvh_vertices.at[ids.z]).xyz, olbvh_floats(olbvh_vertices.at[ids.w]).xyz);
 }
 
 // The halves of its leaf's cell that an entry is near to, per axis: bit 2 c the lower one along axis c, bit 2 c + 1 the upper. They stand in the
@@ -569,8 +583,8 @@ olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
 
 // Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
 bool olbvh_is_near(uvec4 ids, olbvh_Sought s) {
-    uvec3 a = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.x].w)), b = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.y].w));
-    uvec3 c = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.z].w)), d = olbvh_unpack_cell(floatBitsToUint(olbvh_vertices.at[ids.w].w));
+    uvec3 a = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.x]).w)), b = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.y]).w));
+    uvec3 c = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.z]).w)), d = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.w]).w));
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 
@@ -604,7 +618,7 @@ uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) {
     uint ids = olbvh_grid.at[0].ids, count = min(32u, end - begin), left = 0u, olbvh_near = 0u;
     for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] >> olbvh_ID_BITS & s.halves) == s.halves) << k;
     for (; left != 0u; left &= left - 1u) {
-        if (olbvh_is_near(olbvh_cells.at[olbvh_p.at[begin + findLSB(left)] & ids], s)) olbvh_near |= left & -left;
+        if (olbvh_is_near(olbvh_words(olbvh_cells.at[olbvh_p.at[begin + findLSB(left)] & ids]), s)) olbvh_near |= left & -left;
     }
     return olbvh_near;
 }
@@ -614,7 +628,7 @@ void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
     for (; begin < end && !best.inside; begin += 32u) {
         for (uint olbvh_near = olbvh_near_among(begin, end, s); olbvh_near != 0u && !best.inside; olbvh_near &= olbvh_near - 1u) {
             uint t = olbvh_listed_tet(begin + findLSB(olbvh_near));
-            olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+            olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
             olbvh_consider(best, t, tet, olbvh_weights(tet, s.x));
         }
     }
@@ -675,10 +689,10 @@ olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uv
 olbvh_Stand olbvh_stand_in(uint t) {
     olbvh_Stand s;
     s.t = t;
-    s.cell = olbvh_cells.at[t];
+    s.cell = olbvh_words(olbvh_cells.at[t]);
     uvec4 rank = olbvh_ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
-    vec3 a = olbvh_vertices.at[s.ids.x].xyz, b = olbvh_vertices.at[s.ids.y].xyz, c = olbvh_vertices.at[s.ids.z].xyz, d = olbvh_vertices.at[s.ids.w].xyz;
+    vec3 a = olbvh_floats(olbvh_vertices.at[s.ids.x]).xyz, b = olbvh_floats(olbvh_vertices.at[s.ids.y]).xyz, c = olbvh_floats(olbvh_vertices.at[s.ids.z]).xyz, d = olbvh_floats(olbvh_vertices.at[s.ids.w]).xyz;
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
@@ -719,9 +733,9 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     s.t = olbvh_neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
     if (s.t == olbvh_NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
-    s.cell = olbvh_cells.at[s.t];
+    s.cell = olbvh_words(olbvh_cells.at[s.t]);
     e.fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
-    vec3 v = olbvh_vertices.at[e.fresh].xyz;
+    vec3 v = olbvh_floats(olbvh_vertices.at[e.fresh]).xyz;
     e.before = lessThan(uvec3(e.fresh), olbvh_kept(s.ids, e.beyond));
     s.ids = olbvh_exchange(s.ids, e, e.fresh);
     s.x = olbvh_exchange(s.x, e, v.x);
@@ -741,7 +755,7 @@ uint olbvh_owner_at_face(olbvh_Stand s, vec3 x) {
     olbvh_Weights here = olbvh_weights(tet, x);
     uint u = olbvh_near_one_face(here) ? olbvh_neighbours.at[s.t][olbvh_outermost(olbvh_own_weights(here, tet))] : olbvh_NONE;
     if (u == olbvh_NONE) return olbvh_NONE;
-    olbvh_Weights there = olbvh_weights(olbvh_load_tet(olbvh_cells.at[u]), x);
+    olbvh_Weights there = olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x);
     // The face weighs the same from either side.
     if (!olbvh_near_one_face(there) || olbvh_least_of(there.w) != -olbvh_least_of(here.w)) return olbvh_NONE;
     return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : olbvh_NONE;
@@ -787,7 +801,7 @@ void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
-        if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_cells.at[u]), x))) olbvh_star[olbvh_star_size++] = u;
+        if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
     }
 }
 
@@ -797,7 +811,7 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
     olbvh_star_size = 1u;
     for (uint i = 0u; i < olbvh_star_size; ++i) {
         uint t = olbvh_star[i];
-        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
         olbvh_consider(best, t, tet, w);
         olbvh_grow_star(t, tet, w, x);
@@ -809,7 +823,7 @@ bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best
 // Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
 bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout olbvh_Best best) {
     for (; s < olbvh_STEPS; ++s) {
-        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
         if (w.clear) best = olbvh_Best(t, true, true, 0.0);
         if (w.clear || (olbvh_near(w) && !leave)) return !w.clear;
@@ -826,7 +840,7 @@ bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout ol
 uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
     uint from = olbvh_NONE;
     for (uint s = 0u; s < olbvh_LEG; ++s) {
-        olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[t]);
+        olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
         uvec4 beside = olbvh_neighbours.at[t];
         float first = 3.40282347e38;
@@ -939,7 +953,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, olbvh_sought_at(g, place, x, tolerance));
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
-    olbvh_Tet tet = olbvh_load_tet(olbvh_cells.at[owner]);
+    olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[owner]));
     weights_of_owner = olbvh_barycentric(olbvh_weights(tet, x), tet.rank);
     return owner;
 }
@@ -963,7 +977,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     uint n = 0u;
     for (uint i = range.x; i < range.y; ++i) {
         uint t = by_walk ? olbvh_star[i] : olbvh_listed_tet(i);
-        if (!olbvh_weights(olbvh_load_tet(olbvh_cells.at[t]), x).inside) continue;
+        if (!olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[t])), x).inside) continue;
         if (n < OLBVH_OWNERS) owners[n] = t;
         ++n;
     }
@@ -972,14 +986,14 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
 
 // Value of the field, which has one value per point of the mesh, in a tetrahedron.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
-    uvec4 v = olbvh_cells.at[owner];
+    uvec4 v = olbvh_words(olbvh_cells.at[owner]);
     return dot(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
 }
 
 // Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
 vec3 olbvh_gradient(uint owner) {
-    uvec4 v = olbvh_cells.at[owner];
-    vec3 a = olbvh_vertices.at[v.x].xyz, e1 = olbvh_vertices.at[v.y].xyz - a, e2 = olbvh_vertices.at[v.z].xyz - a, e3 = olbvh_vertices.at[v.w].xyz - a;
+    uvec4 v = olbvh_words(olbvh_cells.at[owner]);
+    vec3 a = olbvh_floats(olbvh_vertices.at[v.x]).xyz, e1 = olbvh_floats(olbvh_vertices.at[v.y]).xyz - a, e2 = olbvh_floats(olbvh_vertices.at[v.z]).xyz - a, e3 = olbvh_floats(olbvh_vertices.at[v.w]).xyz - a;
     // Normalised coordinates lie in [0, 2^41).
     const float UNIT = 1.0 / 1099511627776.0;
     e1 *= UNIT;

@@ -36,6 +36,7 @@ pub struct Host {
     allocator: Option<Arc<Mutex<Allocator>>>,
     pub debug: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT, Box<Messages>)>,
     pub addresses: bool,
+    pub int64: bool,
     pub size_control: bool,
 }
 
@@ -78,7 +79,7 @@ impl Host {
             let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(addresses);
             let mut control =
                 vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
-            let features = vk::PhysicalDeviceFeatures::default().shader_clip_distance(true);
+            let features = vk::PhysicalDeviceFeatures::default().shader_clip_distance(true).shader_int64(wanted.shader_int64);
             let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&names);
             info = info.enabled_features(&features).push_next(&mut address);
             if size_control {
@@ -95,7 +96,19 @@ impl Host {
                 allocation_sizes: gpu_allocator::AllocationSizes::default(),
             })?;
             let allocator = Some(Arc::new(Mutex::new(allocator)));
-            Ok(Self { _entry: entry, instance, physical, device, family, queue, allocator, debug, addresses, size_control })
+            Ok(Self {
+                _entry: entry,
+                instance,
+                physical,
+                device,
+                family,
+                queue,
+                allocator,
+                debug,
+                addresses,
+                int64: wanted.shader_int64,
+                size_control,
+            })
         }
     }
 

@@ -45,6 +45,7 @@ fn main() -> Result<()> {
         pipeline_cache: None,
         enabled: Enabled {
             buffer_addresses: host.addresses,
+            shader_int64: host.int64,
             subgroup_size_control: host.size_control,
             debug_utils: host.debug.is_some(),
             ..Enabled::default()

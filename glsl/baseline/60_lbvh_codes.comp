@@ -9,7 +9,7 @@ ARGUMENTS(6)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, writeonly, uint, codes)
 BUFFER(5, writeonly, uint, ids)
@@ -21,7 +21,7 @@ void main() {
     if (t >= tets) return;
     uint code = 1u << 30;
     if (!is_bad(t)) {
-        uvec4 v = cells.at[t];
+        uvec4 v = words(cells.at[t]);
         vec3 a = position(v.x, stride), b = position(v.y, stride), c = position(v.z, stride), d = position(v.w, stride);
         precise vec3 middle = min(min(a, b), min(c, d)) * 0.5 + max(max(a, b), max(c, d)) * 0.5;
         code = morton(quantize(grid.at[0], middle));

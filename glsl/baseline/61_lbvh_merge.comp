@@ -7,8 +7,8 @@
 ARGUMENTS(9)
     uint tets;
 END_ARGUMENTS
-BUFFER16(0, readonly, vec4, vertices)
-BUFFER16(1, readonly, uvec4, cells)
+RECORDS(0, vec4, vertices)
+RECORDS(1, uvec4, cells)
 BUFFER(2, readonly, uint, boundary)
 BUFFER(3, readonly, uint, codes)
 BUFFER(4, readonly, uint, ids)

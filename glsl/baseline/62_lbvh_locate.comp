@@ -15,8 +15,8 @@ BUFFER16(1, readonly, LbvhNode, nodes)
 BUFFER(2, readonly, uint, root)
 BUFFER(3, readonly, uint, ids)
 BUFFER(4, readonly, uint, boundary)
-BUFFER16(5, readonly, uvec4, cells)
-BUFFER16(6, readonly, vec4, vertices)
+RECORDS(5, uvec4, cells)
+RECORDS(6, vec4, vertices)
 BUFFER(7, readonly, float, points)
 BUFFER(8, READ_WRITE, uint, owners)
 BUFFER16(9, READ_WRITE, uvec4, barycentrics) // of points not done: all ones, where to go on, what is known of the best candidate
@@ -39,7 +39,7 @@ void main() {
         if (find_owner(s, g, at, x, tolerance, work, budget, owner)) {
             vec4 b = vec4(0.0);
             if (owner != NONE) {
-                Tet tet = load_tet(cells.at[owner]);
+                Tet tet = load_tet(words(cells.at[owner]));
                 b = barycentric(weights(tet, x), tet.rank);
             }
             state = floatBitsToUint(b);

@@ -8,8 +8,8 @@ layout(constant_id = 2) const uint FILL = 0;
 ARGUMENTS(8)
     uint tets;
 END_ARGUMENTS
-BUFFER16(0, readonly, vec4, vertices)
-BUFFER16(1, readonly, uvec4, cells)
+RECORDS(0, vec4, vertices)
+RECORDS(1, uvec4, cells)
 BUFFER(2, readonly, uint, bad)
 BUFFER16(3, readonly, uvec4, neighbours)
 BUFFER(4, READ_WRITE, uint, places)  // FILL 0: faces of each tetrahedron; FILL 1: number of the first
@@ -23,13 +23,13 @@ void main() {
     if (t < tets) {
         uint place = FILL != 0u ? places.at[t] : 0u;
         if ((bad.at[t >> 5u] >> (t & 31u) & 1u) == 0u) {
-            uvec4 v = cells.at[t], across = neighbours.at[t];
+            uvec4 v = words(cells.at[t]), across = neighbours.at[t];
             for (uint f = 0u; f < 4u; ++f) {
                 if (across[f] != NONE && across[f] < t) continue;
                 if (FILL != 0u) {
                     uvec3 face = f == 0u ? v.yzw : f == 1u ? v.xzw : f == 2u ? v.xyw : v.xyz;
-                    vec3 a = vertices.at[face.x].xyz, b = vertices.at[face.y].xyz, c = vertices.at[face.z].xyz;
-                    bool turned = orient(a, b, c, vertices.at[v[f]].xyz) < 0.0;
+                    vec3 a = floats(vertices.at[face.x]).xyz, b = floats(vertices.at[face.y]).xyz, c = floats(vertices.at[face.z]).xyz;
+                    bool turned = orient(a, b, c, floats(vertices.at[v[f]]).xyz) < 0.0;
                     indices.at[3u * place] = face.x;
                     indices.at[3u * place + 1u] = turned ? face.z : face.y;
                     indices.at[3u * place + 2u] = turned ? face.y : face.z;
@@ -37,7 +37,7 @@ void main() {
                 }
                 ++place;
             }
-            vec3 a = vertices.at[v.x].xyz, b = vertices.at[v.y].xyz, c = vertices.at[v.z].xyz, d = vertices.at[v.w].xyz;
+            vec3 a = floats(vertices.at[v.x]).xyz, b = floats(vertices.at[v.y]).xyz, c = floats(vertices.at[v.z]).xyz, d = floats(vertices.at[v.w]).xyz;
             vec3 size = max(max(a, b), max(c, d)) - min(min(a, b), min(c, d));
             reach = floatBitsToUint(size.x + size.y + size.z);
         }

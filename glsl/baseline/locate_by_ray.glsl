@@ -12,8 +12,8 @@ END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 ALIGNED_BUFFER(8, 1, readonly, uvec2, sides)
 BUFFER(2, readonly, uint, longest)
-BUFFER16(3, readonly, uvec4, cells)
-BUFFER16(4, readonly, vec4, vertices)
+RECORDS(3, uvec4, cells)
+RECORDS(4, vec4, vertices)
 BUFFER(5, readonly, float, points)
 BUFFER(6, writeonly, uint, owners)
 BUFFER16(7, writeonly, vec4, barycentrics)
@@ -40,7 +40,7 @@ void locate(uint i) {
             pair = face.y != 0u ? pair.xy : pair.yx;
             for (uint side = 0u; side < 2u && owner == NONE; ++side) {
                 if (pair[side] == NONE) continue;
-                Tet tet = load_tet(cells.at[pair[side]]);
+                Tet tet = load_tet(words(cells.at[pair[side]]));
                 Weights w = weights(tet, x);
                 if (!w.inside) continue;
                 owner = pair[side];

@@ -11,7 +11,7 @@ ARGUMENTS(4)
     uint groups;  // workgroups of this dispatch; each invocation takes every (groups * WORKGROUP)-th tetrahedron
 END_ARGUMENTS
 BUFFER(0, readonly, float, positions)
-BUFFER16(1, readonly, uvec4, cells)
+RECORDS(1, uvec4, cells)
 BUFFER(2, READ_WRITE, uint, bad) // one bit per tetrahedron, zeroed
 BUFFER(3, READ_WRITE, MeshStatus, status)
 
@@ -28,7 +28,7 @@ void main() {
     uvec3 lo = uvec3(0u), hi = uvec3(0u);
     uint bad_cells = 0u;
     for (uint t = item_index(); t < tets; t += groups * WORKGROUP) {
-        uvec4 v = cells.at[t];
+        uvec4 v = words(cells.at[t]);
         bool ok = max(max(v.x, v.y), max(v.z, v.w)) < points && v.x != v.y && v.x != v.z && v.x != v.w && v.y != v.z && v.y != v.w && v.z != v.w;
         uvec3 tl = uvec3(0u), th = uvec3(0u);
         for (uint i = 0u; ok && i < 4u; ++i) {

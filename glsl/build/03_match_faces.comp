@@ -11,8 +11,8 @@ ARGUMENTS(7)
     uint slots;      // of the table
     uint near_slots; // of a vertex
 END_ARGUMENTS
-BUFFER16(0, readonly, vec4, vertices)
-BUFFER16(1, readonly, uvec4, cells)
+RECORDS(0, vec4, vertices)
+RECORDS(1, uvec4, cells)
 BUFFER(2, readonly, uint, bad)
 BUFFER(3, READ_WRITE, uint, table) // faces, or NONE; filled with NONE
 BUFFER(4, READ_WRITE, uint, mates) // filled with NONE, which is ALONE
@@ -44,8 +44,8 @@ void main() {
     bool live = t < tets && (bad.at[min(t, tets - 1u) >> 5u] >> (t & 31u) & 1u) == 0u;
     uint without_volume = 0u, negative = 0u;
     if (live) {
-        uvec4 ids = cells.at[t];
-        Tet tet = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+        uvec4 ids = words(cells.at[t]);
+        Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
         float vol = volume(tet);
         // The sign in the caller's order follows from the parity of the permutation.
         uvec4 r = tet.rank;
@@ -70,7 +70,7 @@ void main() {
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
                 uint other_face = other & ~SIDE;
-                if (face_of(cells.at[other_face >> 2], other_face & 3u) == face) {
+                if (face_of(words(cells.at[other_face >> 2]), other_face & 3u) == face) {
                     if (atomicCompSwap(mates.at[other_face], NONE, me) == NONE) {
                         mates.at[4u * t + f] = other;
                     } else {

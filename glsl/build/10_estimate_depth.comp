@@ -10,7 +10,7 @@ ARGUMENTS(5)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, READ_WRITE, BuildStatus, status)
 #include "shared/positions.glsl"
@@ -33,7 +33,7 @@ void main() {
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
     for (uint t = item_index(); t < tets; t += groups * WORKGROUP) {
         if (is_bad(t)) continue;
-        uvec4 ids = cells.at[t];
+        uvec4 ids = words(cells.at[t]);
         vec3 lo = position(ids.x, stride), hi = lo;
         for (uint i = 1u; i < 4u; ++i) {
             vec3 p = position(ids[i], stride);

@@ -11,7 +11,7 @@ ARGUMENTS(6)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, writeonly, uint, counts) // tets + 1
 BUFFER(5, writeonly, uint, marks)  // one bit per cell of the level

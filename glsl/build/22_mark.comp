@@ -12,9 +12,9 @@ ARGUMENTS(9)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-BUFFER16(4, readonly, vec4, vertices)
+RECORDS(4, vec4, vertices)
 BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
 BUFFER(6, readonly, uint, shares)  // their number
 BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves; zeroed
@@ -34,7 +34,7 @@ void mark(Grid g, uint t, uint first) {
     CellBox box = coarser(finest_box(t), g.level);
     uvec3 at = first_candidate(box, first);
     Filter cell_filter;
-    if (ASSIGN != 0u) cell_filter = make_filter(load_tet(cells.at[t]), g, g.level, ASSIGN);
+    if (ASSIGN != 0u) cell_filter = make_filter(load_tet(words(cells.at[t])), g, g.level, ASSIGN);
     uint run;
     for (uint n = candidates_of(box, first); n > 0u; n -= run) {
         run = min(n, box.lo.x + box.size.x - at.x);

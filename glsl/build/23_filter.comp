@@ -14,9 +14,9 @@ ARGUMENTS(13)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-BUFFER16(4, readonly, vec4, vertices)
+RECORDS(4, vec4, vertices)
 BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
 BUFFER(6, readonly, uint, shares)  // their number
 BUFFER(7, writeonly, uint, hits)   // one bit per candidate
@@ -47,7 +47,7 @@ void main() {
         return;
     }
     uvec3 at = first_candidate(box, share.first);
-    Tet tet = load_tet(cells.at[t]);
+    Tet tet = load_tet(words(cells.at[t]));
     vec3 h = half_cell(g, g.level);
     uint bits = low_bits(n), centres = 0u;
     if (LISTS != 0u) {

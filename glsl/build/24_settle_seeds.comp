@@ -11,9 +11,9 @@ ARGUMENTS(12)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-BUFFER16(4, readonly, vec4, vertices)
+RECORDS(4, vec4, vertices)
 BUFFER(5, readonly, uint, offsets)
 BUFFER(6, READ_WRITE, uint, hits)
 BUFFER(7, READ_WRITE, uint, counts)
@@ -36,7 +36,7 @@ bool owns_centre(uint t, Weights own, vec3 centre) {
     star_size = 1u;
     for (uint i = 0u; i < star_size; ++i) {
         uint u = star[i];
-        Tet other = load_tet(cells.at[u]);
+        Tet other = load_tet(words(cells.at[u]));
         Weights w = weights(other, centre);
         if (w.inside && u < beaten_below) return false;
         grow_star(u, other, w, centre);
@@ -52,7 +52,7 @@ void main() {
     Grid g = grid.at[0];
     CellBox box = coarser(finest_box(share.t), g.level);
     uvec3 at = first_candidate(box, share.first);
-    Tet tet = load_tet(cells.at[share.t]);
+    Tet tet = load_tet(words(cells.at[share.t]));
     vec3 h = half_cell(g, g.level);
     uint marked, centres, bits = hits.at[share.index], i = 0u;
     sift(g.level, box, at, candidates_of(box, share.first), centres_of(tet, h, box), marked, centres);

@@ -10,7 +10,7 @@ ARGUMENTS(10)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, offsets) // of the shares
 BUFFER(5, readonly, uint, shares)

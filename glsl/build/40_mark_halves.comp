@@ -11,7 +11,7 @@ BUFFER(0, readonly, uint, entries)
 BUFFER16(1, READ_WRITE, Grid, grid)
 BUFFER(2, readonly, BuildStatus, status)
 BUFFER(3, readonly, uint, codes)
-BUFFER16(4, readonly, uvec4, cells)
+RECORDS(4, uvec4, cells)
 BUFFER16(5, readonly, uvec4, quantized) // the vertices, of which the last word is the finest cell
 BUFFER(6, READ_WRITE, uint, p)
 #include "shared/halves.glsl"
@@ -22,7 +22,7 @@ void main() {
     if (first >= n || status.at[0].overflow != 0u) return;
     Grid g = grid.at[0];
     for (uint i = first; i < min(n, first + ROWS); ++i) {
-        uvec4 ids = cells.at[p.at[i]];
+        uvec4 ids = words(cells.at[p.at[i]]);
         uvec3 lo = uvec3(1023u), hi = uvec3(0u);
         for (uint k = 0u; k < 4u; ++k) {
             uvec3 q = unpack_cell(quantized.at[ids[k]].w);

@@ -21,8 +21,8 @@ BUFFER(3, READ_WRITE, uint, flags)
 BUFFER(4, READ_WRITE, BuildStatus, status)
 BUFFER(5, writeonly, float, boxes) // 6 per node: lo, hi
 BUFFER(6, readonly, uint, p)
-BUFFER16(7, readonly, uvec4, cells)
-BUFFER16(8, readonly, vec4, vertices)
+RECORDS(7, uvec4, cells)
+RECORDS(8, vec4, vertices)
 BUFFER(9, readonly, uint, marks)
 BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/marks.glsl"
@@ -36,8 +36,8 @@ bool touched(Grid g, uint begin, uint end, uint code) {
     vec3 h = half_cell(g, g.level), centre = cell_centre(h, unmorton(code));
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
     for (uint i = begin; i < min(end, begin + ASKED); ++i) {
-        uvec4 ids = cells.at[p.at[i]];
-        Tet t = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+        uvec4 ids = words(cells.at[p.at[i]]);
+        Tet t = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
         vec3 v[4];
         for (uint k = 0u; k < 4u; ++k) v[k] = difference(t.v[k], centre);
         if (box_touches(v, axes, vec3(0.0))) return true;

@@ -11,7 +11,7 @@ ARGUMENTS(9)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
-BUFFER16(2, readonly, uvec4, cells)
+RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, field) // one float per point or tetrahedron, as bits
 BUFFER(5, readonly, uint, masks)
@@ -28,7 +28,7 @@ bool is_finite(uint bits) { return (bits & 0x7f800000u) != 0x7f800000u; }
 void main() {
     uint t = item_index();
     if (t >= tets || is_bad(t) || status.at[0].overflow != 0u) return;
-    uvec4 ids = cells.at[t];
+    uvec4 ids = words(cells.at[t]);
     uvec4 values = ON_CELLS != 0u ? uvec4(field.at[t]) : uvec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
     uint lo = 0u, hi = 0u;
     for (uint i = 0u; i < 4u; ++i) {

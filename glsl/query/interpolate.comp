@@ -5,7 +5,7 @@ layout(constant_id = 2) const uint ON_CELLS = 0;
 ARGUMENTS(5)
     uint count;
 END_ARGUMENTS
-BUFFER16(0, readonly, uvec4, cells)
+RECORDS(0, uvec4, cells)
 BUFFER(1, readonly, float, field)
 BUFFER(2, readonly, uint, owners)
 BUFFER16(3, readonly, vec4, barycentrics)
@@ -19,7 +19,7 @@ void main() {
     if (owner != NONE && ON_CELLS != 0u) {
         value = field.at[owner];
     } else if (owner != NONE) {
-        uvec4 ids = cells.at[owner];
+        uvec4 ids = words(cells.at[owner]);
         vec4 b = barycentrics.at[i];
         precise float v = (b.x * field.at[ids.x] + b.y * field.at[ids.y]) + (b.z * field.at[ids.z] + b.w * field.at[ids.w]);
         value = v;

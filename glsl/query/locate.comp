@@ -23,8 +23,8 @@ BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
 BUFFER(4, readonly, uint, p)
 BUFFER(5, readonly, uint, flags)
-BUFFER16(6, readonly, uvec4, cells)
-BUFFER16(7, readonly, vec4, vertices)
+RECORDS(6, uvec4, cells)
+RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, guides)
 BUFFER(10, READ_WRITE, uint, owners)
@@ -107,7 +107,7 @@ void main() {
         uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
         vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
         if (last != 0u && owner != NONE) {
-            Tet tet = load_tet(cells.at[owner]);
+            Tet tet = load_tet(words(cells.at[owner]));
             b = barycentric(weights(tet, a.x), tet.rank);
         }
         owners.at[a.i] = last == 0u ? best.owner : owner;

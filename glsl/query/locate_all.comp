@@ -20,8 +20,8 @@ BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
 BUFFER(4, readonly, uint, p)
 BUFFER(5, readonly, uint, flags)
-BUFFER16(6, readonly, uvec4, cells)
-BUFFER16(7, readonly, vec4, vertices)
+RECORDS(6, uvec4, cells)
+RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, owners)
 BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: where the next one goes
@@ -37,7 +37,7 @@ uint list_star(uint owner, vec3 x, uint place) {
     arrive(owner, x, unused);
     uint n = 0u;
     for (uint i = 0u; i < star_size; ++i) {
-        if (weights(load_tet(cells.at[star[i]]), x).inside) star[n++] = star[i];
+        if (weights(load_tet(words(cells.at[star[i]])), x).inside) star[n++] = star[i];
     }
     uint next = 0u;
     for (uint k = 0u; FILL != 0u && k < n; ++k) {
@@ -58,7 +58,7 @@ void main() {
     vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
     vec3 x = normalise(g, at);
     uint leaf = find_leaf(g.level, quantize(g, at));
-    Tet own = load_tet(cells.at[owners.at[i]]);
+    Tet own = load_tet(words(cells.at[owners.at[i]]));
     uint place = places.at[i];
     if (!weights(own, x).inside) {
         // The nearest cell, which nothing contains.
@@ -78,7 +78,7 @@ void main() {
     for (; begin < end; begin += 32u) {
         for (uint near = near_among(begin, end, sought); near != 0u; near &= near - 1u) {
             uint t = listed_tet(begin + findLSB(near));
-            if (!weights(load_tet(cells.at[t]), x).inside) continue;
+            if (!weights(load_tet(words(cells.at[t])), x).inside) continue;
             if (FILL != 0u && place < capacity) found.at[place] = t;
             ++place;
         }

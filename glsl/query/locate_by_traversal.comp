@@ -19,8 +19,8 @@ BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
 BUFFER(4, readonly, uint, p)
 BUFFER(5, readonly, uint, flags)
-BUFFER16(6, readonly, uvec4, cells)
-BUFFER16(7, readonly, vec4, vertices)
+RECORDS(6, uvec4, cells)
+RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, writeonly, uint, owners)
 BUFFER16(10, writeonly, vec4, barycentrics)
@@ -59,12 +59,12 @@ void main() {
         uint end = walks_in(leaf_found, range) ? range.x : min(range.y, range.x + 32000u);
         for (uint i = range.x; i < end && !best.inside; ++i) {
             uint t = listed_tet(i);
-            Tet tet = load_tet(cells.at[t]);
+            Tet tet = load_tet(words(cells.at[t]));
             consider(best, t, tet, weights(tet, x));
         }
         owner = decide(best, leaf_found, tolerance);
         if (owner != NONE) {
-            Tet tet = load_tet(cells.at[owner]);
+            Tet tet = load_tet(words(cells.at[owner]));
             b = barycentric(weights(tet, x), tet.rank);
         }
     }

@@ -12,7 +12,7 @@ ARGUMENTS(9)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid) // of the other mesh
 BUFFER(1, readonly, float, own_positions)
-BUFFER16(2, readonly, uvec4, own_cells)
+RECORDS(2, uvec4, own_cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, places)
 BUFFER(5, readonly, uint, around)
@@ -32,7 +32,7 @@ void main() {
         for (uint k = 0u; k < min(32u, tets - begin); ++k) {
             uint bit = 1u << k;
             if ((healthy & bit) == 0u) continue;
-            uvec4 ids = own_cells.at[begin + k];
+            uvec4 ids = words(own_cells.at[begin + k]);
             if ((held & bit) != 0u || (places.at[ids.x] | places.at[ids.y] | places.at[ids.z] | places.at[ids.w]) != 0u) {
                 hit |= bit;
                 continue;

@@ -17,8 +17,8 @@ BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
 BUFFER(4, readonly, uint, p)
 BUFFER(5, readonly, uint, flags)
-BUFFER16(6, readonly, uvec4, cells)
-BUFFER16(7, readonly, vec4, vertices)
+RECORDS(6, uvec4, cells)
+RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, own_positions)
 BUFFER(9, readonly, uint, used)
 BUFFER(10, READ_WRITE, uint, places) // 1: in the other mesh
@@ -50,7 +50,7 @@ void main() {
             for (; begin < end && !inside; begin += 32u) {
                 for (uint near = near_among(begin, end, sought); near != 0u && !inside; near &= near - 1u) {
                     uint t = listed_tet(begin + findLSB(near));
-                    inside = weights(load_tet(cells.at[t]), sought.x).inside;
+                    inside = weights(load_tet(words(cells.at[t])), sought.x).inside;
                     if (inside) atomicOr(around.at[t >> 5u], 1u << (t & 31u));
                 }
             }

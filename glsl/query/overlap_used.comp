@@ -5,13 +5,13 @@ ARGUMENTS(3)
     uint tets;
 END_ARGUMENTS
 BUFFER(0, readonly, uint, bad)
-BUFFER16(1, readonly, uvec4, cells)
+RECORDS(1, uvec4, cells)
 BUFFER(2, READ_WRITE, uint, used) // one bit per point, zeroed
 
 void main() {
     uint t = item_index();
     if (t >= tets || (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u) return;
-    uvec4 ids = cells.at[t];
+    uvec4 ids = words(cells.at[t]);
     for (uint i = 0u; i < 4u; ++i) {
         uint bit = 1u << (ids[i] & 31u);
         // Most bits are set already.

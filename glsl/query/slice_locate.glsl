@@ -18,8 +18,8 @@ ARGUMENTS(8 + STRUCTURE_BUFFERS)
     float tolerance;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, cells)
-BUFFER16(2, readonly, vec4, vertices)
+RECORDS(1, uvec4, cells)
+RECORDS(2, vec4, vertices)
 BUFFER16(3, readonly, uvec4, neighbours)
 BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, READ_WRITE, RunState, states)

@@ -19,8 +19,8 @@ ARGUMENTS(8 + STRUCTURE_BUFFERS)
     uint budget; // nodes and candidates per voxel and dispatch
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, cells)
-BUFFER16(2, readonly, vec4, vertices)
+RECORDS(1, uvec4, cells)
+RECORDS(2, vec4, vertices)
 BUFFER16(3, readonly, SlicePlan, plans)
 BUFFER(4, READ_WRITE, TouchState, states)
 BUFFER(5, READ_WRITE, uint, answers)
@@ -36,8 +36,8 @@ vec3 h[3]; // half axes of its box
 
 // Keeps the closest of the primitives that touch the box.
 void measure(uint t) {
-    uvec4 ids = cells.at[t];
-    Tet tet = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+    uvec4 ids = words(cells.at[t]);
+    Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
     vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
     if (box_square(v) > state.square || !box_touches(v, h, touch_slack(v, h))) return;
     vec4 unused;

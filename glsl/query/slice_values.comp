@@ -17,8 +17,8 @@ ARGUMENTS(8)
     uint voxels;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, cells)
-BUFFER16(2, readonly, vec4, vertices)
+RECORDS(1, uvec4, cells)
+RECORDS(2, vec4, vertices)
 BUFFER(3, readonly, float, field)
 BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, readonly, uint, answers)
@@ -32,8 +32,8 @@ struct Source {
 };
 
 Source source_of(uint owner) {
-    uvec4 ids = cells.at[owner];
-    Tet tet = make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+    uvec4 ids = words(cells.at[owner]);
+    Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
     return Source(tet, vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]));
 }
 

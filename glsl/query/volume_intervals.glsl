@@ -17,8 +17,8 @@ ARGUMENTS(6 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, cells)    // for the binary tree
-BUFFER16(2, readonly, vec4, vertices)  // for the binary tree
+RECORDS(1, uvec4, cells)    // for the binary tree
+RECORDS(2, vec4, vertices)  // for the binary tree
 BUFFER16(3, readonly, Frame, frames)
 BUFFER16(4, READ_WRITE, RayState, states)
 BUFFER16(5, READ_WRITE, vec4, colors)

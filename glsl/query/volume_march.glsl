@@ -16,8 +16,8 @@ ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint budget; // candidates tested per ray and dispatch, roughly
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, cells)
-BUFFER16(2, readonly, vec4, vertices)
+RECORDS(1, uvec4, cells)
+RECORDS(2, vec4, vertices)
 BUFFER16(3, readonly, uvec4, neighbours)
 BUFFER(4, readonly, float, field)
 BUFFER(5, readonly, float, normals) // three per vertex
@@ -82,9 +82,9 @@ float weighed(vec4 b, vec4 at_corners) {
 // Colour, and opacity of one step, at a value.
 vec4 lookup(float value) {
     precise float x = clamp((value - view.value_lo) * view.value_scale, 0.0, 1.0) * float(TABLE - 1u);
-    uint i = min(uint(x), TABLE - 2u);
+    uint i = min(uint(int(x)), TABLE - 2u); // signed: see quantize
     precise float t = x - float(i);
-    vec4 a = frames.at[0].table[i], b = frames.at[0].table[i + 1u];
+    vec4 a = floats(frames.at[0].table[i]), b = floats(frames.at[0].table[i + 1u]);
     precise vec4 r = a + (b - a) * t;
     return r;
 }

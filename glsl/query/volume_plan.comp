@@ -15,7 +15,7 @@ ARGUMENTS(4)
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, RenderView, views)
-BUFFER16(2, readonly, vec4, table)
+RECORDS(2, vec4, table)
 BUFFER16(3, writeonly, Frame, frames)
 
 void main() {

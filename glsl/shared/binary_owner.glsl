@@ -27,7 +27,7 @@ bool enters(uint reference) {
 
 void look_at(inout Best best, uint t) {
     if (best.inside && best.owner < t) return;
-    Tet tet = load_tet(cells.at[t]);
+    Tet tet = load_tet(words(cells.at[t]));
     if (holds(min(min(tet.v[0], tet.v[1]), min(tet.v[2], tet.v[3])), max(max(tet.v[0], tet.v[1]), max(tet.v[2], tet.v[3]))))
         consider(best, t, tet, weights(tet, sought));
 }

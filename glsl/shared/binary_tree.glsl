@@ -8,8 +8,8 @@ const uint BINARY_DEPTH = 64u; // a code has 30 bits and a place 29: the tree is
 void box_of(uint reference, out vec3 lo, out vec3 hi) {
     uint i = reference & BINARY_INDEX;
     if ((reference & BINARY_LEAF) != 0u) {
-        uvec4 v = cells.at[ids.at[i]];
-        vec3 a = vertices.at[v.x].xyz, b = vertices.at[v.y].xyz, c = vertices.at[v.z].xyz, d = vertices.at[v.w].xyz;
+        uvec4 v = words(cells.at[ids.at[i]]);
+        vec3 a = floats(vertices.at[v.x]).xyz, b = floats(vertices.at[v.y]).xyz, c = floats(vertices.at[v.z]).xyz, d = floats(vertices.at[v.w]).xyz;
         lo = min(min(a, b), min(c, d));
         hi = max(max(a, b), max(c, d));
     } else {

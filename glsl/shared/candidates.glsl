@@ -1,7 +1,7 @@
 // Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
 
 Tet load_tet(uvec4 ids) {
-    return make_tet(ids, vertices.at[ids.x].xyz, vertices.at[ids.y].xyz, vertices.at[ids.z].xyz, vertices.at[ids.w].xyz);
+    return make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
 }
 
 #include "shared/halves.glsl"
@@ -23,8 +23,8 @@ Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
 
 // Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
 bool is_near(uvec4 ids, Sought s) {
-    uvec3 a = unpack_cell(floatBitsToUint(vertices.at[ids.x].w)), b = unpack_cell(floatBitsToUint(vertices.at[ids.y].w));
-    uvec3 c = unpack_cell(floatBitsToUint(vertices.at[ids.z].w)), d = unpack_cell(floatBitsToUint(vertices.at[ids.w].w));
+    uvec3 a = unpack_cell(floatBitsToUint(floats(vertices.at[ids.x]).w)), b = unpack_cell(floatBitsToUint(floats(vertices.at[ids.y]).w));
+    uvec3 c = unpack_cell(floatBitsToUint(floats(vertices.at[ids.z]).w)), d = unpack_cell(floatBitsToUint(floats(vertices.at[ids.w]).w));
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 

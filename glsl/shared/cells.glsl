@@ -13,7 +13,7 @@ CellBox finest_box(uint t) {
     box.size = uvec3(0u);
     if (is_bad(t)) return box;
     uvec3 lo = uvec3(1023u), hi = uvec3(0u);
-    uvec4 ids = cells.at[t];
+    uvec4 ids = words(cells.at[t]);
     for (uint i = 0u; i < 4u; ++i) {
         uvec3 q = unpack_cell(quantized.at[ids[i]].w);
         lo = min(lo, q);

@@ -5,5 +5,5 @@ const uint TABLE = 1024u; // entries of the transfer function
 struct Frame {
     RenderView view;
     RenderPlan plan;
-    vec4 table[TABLE]; // sRGB colour, and opacity of one step
+    FLOATS table[TABLE]; // sRGB colour, and opacity of one step
 };

@@ -19,10 +19,10 @@ bool near_bounds(Grid g, vec3 x) {
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid, clamped into the grid.
+// Cell of the finest grid, clamped into the grid. By signed integers, since drivers for CPUs convert to unsigned ones lane by lane.
 uvec3 quantize(Grid g, vec3 x) {
     precise vec3 q = floor(from_corner(g, x) * g.inv.xyz);
-    return uvec3(clamp(q, vec3(0.0), vec3(1023.0)));
+    return uvec3(ivec3(clamp(q, vec3(0.0), vec3(1023.0))));
 }
 
 // A finest cell in one word.

@@ -7,7 +7,7 @@
 //     BUFFER(0, readonly, uint, keys)
 //     BUFFER(1, writeonly, uint, sorted)
 // and reads keys.at[i]. Compiled plainly, the push constants hold one 64-bit address per buffer, then the scalars. Compiled with
-// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i` and the push constants hold the scalars only.
+// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i` and the push constants hold the scalars only. OLBVH_WIDE: see records.glsl.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_control_flow_attributes : require
@@ -30,6 +30,8 @@
 #define BUFFER(slot, access, T, name) ALIGNED_BUFFER(4, slot, access, T, name)
 // Elements of 16 bytes at addresses that are multiples of 16: one load each.
 #define BUFFER16(slot, access, T, name) ALIGNED_BUFFER(16, slot, access, T, name)
+
+#include "shared/records.glsl"
 
 const uint NONE = 0xffffffffu;
 

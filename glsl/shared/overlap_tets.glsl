@@ -2,7 +2,7 @@
 Grid joint; // lo and scale only
 
 RawTet own_tet(uint t) {
-    uvec4 i = own_cells.at[t];
+    uvec4 i = words(own_cells.at[t]);
     vec3 v[4];
     for (uint k = 0u; k < 4u; ++k) {
         uint at = i[k] * OWN_STRIDE;
@@ -12,7 +12,7 @@ RawTet own_tet(uint t) {
 }
 
 RawTet other_tet(uint t) {
-    uvec4 i = cells.at[t];
+    uvec4 i = words(cells.at[t]);
     vec3 v[4];
     for (uint k = 0u; k < 4u; ++k) {
         uint at = i[k] * STRIDE;

@@ -8,7 +8,7 @@ uint near_among(uint begin, uint end, Sought s) {
     uint ids = grid.at[0].ids, count = min(32u, end - begin), left = 0u, near = 0u;
     for (uint k = 0u; k < count; ++k) left |= uint((p.at[begin + k] >> ID_BITS & s.halves) == s.halves) << k;
     for (; left != 0u; left &= left - 1u) {
-        if (is_near(cells.at[p.at[begin + findLSB(left)] & ids], s)) near |= left & -left;
+        if (is_near(words(cells.at[p.at[begin + findLSB(left)] & ids]), s)) near |= left & -left;
     }
     return near;
 }
@@ -18,7 +18,7 @@ void search(inout Best best, uint begin, uint end, Sought s) {
     for (; begin < end && !best.inside; begin += 32u) {
         for (uint near = near_among(begin, end, s); near != 0u && !best.inside; near &= near - 1u) {
             uint t = listed_tet(begin + findLSB(near));
-            Tet tet = load_tet(cells.at[t]);
+            Tet tet = load_tet(words(cells.at[t]));
             consider(best, t, tet, weights(tet, s.x));
         }
     }

@@ -20,10 +20,10 @@ Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4
 Stand stand_in(uint t) {
     Stand s;
     s.t = t;
-    s.cell = cells.at[t];
+    s.cell = words(cells.at[t]);
     uvec4 rank = ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
-    vec3 a = vertices.at[s.ids.x].xyz, b = vertices.at[s.ids.y].xyz, c = vertices.at[s.ids.z].xyz, d = vertices.at[s.ids.w].xyz;
+    vec3 a = floats(vertices.at[s.ids.x]).xyz, b = floats(vertices.at[s.ids.y]).xyz, c = floats(vertices.at[s.ids.z]).xyz, d = floats(vertices.at[s.ids.w]).xyz;
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
@@ -64,9 +64,9 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     s.t = neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
     if (s.t == NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
-    s.cell = cells.at[s.t];
+    s.cell = words(cells.at[s.t]);
     e.fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
-    vec3 v = vertices.at[e.fresh].xyz;
+    vec3 v = floats(vertices.at[e.fresh]).xyz;
     e.before = lessThan(uvec3(e.fresh), kept(s.ids, e.beyond));
     s.ids = exchange(s.ids, e, e.fresh);
     s.x = exchange(s.x, e, v.x);
@@ -86,7 +86,7 @@ uint owner_at_face(Stand s, vec3 x) {
     Weights here = weights(tet, x);
     uint u = near_one_face(here) ? neighbours.at[s.t][outermost(own_weights(here, tet))] : NONE;
     if (u == NONE) return NONE;
-    Weights there = weights(load_tet(cells.at[u]), x);
+    Weights there = weights(load_tet(words(cells.at[u])), x);
     // The face weighs the same from either side.
     if (!near_one_face(there) || least_of(there.w) != -least_of(here.w)) return NONE;
     return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : NONE;

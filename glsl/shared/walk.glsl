@@ -34,7 +34,7 @@ void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
-        if (near(weights(load_tet(cells.at[u]), x))) star[star_size++] = u;
+        if (near(weights(load_tet(words(cells.at[u])), x))) star[star_size++] = u;
     }
 }
 
@@ -44,7 +44,7 @@ void arrive(uint first, vec3 x, inout Best best) {
     star_size = 1u;
     for (uint i = 0u; i < star_size; ++i) {
         uint t = star[i];
-        Tet tet = load_tet(cells.at[t]);
+        Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
         consider(best, t, tet, w);
         grow_star(t, tet, w, x);
@@ -56,7 +56,7 @@ bool settled(Best best) { return best.inside || (best.in_box && best.smallest >=
 // Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
 bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best best) {
     for (; s < STEPS; ++s) {
-        Tet tet = load_tet(cells.at[t]);
+        Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
         if (w.clear) best = Best(t, true, true, 0.0);
         if (w.clear || (near(w) && !leave)) return !w.clear;
@@ -73,7 +73,7 @@ bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best bes
 uint walk_leg(uint t, vec3 a, vec3 b) {
     uint from = NONE;
     for (uint s = 0u; s < LEG; ++s) {
-        Tet tet = load_tet(cells.at[t]);
+        Tet tet = load_tet(words(cells.at[t]));
         vec4 before = own_weights(weights(tet, a), tet), behind = own_weights(weights(tet, b), tet);
         uvec4 beside = neighbours.at[t];
         float first = 3.40282347e38;

@@ -24,6 +24,8 @@ pub struct OlbvhHostDevice {
     pub queue_family: u32,
     /// Not 0: the feature `bufferDeviceAddress` is enabled.
     pub buffer_addresses: u32,
+    /// Not 0: feature `shaderInt64` is enabled, which only drivers for processors profit from.
+    pub shader_int64: u32,
     /// Not 0: `VK_EXT_subgroup_size_control` is enabled with `subgroupSizeControl` and `computeFullSubgroups`.
     pub subgroup_size_control: u32,
     /// Not 0: the instance extension `VK_EXT_debug_utils` is enabled.
@@ -55,6 +57,7 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
                 pipeline_cache: None,
                 enabled: Enabled {
                     buffer_addresses: host.buffer_addresses != 0,
+                    shader_int64: host.shader_int64 != 0,
                     subgroup_size_control: host.subgroup_size_control != 0,
                     debug_utils: host.debug_utils != 0,
                     ..Enabled::default()

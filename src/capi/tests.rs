@@ -152,6 +152,7 @@ fn a_c_host_records_by_address_and_asks() {
         queue: host.queue().lock().unwrap().as_raw(),
         queue_family: host.family,
         buffer_addresses: u32::from(host.addresses),
+        shader_int64: u32::from(host.int64),
         subgroup_size_control: u32::from(host.control),
         debug_utils: 0,
     };

@@ -291,6 +291,11 @@ impl Gpu {
             .unwrap_or_default()
     }
 
+    /// Whether kernels read records of four words as two of 64 bits: processors, which fetch every component by itself.
+    pub(super) fn reads_wide(&self) -> bool {
+        self.report().requirements.shader_int64 && Row::of(self.report()) == Row::Cpu
+    }
+
     pub(crate) fn requires_subgroup_size(&self) -> bool {
         let [least, _, most] = self.inner.foundation.report.requirements.subgroup_sizes;
         self.inner.foundation.report.requirements.subgroup_size_control && least != most

@@ -13,6 +13,8 @@ use std::sync::{Arc, Mutex};
 pub struct Enabled {
     /// Feature `bufferDeviceAddress`; without it kernels get their buffers by descriptors.
     pub buffer_addresses: bool,
+    /// Feature `shaderInt64`, which only drivers for processors profit from.
+    pub shader_int64: bool,
     /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Needed where subgroup sizes vary.
     pub subgroup_size_control: bool,
     /// `VK_KHR_acceleration_structure`, and of `VK_KHR_ray_query` and `VK_KHR_ray_tracing_pipeline` those named, with their features: for a baseline only.
@@ -69,6 +71,7 @@ impl Gpu {
             return Err(Error::NoDevice(format!("{} lacks {}", report.name, requirements.missing.join(", "))));
         }
         requirements.buffer_addresses &= enabled.buffer_addresses;
+        requirements.shader_int64 &= enabled.shader_int64;
         requirements.subgroup_size_control &= enabled.subgroup_size_control;
         requirements.ray_tracing.queries &= enabled.ray_tracing.queries && requirements.buffer_addresses;
         requirements.ray_tracing.pipelines &= enabled.ray_tracing.pipelines && requirements.buffer_addresses;

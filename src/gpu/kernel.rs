@@ -25,6 +25,8 @@ pub(crate) struct BufferInfo {
 pub(crate) struct KernelInfo {
     pub name: &'static str,
     pub address: &'static [u8],
+    /// By address too, with records of four words read as two of 64 bits.
+    pub wide: &'static [u8],
     pub descriptor: &'static [u8],
     pub buffers: &'static [BufferInfo],
     pub scalar_bytes: usize,
@@ -64,8 +66,12 @@ impl KernelInfo {
     }
 
     /// The module.
-    pub(super) fn words(&self, binding: Binding) -> Vec<u32> {
-        let code = if binding == Binding::Address { self.address } else { self.descriptor };
+    pub(super) fn words(&self, binding: Binding, wide: bool) -> Vec<u32> {
+        let code = match binding {
+            Binding::Address if wide => self.wide,
+            Binding::Address => self.address,
+            Binding::Descriptors => self.descriptor,
+        };
         code.chunks_exact(4).map(|b| u32::from_le_bytes([b[0], b[1], b[2], b[3]])).collect()
     }
 }
@@ -91,7 +97,7 @@ pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
 pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
     let device = gpu.device();
     let binding = gpu.binding();
-    let words = info.words(binding);
+    let words = info.words(binding, gpu.reads_wide());
     let bindings: Vec<_> = (0..info.buffers.len() as u32)
         .map(|i| {
             let b = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);

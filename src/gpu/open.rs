@@ -113,7 +113,9 @@ impl Gpu {
         let extensions: Vec<_> = requirements.extensions.iter().map(|e| e.as_ptr()).collect();
         let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
         let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
-        let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions);
+        let core = vk::PhysicalDeviceFeatures::default().shader_int64(requirements.shader_int64);
+        let mut info =
+            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions).enabled_features(&core);
         if requirements.buffer_addresses {
             info = info.push_next(&mut addresses);
         }

@@ -165,7 +165,7 @@ struct Modules<'a> {
 
 impl Modules<'_> {
     fn add(&mut self, kernel: &KernelInfo) -> Result<()> {
-        let words = kernel.words(Binding::Address);
+        let words = kernel.words(Binding::Address, false);
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
         // SAFETY: the code is the shader compiler's.
         self.made.push(unsafe { self.device.create_shader_module(&info, None) }.map_err(failed("vkCreateShaderModule"))?);

@@ -29,6 +29,8 @@ pub struct Requirements {
     pub extensions: Vec<&'static CStr>,
     /// The device can pass buffers by address; without it, descriptors serve.
     pub buffer_addresses: bool,
+    /// Kernels can compute with 64-bit integers; a driver for processors then reads cells and vertices in half as many loads.
+    pub shader_int64: bool,
     /// Subgroup sizes can be required per pipeline.
     pub subgroup_size_control: bool,
     /// Whether and how the device traces rays.
@@ -145,13 +147,14 @@ impl Requirements {
         let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
         let can_control = has(ash::ext::subgroup_size_control::NAME);
         // SAFETY: as above; the extension struct is chained only where the extension exists.
-        unsafe {
+        let core = unsafe {
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut addresses);
             if can_control {
                 features = features.push_next(&mut size_control);
             }
             instance.get_physical_device_features2(device, &mut features);
-        }
+            features.features
+        };
         let for_structures = [ash::khr::acceleration_structure::NAME, ash::khr::deferred_host_operations::NAME];
         let can_trace = addresses.buffer_device_address != 0 && for_structures.iter().all(|e| has(e));
         let listed_ways = RayTracing {
@@ -175,6 +178,7 @@ impl Requirements {
             missing,
             extensions,
             buffer_addresses: addresses.buffer_device_address != 0,
+            shader_int64: core.shader_int64 != 0,
             subgroup_size_control,
             ray_tracing,
             subgroup_sizes: sizes,

@@ -25,6 +25,7 @@ pub struct Host {
     pub device: ash::Device,
     pub family: u32,
     pub addresses: bool,
+    pub int64: bool,
     pub control: bool,
     pub rays: RayTracing,
     watched: Option<(ash::ext::debug_utils::Instance, vk::DebugUtilsMessengerEXT)>,
@@ -99,6 +100,8 @@ impl Host {
                 .collect();
             let mut info =
                 vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses).enabled_extension_names(&extensions);
+            let core = vk::PhysicalDeviceFeatures::default().shader_int64(needs.shader_int64);
+            info = info.enabled_features(&core);
             if needs.subgroup_size_control {
                 info = info.push_next(&mut control);
             }
@@ -112,14 +115,14 @@ impl Host {
                 info = info.push_next(&mut ray_pipelines);
             }
             let device = instance.create_device(physical, &info, None).unwrap();
-            let (addresses, control) = (needs.buffer_addresses, needs.subgroup_size_control);
-            Self { entry, instance, physical, device, family, addresses, control, rays, watched, messages }
+            let (addresses, int64, control) = (needs.buffer_addresses, needs.shader_int64, needs.subgroup_size_control);
+            Self { entry, instance, physical, device, family, addresses, int64, control, rays, watched, messages }
         }
     }
 
     pub fn enabled(&self) -> Enabled {
-        let (buffer_addresses, subgroup_size_control, ray_tracing) = (self.addresses, self.control, self.rays);
-        Enabled { buffer_addresses, subgroup_size_control, ray_tracing, ..Enabled::default() }
+        let (buffer_addresses, shader_int64, subgroup_size_control) = (self.addresses, self.int64, self.control);
+        Enabled { buffer_addresses, shader_int64, subgroup_size_control, ray_tracing: self.rays, debug_utils: false }
     }
 
     pub fn queue(&self) -> Arc<Mutex<vk::Queue>> {

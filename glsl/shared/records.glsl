@@ -1,0 +1,14 @@
+// Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
+// many fetches (OLBVH_WIDE).
+#if defined(OLBVH_WIDE) && !defined(OLBVH_GLSL)
+#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
+#define FLOATS u64vec2
+#define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
+uvec4 words(u64vec2 record) { return uvec4(unpack32(record.x), unpack32(record.y)); }
+vec4 floats(u64vec2 record) { return uintBitsToFloat(words(record)); }
+#else
+#define FLOATS vec4
+#define RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
+uvec4 words(uvec4 record) { return record; }
+vec4 floats(vec4 record) { return record; }
+#endif
