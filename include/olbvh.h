@@ -181,6 +181,10 @@ typedef struct olbvh_host_device {
    */
   uint32_t buffer_addresses;
   /*
+   Not 0: feature `shaderInt64` is enabled, which only drivers for processors profit from.
+   */
+  uint32_t shader_int64;
+  /*
    Not 0: `VK_EXT_subgroup_size_control` is enabled with `subgroupSizeControl` and `computeFullSubgroups`.
    */
   uint32_t subgroup_size_control;

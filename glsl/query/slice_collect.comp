@@ -3,20 +3,31 @@
 #include "shared/layout.glsl"
 #include "shared/voxels.glsl"
 // Slicing (SPEC 3.4), between the parts: the voxels whose centre lies in no cell, in no order, so that looking at boxes costs nothing for the others.
-// One invocation per 32 voxels. What has been listed is marked, and not listed again.
+// One invocation per 32 voxels. What has been listed is marked, and not listed again; what is settled without it is counted.
 ARGUMENTS(4)
     uint voxels;
 END_ARGUMENTS
 BUFFER(0, READ_WRITE, uint, answers)
-BUFFER(1, readonly, SliceStatus, status)
+BUFFER(1, READ_WRITE, SliceStatus, status)
 BUFFER16(2, READ_WRITE, SlicePlan, plans)
 BUFFER(3, writeonly, TouchState, states)
 
 void main() {
-    uint begin = 32u * item_index(), wait = 0u;
+    uint begin = 32u * item_index(), wait = 0u, inside = 0u, refused = 0u;
     // Only once all centres have been located.
     if (begin < voxels && status.at[0].locating == 0u) {
-        for (uint k = 0u; k < min(32u, voxels - begin); ++k) wait |= uint(answers.at[begin + k] == SLICE_PENDING) << k;
+        for (uint k = 0u; k < min(32u, voxels - begin); ++k) {
+            uint answer = answers.at[begin + k];
+            wait |= uint(answer == SLICE_PENDING) << k;
+            inside += uint(answer < SLICE_TOUCHED);
+        }
+        if (plans.at[0].refused != 0u) refused = min(32u, voxels - begin);
+    }
+    inside = subgroupAdd(inside);
+    refused = subgroupAdd(refused);
+    if (subgroupElect()) {
+        if (inside > 0u) atomicAdd(status.at[0].inside, inside);
+        if (refused > 0u) atomicAdd(status.at[0].empty, refused);
     }
     uint count = bitCount(wait), total = subgroupAdd(count), before = subgroupExclusiveAdd(count), place = 0u;
     if (subgroupElect() && total > 0u) place = atomicAdd(plans.at[0].listed, total);

@@ -9,13 +9,12 @@
 layout(constant_id = 2) const uint RUN = 32;
 layout(constant_id = 3) const uint WALK = 6;
 layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
-ARGUMENTS(8 + STRUCTURE_BUFFERS)
-    uint layer;
-    uint first;  // number of the first row in that layer
-    uint rows;
-    uint fresh;  // not 0: nothing has been done yet
-    uint budget; // candidates tested per run and dispatch, roughly
-    float tolerance;
+layout(constant_id = 6) const uint BUDGET = 4096; // candidates tested per run and dispatch, roughly
+layout(constant_id = 7) const uint TOLERANCE = 0; // a float's bits
+layout(constant_id = 8) const uint FIELD = 0; // there is one
+layout(constant_id = 9) const uint ON_CELLS = 0;
+ARGUMENTS(10 + STRUCTURE_BUFFERS)
+    uint fresh; // not 0: nothing has been done yet
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
@@ -25,68 +24,109 @@ BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, READ_WRITE, RunState, states)
 BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
 BUFFER(7, READ_WRITE, SliceStatus, status) // zeroed
-STRUCTURE(8)
+BUFFER(8, readonly, float, field)
+BUFFER(9, writeonly, float, values)
+STRUCTURE(10)
 #include "shared/structure_owner.glsl"
+#include "shared/held.glsl"
 #include "shared/part.glsl"
 
-bool is_ours(SlicePlan plan, Grid g, vec3 at) { return PART == 0u || in_part(plan.first_cell, plan.last_cell, quantize(g, at)); }
+SlicePlan plan;
+RunState state;
+uint line; // first voxel of the run
+
+// Where the run stands, and the field there.
+Stand stand;
+vec4 held;
+
+void enter(uint t) {
+    stand = stand_in(t);
+    if (FIELD != 0u) held = field_in(stand);
+}
+
+// Across the face that says outside most; false if nothing is behind it.
+bool go_on(Sides sides) {
+    Exchange e;
+    if (!step_on(stand, sides, e)) return false;
+    if (FIELD != 0u) held = field_behind(held, stand, e);
+    return true;
+}
+
+// The next voxel of the run.
+void settle(uint answer, float value) {
+    answers.at[line + state.next] = answer;
+    if (FIELD != 0u && answer != SLICE_PENDING) values.at[line + state.next] = value;
+    ++state.next;
+}
+
+// The next voxel, which lies so in the stand.
+void settle_inside(Sides sides) {
+    state.hint = stand.t;
+    settle(stand.t, FIELD == 0u ? 0.0 : value_of(held, barycentric(sides)));
+}
+
+bool is_ours(Grid g, vec3 at) { return PART == 0u || in_part(plan.first_cell, plan.last_cell, quantize(g, at)); }
 
 void main() {
     uint i = item_index();
     uint unfinished = 0u;
-    SlicePlan plan = plans.at[0];
+    plan = plans.at[0];
     uint runs = (plan.width + RUN - 1u) / RUN;
     if (i == 0u) status.at[0].refused = plan.refused;
-    if (i < rows * runs) {
+    if (i < plan.rows * runs) {
         Grid g = grid.at[0];
-        RunState state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
+        state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
         if (fresh == 0u) state = states.at[i];
         uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
-        uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
-        uint line = row * plan.width + begin;
-        for (; plan.refused != 0u && state.next < count; ++state.next) answers.at[line + state.next] = NONE;
+        line = row * plan.width + begin;
+        uvec3 first = voxel_place(plan, line);
+        while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
         bool stands = state.hint != NONE && state.cursor == 0u;
-        Stand stand = stand_nowhere();
-        if (stands) stand = stand_in(state.hint);
-        for (uint work = 0u; state.next < count && work < budget; ++work) {
+        stand = stand_nowhere();
+        if (stands) enter(state.hint);
+        for (uint work = 0u; state.next < count && work < BUDGET; ++work) {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
             uint misses = 0u;
-            for (; stands && state.next < count && work < budget; ++work) {
-                vec3 at = voxel_centre(plan, begin + state.next, y, k);
-                if (!is_ours(plan, g, at)) break;
+            for (; stands && state.next < count && work < BUDGET; ++work) {
+                vec3 at = voxel_centre(plan, first + uvec3(state.next, 0u, 0u));
+                if (!is_ours(g, at)) break;
                 vec3 x = normalise(g, at);
                 Sides sides = sides_of(stand, x);
                 uint owner = owner_of(stand, sides, x);
                 if (owner != NONE) {
-                    if (owner != stand.t) stand = stand_in(owner);
-                    state.hint = owner;
-                    answers.at[line + state.next] = owner;
-                    ++state.next;
+                    if (owner != stand.t) {
+                        enter(owner);
+                        sides = sides_of(stand, x);
+                    }
+                    settle_inside(sides);
                     misses = 0u;
                 } else {
-                    stands = !sides.near && ++misses < WALK && step_on(stand, sides);
+                    stands = !sides.near && ++misses < WALK && go_on(sides);
                 }
             }
-            if (state.next >= count || work >= budget) break;
-            vec3 at = voxel_centre(plan, begin + state.next, y, k);
-            if (!is_ours(plan, g, at)) {
-                answers.at[line + state.next] = SLICE_PENDING;
-                ++state.next;
+            if (state.next >= count || work >= BUDGET) break;
+            vec3 at = voxel_centre(plan, first + uvec3(state.next, 0u, 0u));
+            if (!is_ours(g, at)) {
+                settle(SLICE_PENDING, 0.0);
                 continue;
             }
+            vec3 x = normalise(g, at);
             OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
             uint owner;
-            bool ended = find_owner(search, g, at, normalise(g, at), tolerance, work, budget, owner);
+            bool ended = find_owner(search, g, at, x, uintBitsToFloat(TOLERANCE), work, BUDGET, owner);
             state.cursor = search.cursor;
             state.best = search.best.owner;
             state.in_box = best_bits(search.best);
             state.smallest = search.best.smallest;
             if (!ended) break;
-            state.hint = owner;
-            answers.at[line + state.next] = owner == NONE ? SLICE_PENDING : owner;
-            ++state.next;
             stands = owner != NONE;
-            if (stands) stand = stand_in(owner);
+            if (stands) {
+                enter(owner);
+                settle_inside(sides_of(stand, x));
+            } else {
+                state.hint = NONE;
+                settle(SLICE_PENDING, 0.0);
+            }
         }
         unfinished = uint(state.next < count);
         states.at[i] = state;

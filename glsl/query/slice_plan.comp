@@ -14,7 +14,9 @@ ARGUMENTS(2)
     float half2[3];
     uint width;
     uint height;
-    uint layers;
+    uint layer;
+    uint first;
+    uint rows;
     uint first_cell;
     uint last_cell;
 END_ARGUMENTS
@@ -53,7 +55,9 @@ void main() {
     plan.up = wide(up);
     plan.width = width;
     plan.height = height;
-    plan.layers = layers;
+    plan.layer = layer;
+    plan.first = first;
+    plan.rows = rows;
     plan.listed = 0u;
     plan.first_cell = first_cell;
     plan.last_cell = last_cell;

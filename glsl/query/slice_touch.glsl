@@ -14,8 +14,6 @@ ARGUMENTS(7 + STRUCTURE_BUFFERS)
 #else
 ARGUMENTS(8 + STRUCTURE_BUFFERS)
 #endif
-    uint layer;
-    uint first;  // number of the first row in that layer
     uint budget; // nodes and candidates per voxel and dispatch
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -126,9 +124,7 @@ void main() {
         uint voxel = state.voxel;
         if (answers.at[voxel] == SLICE_LISTED) {
             Grid g = grid.at[0];
-            uint row = voxel / plan.width;
-            uint y = (first + row) % plan.height, k = layer + (first + row) / plan.height;
-            vec3 centre = voxel_centre(plan, voxel - row * plan.width, y, k);
+            vec3 centre = voxel_centre(plan, voxel_place(plan, voxel));
             x = normalise(g, centre);
             h = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
             if (measure_all(g, centre, plan.reach.xyz)) {

@@ -31,6 +31,7 @@ STRUCTURE(10)
 RenderView view;
 RenderPlan plan;
 #include "shared/skip.glsl"
+#include "shared/held.glsl"
 
 const uint WALK = 6u;   // steps of a walk across faces before the structure is asked
 const uint BURST = 32u; // passes before rays that wait for the structure are served
@@ -51,10 +52,9 @@ vec3 normal_of(uint v) { return vec3(normals.at[3u * v], normals.at[3u * v + 1u]
 
 void enter(uint t) {
     stand = stand_in(t);
-    uvec4 ids = stand.ids;
-    if (ON_CELLS != 0u) held_values = vec4(field.at[t]);
-    else held_values = vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
+    held_values = field_in(stand);
     if (SHADING != 0u) {
+        uvec4 ids = stand.ids;
         vec3 a = normal_of(ids.x), b = normal_of(ids.y), c = normal_of(ids.z), d = normal_of(ids.w);
         for (uint k = 0u; k < 3u; ++k) held_normals[k] = vec4(a[k], b[k], c[k], d[k]);
     }
@@ -64,19 +64,12 @@ void enter(uint t) {
 bool go_on(Sides at) {
     Exchange e;
     if (!step_on(stand, at, e)) return false;
-    if (ON_CELLS != 0u) held_values = vec4(field.at[stand.t]);
-    else held_values = exchange(held_values, e, field.at[e.fresh]);
+    held_values = field_behind(held_values, stand, e);
     if (SHADING != 0u) {
         vec3 n = normal_of(e.fresh);
         for (uint k = 0u; k < 3u; ++k) held_normals[k] = exchange(held_normals[k], e, n[k]);
     }
     return true;
-}
-
-// What has these values at the corners, at barycentric coordinates.
-float weighed(vec4 b, vec4 at_corners) {
-    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
-    return r;
 }
 
 // Colour, and opacity of one step, at a value.
@@ -158,7 +151,7 @@ void take(Sides sides) {
     pass_by();
     ++found;
     vec4 b = barycentric(sides);
-    float value = ON_CELLS != 0u ? held_values.x : weighed(b, held_values);
+    float value = value_of(held_values, b);
     if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
     if (ISO != 0u) {
         state.last = floatBitsToUint(value);

@@ -115,12 +115,16 @@ struct SlicePlan {
     vec4 reach;  // Half extent of a voxel's box along the axes in the units of the mesh, and a little more.
     uint width;  // Voxels per row.
     uint height; // Rows of a layer.
-    uint layers; // Layers.
+    uint layer;  // Layer of the first row of the band: those rows that are sliced now.
+    uint first;  // Number of that row in the layer.
+    uint rows;   // Rows of the band.
     uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
-    uint listed; // Voxels of the band whose centre lies in no cell.
     uint first_cell; // The first cell of the finest grid that is looked at, 10 bits per axis, x lowest.
     uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
-    uint pad;    // Unused.
+    uint listed; // Voxels of the band whose centre lies in no cell.
+    uint pad0;   // Unused.
+    uint pad1;   // Unused.
+    uint pad2;   // Unused.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.

@@ -2,10 +2,10 @@
 //!
 //! ```text
 //! plan      the voxels as the kernels need them, over bounds that the device knows
-//! locate    centres, in runs along the rows                                           a round: locate, collect, touch
+//! locate    centres, in runs along the rows, and the field there                      a round: locate, collect, touch
 //! collect   the voxels whose centre lies in no cell
 //! touch     their boxes
-//! values    voxels by kind, values of a field
+//! values    their kinds, and the field there
 //! ```
 
 mod stack;
@@ -135,9 +135,11 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
 }
 
 fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
-    let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], layers } = *input.voxels;
+    let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
+    let Rows { layer, first, count: rows } = input.rows;
     let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, input.part.unwrap_or(CellRange::WHOLE).words());
-    let arguments = PlanKernel { grid, plans, origin, across, down, up, half0, half1, half2, width, height, layers, first_cell, last_cell };
+    let arguments =
+        PlanKernel { grid, plans, origin, across, down, up, half0, half1, half2, width, height, layer, first, rows, first_cell, last_cell };
     r.dispatch(&arguments, SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
 }
 
@@ -145,6 +147,8 @@ fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMe
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let items = asked.rows.count * asked.voxels.size[0].div_ceil(RUN);
     let (run, walk, part, lists) = (RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
+    let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
+    let (buffer, field, on_cells) = of_field(r, asked);
     r.stage("query.slice_locate", |r| {
         dispatch!(r, items, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
             cells: input.cells,
@@ -154,14 +158,17 @@ fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMe
             states: memory.runs,
             answers: memory.answers,
             status: memory.status,
-            layer: asked.rows.layer,
-            first: asked.rows.first,
-            rows: asked.rows.count,
+            field: buffer,
+            values: memory.values,
             fresh: begins,
-            budget: LOCATE_BUDGET,
-            tolerance: TOLERANCE,
-        }, { run, walk, part })
+        }, { run, walk, part, budget, tolerance, field, on_cells })
     })
+}
+
+/// The field, and for the kernels: whether there is one, and whether it has a value per cell.
+fn of_field(r: &Recorder<'_>, input: &SliceInput<'_>) -> (BufferRef, u32, u32) {
+    let (buffer, on) = input.field.unwrap_or((r.gpu().nothing(), On::Points));
+    (buffer, u32::from(input.field.is_some()), u32::from(on == On::Cells))
 }
 
 fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
@@ -183,30 +190,28 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
             states: states,
             answers: answers,
             status: status,
-            layer: part.rows.layer,
-            first: part.rows.first,
             budget: TOUCH_BUDGET,
         }, {})
     })
 }
 
 fn cmd_values(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
-    let workgroup = r.gpu().target().query;
-    let (field, on) = part.field.unwrap_or((r.gpu().nothing(), On::Points));
+    let SliceMemory { answers, values, status, plan: plans, touches: states, groups, .. } = *memory;
+    let (buffer, field, on_cells) = of_field(r, part);
     let arguments = SliceValues {
         grid: searched.mesh.arrays.grid,
         cells: searched.mesh.input.cells,
         vertices: searched.mesh.arrays.vertices,
-        field,
-        plans: memory.plan,
-        answers: memory.answers,
-        values: memory.values,
-        status: memory.status,
-        layer: part.rows.layer,
-        first: part.rows.first,
+        field: buffer,
+        plans,
+        states,
+        answers,
+        values,
+        status,
         voxels: part.count(),
     };
-    let (linear, field) = (u32::from(part.extrapolate == Extrapolate::Linear), u32::from(part.field.is_some()));
-    let spec = SliceValuesSpec { workgroup, on_cells: u32::from(on == On::Cells), linear, field, run: RUN, ..Default::default() };
-    r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Count(part.count().div_ceil(RUN).div_ceil(workgroup))))
+    let linear = u32::from(part.extrapolate == Extrapolate::Linear);
+    let spec = SliceValuesSpec { workgroup: r.gpu().target().query, on_cells, linear, field, ..Default::default() };
+    // As many workgroups as looked at boxes.
+    r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Indirect(groups)))
 }

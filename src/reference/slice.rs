@@ -6,6 +6,7 @@ use super::locate::{Location, Locator};
 use super::separate::{Closest, box_square, box_touches, closest, touch_slack};
 use super::tet::{Tet, Vec3, sub};
 use super::vertices::CellRange;
+use super::walk::Stand;
 use crate::error::Result;
 use crate::layout::SlicePlan;
 use crate::mesh::{Field, Mesh, On};
@@ -102,15 +103,18 @@ impl<'a> Slicer<'a> {
                 let location = self.locator.stride_to(centre, hint, WALK).unwrap_or_else(|| self.locator.locate(centre));
                 hint = location.owner;
                 match location.found() {
-                    Some(owner) => Voxel { value: self.value(&location), kind: INSIDE, owner },
+                    Some(owner) => Voxel { value: self.value(owner, centre), kind: INSIDE, owner },
                     None => self.touched(centre),
                 }
             })
             .collect()
     }
 
-    fn value(&self, location: &Location) -> f32 {
-        self.field.map_or(f32::NAN, |field| self.locator.value(field, location))
+    /// The value of a voxel with its centre in a cell.
+    fn value(&self, owner: u32, centre: [f32; 3]) -> f32 {
+        let (field, stand) = (self.field, self.locator.walker().stand_in(owner));
+        let at = |(field, stand): (&Field, Stand)| stand.value(field, stand.sides(self.tree.grid.normalise(centre)).barycentric());
+        field.zip(stand).map_or(f32::NAN, at)
     }
 
     /// The primitive `t` relative to a point in normalised coordinates.

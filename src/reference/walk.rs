@@ -16,7 +16,7 @@ use super::boundary::NONE;
 use super::candidates::Best;
 use super::grid::reciprocal;
 use super::tet::{Sides, Tet, Vec3, Weights, least_of, sides_of};
-use crate::mesh::Mesh;
+use crate::mesh::{Field, Mesh, On};
 
 /// Most tetrahedra of a star.
 pub const STAR: usize = 128;
@@ -68,10 +68,23 @@ pub struct Stand {
 }
 
 impl Stand {
+    /// The value of a field in it, at barycentric coordinates in ascending index of the corners.
+    pub fn value(&self, field: &Field, b: [f32; 4]) -> f32 {
+        match field.on {
+            On::Points => weighed(b, self.ids.map(|i| field.values[i as usize])),
+            On::Cells => field.values[self.t as usize],
+        }
+    }
+
     /// The sides of x on which its faces lie.
     pub fn sides(&self, x: Vec3) -> Sides {
         sides_of(self.v, x)
     }
+}
+
+/// What has these values at the corners, at barycentric coordinates.
+pub fn weighed(b: [f32; 4], v: [f32; 4]) -> f32 {
+    (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3])
 }
 
 /// The face that says outside most.

@@ -154,7 +154,6 @@ impl VoxelGrid {
             reach: pad([0, 1, 2].map(reach)),
             width: self.size[0],
             height: self.size[1],
-            layers: self.layers,
             refused: if large { 2 } else { u32::from(flat) },
             last_cell: CellRange::WHOLE.words()[1],
             ..SlicePlan::default()

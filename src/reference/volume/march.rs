@@ -2,9 +2,8 @@
 
 use super::Scene;
 use super::skip::{Skips, inverse_of};
-use crate::mesh::On;
 use crate::reference::grid::{canonical, reciprocal};
-use crate::reference::walk::Stand;
+use crate::reference::walk::{Stand, weighed};
 use crate::render::{Lighting, Plan};
 
 /// Steps of a walk across faces before the tree is asked.
@@ -22,11 +21,6 @@ pub struct Marcher<'a> {
     pub skipped_samples: u64,
     /// Samples taken that lie in the mesh.
     pub found_samples: u64,
-}
-
-/// What has these values at the corners, at barycentric coordinates.
-fn weighed(b: [f32; 4], v: [f32; 4]) -> f32 {
-    (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3])
 }
 
 /// What a ray has gathered, and its light.
@@ -95,12 +89,7 @@ impl<'a> Marcher<'a> {
             self.samples += 1;
             let Some((stand, b)) = self.locate(plan.sample(ray, k)) else { continue };
             self.found_samples += 1;
-            let field = self.scene.field;
-            let value = if field.on == On::Cells {
-                field.values[stand.t as usize]
-            } else {
-                weighed(b, stand.ids.map(|i| field.values[i as usize]))
-            };
+            let value = stand.value(self.scene.field, b);
             if !value.is_finite() {
                 continue;
             }

@@ -1,0 +1,21 @@
+// The field at the corners of a stand, corner by corner as the stand holds them. Needs stride.glsl, `field` and ON_CELLS.
+
+// In a tetrahedron that has just been entered.
+vec4 field_in(Stand s) {
+    if (ON_CELLS != 0u) return vec4(field.at[s.t]);
+    return vec4(field.at[s.ids.x], field.at[s.ids.y], field.at[s.ids.z], field.at[s.ids.w]);
+}
+
+// In the next one, after a step.
+vec4 field_behind(vec4 held, Stand s, Exchange e) {
+    if (ON_CELLS != 0u) return vec4(field.at[s.t]);
+    return exchange(held, e, field.at[e.fresh]);
+}
+
+// What has these values at the corners, at barycentric coordinates.
+float weighed(vec4 b, vec4 at_corners) {
+    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    return r;
+}
+
+float value_of(vec4 held, vec4 b) { return ON_CELLS != 0u ? held.x : weighed(b, held); }
