@@ -79,7 +79,8 @@ void main() {
         if (fresh == 0u) state = states.at[i];
         uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
         line = row * plan.width + begin;
-        uvec3 first = voxel_place(plan, line);
+        uvec3 place = voxel_place(plan, line);
+        vec3 origin = row_origin(plan, place.y, place.z);
         while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
         bool stands = state.hint != NONE && state.cursor == 0u;
         stand = stand_nowhere();
@@ -88,11 +89,15 @@ void main() {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
             uint misses = 0u;
             for (; stands && state.next < count && work < BUDGET; ++work) {
-                vec3 at = voxel_centre(plan, first + uvec3(state.next, 0u, 0u));
+                vec3 at = voxel_centre(plan, origin, place.x + state.next);
                 if (!is_ours(g, at)) break;
                 vec3 x = normalise(g, at);
                 Sides sides = sides_of(stand, x);
-                uint owner = owner_of(stand, sides, x);
+                if (!sides.near) {
+                    stands = ++misses < WALK && go_on(sides);
+                    if (stands) sides = sides_of(stand, x);
+                }
+                uint owner = stands ? owner_of(stand, sides, x) : NONE;
                 if (owner != NONE) {
                     if (owner != stand.t) {
                         enter(owner);
@@ -101,11 +106,11 @@ void main() {
                     settle_inside(sides);
                     misses = 0u;
                 } else {
-                    stands = !sides.near && ++misses < WALK && go_on(sides);
+                    stands = stands && !sides.near;
                 }
             }
             if (state.next >= count || work >= BUDGET) break;
-            vec3 at = voxel_centre(plan, first + uvec3(state.next, 0u, 0u));
+            vec3 at = voxel_centre(plan, origin, place.x + state.next);
             if (!is_ours(g, at)) {
                 settle(SLICE_PENDING, 0.0);
                 continue;

@@ -124,7 +124,7 @@ void main() {
         uint voxel = state.voxel;
         if (answers.at[voxel] == SLICE_LISTED) {
             Grid g = grid.at[0];
-            vec3 centre = voxel_centre(plan, voxel_place(plan, voxel));
+            vec3 centre = voxel_centre(plan, voxel);
             x = normalise(g, centre);
             h = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
             if (measure_all(g, centre, plan.reach.xyz)) {

@@ -51,7 +51,7 @@ void main() {
         empty = 1u - touched;
         if (FIELD != 0u) {
             float value = uintBitsToFloat(NAN);
-            if (answer != NONE) value = touched_value(answer & ~SLICE_TOUCHED, normalise(grid.at[0], voxel_centre(plan, voxel_place(plan, voxel))));
+            if (answer != NONE) value = touched_value(answer & ~SLICE_TOUCHED, normalise(grid.at[0], voxel_centre(plan, voxel)));
             values.at[voxel] = value;
         }
     }

@@ -6,6 +6,7 @@ struct Stand {
     uvec4 cell; // vertices in the caller's order
     uvec4 ids;  // and ascending
     vec4 x, y, z;
+    Bounds box;
 };
 
 // How a step changes what is held per corner.
@@ -15,7 +16,11 @@ struct Exchange {
     bvec3 before; // whether the fresh one comes before each of the corners kept
 };
 
-Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
+Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+
+vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+
+vec3[4] corners_of(Stand s) { return vec3[4](corner_of(s, 0u), corner_of(s, 1u), corner_of(s, 2u), corner_of(s, 3u)); }
 
 Stand stand_in(uint t) {
     Stand s;
@@ -27,14 +32,13 @@ Stand stand_in(uint t) {
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
+    s.box = bounds_of(corners_of(s));
     return s;
 }
 
-vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+Tet tet_of(Stand s) { return Tet(corners_of(s), ranks(s.cell)); }
 
-Tet tet_of(Stand s) { return Tet(vec3[4](corner_of(s, 0u), corner_of(s, 1u), corner_of(s, 2u), corner_of(s, 3u)), ranks(s.cell)); }
-
-Sides sides_of(Stand s, vec3 x) { return sides_of(corner_of(s, 0u), corner_of(s, 1u), corner_of(s, 2u), corner_of(s, 3u), x); }
+Sides sides_of(Stand s, vec3 x) { return sides_of(corners_of(s), s.box, x); }
 
 uvec3 kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
@@ -72,6 +76,7 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     s.x = exchange(s.x, e, v.x);
     s.y = exchange(s.y, e, v.y);
     s.z = exchange(s.z, e, v.z);
+    s.box = bounds_of(corners_of(s));
     return true;
 }
 

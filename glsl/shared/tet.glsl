@@ -32,7 +32,7 @@ struct Weights {
     bool in_box; // inside the closed box of the vertices
     bool inside; // the closed, not flat cell holds the point
     bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
-    float margin; // a weight this near to 0 may be that of a point on either side of the face, by rounding
+    float margin; // of the cell, see Bounds
 };
 
 // Ascending places of four different vertex indices.
@@ -56,6 +56,29 @@ Tet make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
 
 float volume(Tet t) { return orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
 
+// The box of a tetrahedron, and its margin: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+struct Bounds {
+    vec3 lo;
+    vec3 hi;
+    float margin;
+};
+
+// Of coordinates, which are not negative and thus in the order of their bits: integers need no care for NaN.
+vec3 smaller(vec3 a, vec3 b) { return uintBitsToFloat(min(floatBitsToUint(a), floatBitsToUint(b))); }
+vec3 larger(vec3 a, vec3 b) { return uintBitsToFloat(max(floatBitsToUint(a), floatBitsToUint(b))); }
+
+Bounds bounds_of(vec3 v[4]) {
+    Bounds r;
+    r.lo = smaller(smaller(v[0], v[1]), smaller(v[2], v[3]));
+    r.hi = larger(larger(v[0], v[1]), larger(v[2], v[3]));
+    precise vec3 size = r.hi - r.lo;
+    precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
+    r.margin = margin;
+    return r;
+}
+
+bool holds(Bounds box, vec3 p) { return all(lessThanEqual(box.lo, p)) && all(lessThanEqual(p, box.hi)); }
+
 Weights weights(Tet t, vec3 p) {
     float vol = volume(t);
     float s = vol < 0.0 ? -1.0 : 1.0;
@@ -64,15 +87,11 @@ Weights weights(Tet t, vec3 p) {
                s * orient(t.v[0], t.v[1], t.v[2], p));
     precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
     r.sum = sum;
-    vec3 lo = min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
-    vec3 hi = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3]));
-    r.in_box = all(lessThanEqual(lo, p)) && all(lessThanEqual(p, hi));
-    float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
-    r.inside = r.in_box && vol != 0.0 && least >= 0.0;
-    precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
-    r.clear = r.inside && least > margin;
-    r.margin = margin;
+    Bounds box = bounds_of(t.v);
+    r.in_box = holds(box, p);
+    r.inside = r.in_box && vol != 0.0 && all(greaterThanEqual(r.w, vec4(0.0)));
+    r.clear = r.inside && all(greaterThan(r.w, vec4(box.margin)));
+    r.margin = box.margin;
     return r;
 }
 
@@ -105,20 +124,16 @@ struct Sides {
     bool near;  // no face says outside by more than the margin
 };
 
-Sides sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 p) {
-    precise vec3 a = v0 - p, b = v1 - p, c = v2 - p, d = v3 - p;
+Sides sides_of(vec3 v[4], Bounds box, vec3 p) {
+    precise vec3 a = v[0] - p, b = v[1] - p, c = v[2] - p, d = v[3] - p;
     vec3 ab = cross_product(a, b), cd = cross_product(c, d);
     vec4 w = vec4(dot_product(cd, b), -dot_product(cd, a), dot_product(ab, d), -dot_product(ab, c));
     precise float sum = (w.x + w.y) + (w.z + w.w);
     Sides r;
     r.w = sum < 0.0 ? -w : w;
     r.sum = abs(sum);
-    vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
-    precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * two_to(-16);
-    float least = least_of(r.w);
-    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && least > margin;
-    r.near = least >= -margin;
+    r.clear = holds(box, p) && all(greaterThan(r.w, vec4(box.margin)));
+    r.near = all(greaterThanEqual(r.w, vec4(-box.margin)));
     return r;
 }
 

@@ -10,7 +10,18 @@ uvec3 voxel_place(SlicePlan plan, uint i) {
     return uvec3(i - row * plan.width, y % plan.height, plan.layer + y / plan.height);
 }
 
-vec3 voxel_centre(SlicePlan plan, uvec3 place) {
-    precise vec3 at = ((plan.origin.xyz + float(place.z) * plan.up.xyz) + float(place.y) * plan.down.xyz) + float(place.x) * plan.across.xyz;
+// Where a row begins, and a voxel in it lies.
+vec3 row_origin(SlicePlan plan, uint y, uint layer) {
+    precise vec3 at = (plan.origin.xyz + float(layer) * plan.up.xyz) + float(y) * plan.down.xyz;
     return at;
+}
+
+vec3 voxel_centre(SlicePlan plan, vec3 row, uint x) {
+    precise vec3 at = row + float(x) * plan.across.xyz;
+    return at;
+}
+
+vec3 voxel_centre(SlicePlan plan, uint i) {
+    uvec3 place = voxel_place(plan, i);
+    return voxel_centre(plan, row_origin(plan, place.y, place.z), place.x);
 }

@@ -53,6 +53,29 @@ pub struct Weights {
     pub clear: bool,
 }
 
+/// The box of a tetrahedron, and its margin.
+#[derive(Clone, Copy, Debug)]
+pub struct Bounds {
+    lo: Vec3,
+    hi: Vec3,
+    /// A weight this near to 0 may be that of a point on either side of the face, by rounding.
+    margin: f32,
+}
+
+impl Bounds {
+    /// Of four corners.
+    pub fn new([a, b, c, d]: [Vec3; 4]) -> Self {
+        let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
+        let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
+        let size = sub(hi, lo);
+        Self { lo, hi, margin: ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23) }
+    }
+
+    fn hold(&self, p: Vec3) -> bool {
+        (0..3).all(|k| self.lo[k] <= p[k] && p[k] <= self.hi[k])
+    }
+}
+
 /// What a step of a walk needs: cheaper than [`Weights`], but neighbours may disagree about their face by rounding.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
@@ -72,19 +95,14 @@ pub fn least_of(w: [f32; 4]) -> f32 {
 }
 
 /// The sides of p on which the faces of a tetrahedron lie.
-pub fn sides_of(v: [Vec3; 4], p: Vec3) -> Sides {
+pub fn sides_of(v: [Vec3; 4], bounds: &Bounds, p: Vec3) -> Sides {
     let [a, b, c, d] = v.map(|v| sub(v, p));
     let (ab, cd) = (cross(a, b), cross(c, d));
     let w = [dot(cd, b), -dot(cd, a), dot(ab, d), -dot(ab, c)];
     let sum = (w[0] + w[1]) + (w[2] + w[3]);
     let w = if sum < 0.0 { w.map(|w| -w) } else { w };
-    let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
-    let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
-    let size = sub(hi, lo);
-    let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
-    let in_box = (0..3).all(|k| lo[k] <= 0.0 && 0.0 <= hi[k]);
-    let least = least_of(w);
-    Sides { w, sum: sum.abs(), clear: in_box && least > margin, near: least >= -margin }
+    let margin = bounds.margin;
+    Sides { w, sum: sum.abs(), clear: bounds.hold(p) && w.iter().all(|&w| w > margin), near: w.iter().all(|&w| w >= -margin) }
 }
 
 impl Sides {
@@ -117,14 +135,10 @@ impl Tet {
         let s = if self.volume() < 0.0 { -1.0 } else { 1.0 };
         // The order of a face's vertices alternates the sign with the opposite vertex.
         let w = [-s * orient(b, c, d, p), s * orient(a, c, d, p), -s * orient(a, b, d, p), s * orient(a, b, c, p)];
-        let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
-        let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
-        let in_box = (0..3).all(|k| lo[k] <= p[k] && p[k] <= hi[k]);
-        let least = least_of(w);
-        let inside = in_box && self.volume() != 0.0 && least >= 0.0;
-        let size = sub(hi, lo);
-        let margin = ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23);
-        Weights { w, sum: (w[0] + w[1]) + (w[2] + w[3]), in_box, inside, margin, clear: inside && least > margin }
+        let bounds = Bounds::new(self.v);
+        let (in_box, margin) = (bounds.hold(p), bounds.margin);
+        let inside = in_box && self.volume() != 0.0 && w.iter().all(|&w| w >= 0.0);
+        Weights { w, sum: (w[0] + w[1]) + (w[2] + w[3]), in_box, inside, margin, clear: inside && w.iter().all(|&w| w > margin) }
     }
 }
 

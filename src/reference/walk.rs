@@ -15,7 +15,7 @@
 use super::boundary::NONE;
 use super::candidates::Best;
 use super::grid::reciprocal;
-use super::tet::{Sides, Tet, Vec3, Weights, least_of, sides_of};
+use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::mesh::{Field, Mesh, On};
 
 /// Most tetrahedra of a star.
@@ -78,7 +78,7 @@ impl Stand {
 
     /// The sides of x on which its faces lie.
     pub fn sides(&self, x: Vec3) -> Sides {
-        sides_of(self.v, x)
+        sides_of(self.v, &Bounds::new(self.v), x)
     }
 }
 
