@@ -168,12 +168,16 @@ struct olbvh_SlicePlan {
     vec4 reach;  // Half extent of a voxel's box along the axes in the units of the mesh, and a little more.
     uint width;  // Voxels per row.
     uint height; // Rows of a layer.
-    uint layers; // Layers.
+    uint layer;  // Layer of the first row of the band: those rows that are sliced now.
+    uint first;  // Number of that row in the layer.
+    uint rows;   // Rows of the band.
     uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
-    uint listed; // Voxels of the band whose centre lies in no cell.
     uint first_cell; // The first cell of the finest grid that is looked at, 10 bits per axis, x lowest.
     uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
-    uint pad;    // Unused.
+    uint listed; // Voxels of the band whose centre lies in no cell.
+    uint pad0;   // Unused.
+    uint pad1;   // Unused.
+    uint pad2;   // Unused.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.
@@ -375,7 +379,7 @@ struct olbvh_Weights {
     bool in_box; // inside the closed box of the vertices
     bool inside; // the closed, not flat cell holds the point
     bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
-    float margin; // a weight this near to 0 may be that of a point on either side of the face, by rounding
+    float margin; // of the cell, see Bounds
 };
 
 // Ascending places of four different vertex indices.
@@ -399,6 +403,29 @@ olbvh_Tet olbvh_make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
 
 float olbvh_volume(olbvh_Tet t) { return olbvh_orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
 
+// The box of a tetrahedron, and its margin: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+struct olbvh_Bounds {
+    vec3 lo;
+    vec3 hi;
+    float margin;
+};
+
+// Of coordinates, which are not negative and thus in the order of their bits: integers need no care for NaN.
+vec3 olbvh_smaller(vec3 a, vec3 b) { return uintBitsToFloat(min(floatBitsToUint(a), floatBitsToUint(b))); }
+vec3 olbvh_larger(vec3 a, vec3 b) { return uintBitsToFloat(max(floatBitsToUint(a), floatBitsToUint(b))); }
+
+olbvh_Bounds olbvh_bounds_of(vec3 v[4]) {
+    olbvh_Bounds r;
+    r.lo = olbvh_smaller(olbvh_smaller(v[0], v[1]), olbvh_smaller(v[2], v[3]));
+    r.hi = olbvh_larger(olbvh_larger(v[0], v[1]), olbvh_larger(v[2], v[3]));
+    precise vec3 size = r.hi - r.lo;
+    precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
+    r.margin = margin;
+    return r;
+}
+
+bool olbvh_holds(olbvh_Bounds box, vec3 olbvh_p) { return all(lessThanEqual(box.lo, olbvh_p)) && all(lessThanEqual(olbvh_p, box.hi)); }
+
 olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
     float vol = olbvh_volume(t);
     float s = vol < 0.0 ? -1.0 : 1.0;
@@ -407,15 +434,11 @@ olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
                s * olbvh_orient(t.v[0], t.v[1], t.v[2], olbvh_p));
     precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
     r.sum = sum;
-    vec3 lo = min(min(t.v[0], t.v[1]), min(t.v[2], t.v[3]));
-    vec3 hi = max(max(t.v[0], t.v[1]), max(t.v[2], t.v[3]));
-    r.in_box = all(lessThanEqual(lo, olbvh_p)) && all(lessThanEqual(olbvh_p, hi));
-    float least = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w));
-    r.inside = r.in_box && vol != 0.0 && least >= 0.0;
-    precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
-    r.clear = r.inside && least > margin;
-    r.margin = margin;
+    olbvh_Bounds box = olbvh_bounds_of(t.v);
+    r.in_box = olbvh_holds(box, olbvh_p);
+    r.inside = r.in_box && vol != 0.0 && all(greaterThanEqual(r.w, vec4(0.0)));
+    r.clear = r.inside && all(greaterThan(r.w, vec4(box.margin)));
+    r.margin = box.margin;
     return r;
 }
 
@@ -448,20 +471,16 @@ struct olbvh_Sides {
     bool olbvh_near;  // no face says outside by more than the margin
 };
 
-olbvh_Sides olbvh_sides_of(vec3 v0, vec3 v1, vec3 v2, vec3 v3, vec3 olbvh_p) {
-    precise vec3 a = v0 - olbvh_p, b = v1 - olbvh_p, c = v2 - olbvh_p, d = v3 - olbvh_p;
+olbvh_Sides olbvh_sides_of(vec3 v[4], olbvh_Bounds box, vec3 olbvh_p) {
+    precise vec3 a = v[0] - olbvh_p, b = v[1] - olbvh_p, c = v[2] - olbvh_p, d = v[3] - olbvh_p;
     vec3 ab = olbvh_cross_product(a, b), cd = olbvh_cross_product(c, d);
     vec4 w = vec4(olbvh_dot_product(cd, b), -olbvh_dot_product(cd, a), olbvh_dot_product(ab, d), -olbvh_dot_product(ab, c));
     precise float sum = (w.x + w.y) + (w.z + w.w);
     olbvh_Sides r;
     r.w = sum < 0.0 ? -w : w;
     r.sum = abs(sum);
-    vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
-    precise vec3 size = hi - lo;
-    precise float margin = ((size.x * size.y) * size.z) * olbvh_two_to(-16);
-    float least = olbvh_least_of(r.w);
-    r.clear = all(lessThanEqual(lo, vec3(0.0))) && all(lessThanEqual(vec3(0.0), hi)) && least > margin;
-    r.olbvh_near = least >= -margin;
+    r.clear = olbvh_holds(box, olbvh_p) && all(greaterThan(r.w, vec4(box.margin)));
+    r.olbvh_near = all(greaterThanEqual(r.w, vec4(-box.margin)));
     return r;
 }
 
@@ -675,6 +694,7 @@ struct olbvh_Stand {
     uvec4 cell; // vertices in the caller's order
     uvec4 ids;  // and ascending
     vec4 x, y, z;
+    olbvh_Bounds box;
 };
 
 // How a step changes what is held per corner.
@@ -684,7 +704,11 @@ struct olbvh_Exchange {
     bvec3 before; // whether the fresh one comes before each of the corners kept
 };
 
-olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
+olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+
+vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+
+vec3[4] olbvh_corners_of(olbvh_Stand s) { return vec3[4](olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u)); }
 
 olbvh_Stand olbvh_stand_in(uint t) {
     olbvh_Stand s;
@@ -696,14 +720,13 @@ olbvh_Stand olbvh_stand_in(uint t) {
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
+    s.box = olbvh_bounds_of(olbvh_corners_of(s));
     return s;
 }
 
-vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
+olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(olbvh_corners_of(s), olbvh_ranks(s.cell)); }
 
-olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(vec3[4](olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u)), olbvh_ranks(s.cell)); }
-
-olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corner_of(s, 0u), olbvh_corner_of(s, 1u), olbvh_corner_of(s, 2u), olbvh_corner_of(s, 3u), x); }
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corners_of(s), s.box, x); }
 
 uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
@@ -741,6 +764,7 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     s.x = olbvh_exchange(s.x, e, v.x);
     s.y = olbvh_exchange(s.y, e, v.y);
     s.z = olbvh_exchange(s.z, e, v.z);
+    s.box = olbvh_bounds_of(olbvh_corners_of(s));
     return true;
 }
 

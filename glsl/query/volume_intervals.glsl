@@ -31,15 +31,26 @@ vec3 origin, inverse_way;
 float first, last;
 float entered, left;
 
-// Whether the ray meets a box, and where it enters and leaves it.
-bool hit(vec3 lo, vec3 hi) {
+// Where the ray enters and leaves the slabs between the sides of a box.
+struct Slabs {
+    vec3 near;
+    vec3 far;
+};
+
+Slabs slabs_of(vec3 lo, vec3 hi) {
     precise vec3 a = ((lo - plan.slack.xyz) - origin) * inverse_way;
     precise vec3 b = ((hi + plan.slack.xyz) - origin) * inverse_way;
-    vec3 near = min(a, b), far = max(a, b);
-    entered = max(max(max(0.0, near.x), near.y), near.z);
-    left = min(min(min(3.40282347e38, far.x), far.y), far.z);
+    return Slabs(min(a, b), max(a, b));
+}
+
+// Whether the ray meets a box, and where it enters and leaves it.
+bool hit(Slabs s) {
+    entered = max(max(max(0.0, s.near.x), s.near.y), s.near.z);
+    left = min(min(min(3.40282347e38, s.far.x), s.far.y), s.far.z);
     return entered <= left;
 }
+
+bool hit(vec3 lo, vec3 hi) { return hit(slabs_of(lo, hi)); }
 
 void extend() {
     first = min(first, entered);
@@ -83,10 +94,23 @@ bool visit_all() {
 #else
 #include "shared/tree.glsl"
 
+Slabs lower, upper; // of the children of the node that is looked at: they share three planes per axis
+
+void enter_node(Node node) {
+    uvec3 k = 2u * unmorton(node.code);
+    vec3 side[3];
+    for (uint c = 0u; c < 3u; ++c) {
+        for (uint i = 0u; i < 3u; ++i) side[i][c] = cell_side(g, c, node.level + 1u, k[c] + i);
+    }
+    lower = slabs_of(side[0], side[1]);
+    upper = slabs_of(side[1], side[2]);
+}
+#define ENTER_NODE(node) enter_node(node)
+
 bool meets(Node node) {
-    vec3 lo, hi;
-    cell_box(g, node.level, node.code, lo, hi);
-    return hit(lo, hi);
+    if (node.level == 0u) return hit(g.lo.xyz, g.hi.xyz);
+    bvec3 up = notEqual(uvec3(node.code >> 2u, node.code >> 1u, node.code) & 1u, uvec3(0u));
+    return hit(Slabs(mix(lower.near, upper.near, up), mix(lower.far, upper.far, up)));
 }
 
 bool visit_node(Node node) {

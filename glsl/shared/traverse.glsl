@@ -2,7 +2,11 @@
 // explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+// and may define ENTER_NODE(node), done before F_N is asked about the node's children.
 // STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+#ifndef ENTER_NODE
+#define ENTER_NODE(node)
+#endif
 const uint MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
 
 // True if the traversal ended by itself, false at the loop limit.
@@ -20,6 +24,7 @@ bool traverse(uint level) {
         bool leaves = node.level + 1u == level;
         uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
         uint accepted = 0u, place = first; // bit per digit
+        ENTER_NODE(node);
         for (uint digit = 0u; digit < 8u; ++digit) {
             if ((mask >> digit & 1u) == 0u) continue;
             Node child = Node(place++, node.level + 1u, node.code << 3 | digit);
