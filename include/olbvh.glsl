@@ -206,8 +206,8 @@ struct olbvh_SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
     uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
     uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
-    uint inside;   // Voxels with their centre in the mesh; counted once all are done, as the next two.
-    uint touched;  // Voxels that the mesh merely touches.
+    uint inside;   // Voxels with their centre in the mesh; counted once all centres are located.
+    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at, as the next.
     uint empty;    // Voxels that it does not.
 };
 
@@ -1044,7 +1044,11 @@ bool olbvh_visit_leaf(olbvh_Node node);
 // explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+// and may define ENTER_NODE(node), done before F_N is asked about the node's children.
 // STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+#ifndef ENTER_NODE
+#define ENTER_NODE(node)
+#endif
 const uint olbvh_MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
 
 // True if the traversal ended by itself, false at the loop limit.
@@ -1062,6 +1066,7 @@ bool olbvh_traverse(uint level) {
         bool leaves = node.level + 1u == level;
         uint mask = olbvh_child_mask(node.index), first = olbvh_co.at[node.index] + 1u;
         uint accepted = 0u, place = first; // bit per digit
+        ENTER_NODE(node);
         for (uint digit = 0u; digit < 8u; ++digit) {
             if ((mask >> digit & 1u) == 0u) continue;
             olbvh_Node child = olbvh_Node(place++, node.level + 1u, node.code << 3 | digit);

@@ -212,7 +212,8 @@ fn rounds_go_on_where_they_ended() {
         if status.locating + status.touching == 0 {
             break status;
         }
-        assert_eq!(status.inside + status.touched + status.empty, 0, "counted before the end");
+        assert!(status.locating == 0 || status.inside == 0, "counted before all are located");
+        assert_eq!(status.touched + status.empty, 0, "counted before the end");
     };
     assert!(submissions > 1 || copies < 6000);
     assert_eq!(status.inside + status.touched + status.empty, 25);

@@ -153,8 +153,8 @@ struct SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
     uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
     uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
-    uint inside;   // Voxels with their centre in the mesh; counted once all are done, as the next two.
-    uint touched;  // Voxels that the mesh merely touches.
+    uint inside;   // Voxels with their centre in the mesh; counted once all centres are located.
+    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at, as the next.
     uint empty;    // Voxels that it does not.
 };
 
