@@ -25,8 +25,8 @@
 //! - **Record**: functions named `cmd_*` append to a [`gpu::Recorder`]: the caller's command buffer, the caller's memory, nothing submitted,
 //!   waited for or allocated. Counts stay on the device.
 //! - **Own**: [`build::Tree::build`], [`query::locate`], [`query::render`] record the same stages, submit, wait, and allocate exactly.
-//! - **GLSL**: every kernel of `glsl/` is compiled twice from one source, with buffers by address and by descriptor; `build.rs` reflects it
-//!   and generates its Rust side, shared structs included ([`layout`]).
+//! - **GLSL**: every kernel of `glsl/` is compiled in three forms from one source, with buffers by address (for processors with records in
+//!   64-bit words) and by descriptor; `build.rs` reflects it and generates its Rust side, shared structs included ([`layout`]).
 //!
 //! # Numerics
 //! Cells decide membership, not boxes: a point is quantized by subtraction, multiplication and floor, all correctly rounded and monotone, so

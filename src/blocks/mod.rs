@@ -82,13 +82,7 @@ fn smaller(source: &Source<'_>, block: &Block) -> Option<[Block; 2]> {
 
 /// Refuses a field that is not the mesh's.
 fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
-    let expected = |on| if on == On::Points { mesh.points.len() } else { mesh.tets.len() };
-    match field {
-        Some((values, on)) if values.len() != expected(on) => {
-            Err(Error::Invalid(format!("a field of {} values where the mesh has {}", values.len(), expected(on))))
-        }
-        _ => Ok(()),
-    }
+    field.map_or(Ok(()), |(values, on)| on.check(values, [mesh.points.len(), mesh.tets.len()]))
 }
 
 /// Whether something failed for want of memory or room, so that less of the mesh may do.

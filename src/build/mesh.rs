@@ -259,6 +259,11 @@ impl DeviceMesh {
         &self.gpu
     }
 
+    /// Number of points and of tetrahedra.
+    pub(crate) fn sizes(&self) -> [usize; 2] {
+        [self.input.points as usize, self.input.tets as usize]
+    }
+
     /// Where points and cells lie.
     pub fn input(&self) -> &MeshInput {
         &self.input

@@ -81,10 +81,7 @@ impl FieldRanges {
     /// # Errors
     /// As [`FieldRanges::new`].
     pub fn update(&mut self, mesh: &DeviceMesh, tree: &Tree, (values, on): (&[f32], On)) -> Result<()> {
-        let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-        if values.len() != expected as usize {
-            return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
-        }
+        on.check(values, mesh.sizes())?;
         if self.buffer.size() < range_bytes(tree.status().nodes) {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
         }

@@ -9,6 +9,9 @@ use ash::vk;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex};
 
+/// Why there is no device, and what helps.
+const NO_DRIVER: &str = "the loader finds no driver; install one (mesa-vulkan-drivers runs on any processor)";
+
 struct Session {
     entry: ash::Entry,
     instance: ash::Instance,
@@ -18,7 +21,8 @@ struct Session {
 /// Opens the loader and an instance.
 fn open_instance() -> Result<Session> {
     // SAFETY: the loader is trusted as every Vulkan program trusts it.
-    let entry = unsafe { ash::Entry::load() }.map_err(|e| Error::NoVulkan(e.to_string()))?;
+    let entry = unsafe { ash::Entry::load() }
+        .map_err(|e| Error::NoVulkan(format!("its loader is missing ({e}); install libvulkan1 and a driver")))?;
     // SAFETY: plain enumeration.
     let extensions =
         unsafe { entry.enumerate_instance_extension_properties(None) }.map_err(failed("vkEnumerateInstanceExtensionProperties"))?;
@@ -37,7 +41,10 @@ fn open_instance() -> Result<Session> {
     let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_2);
     let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&wanted).flags(flags);
     // SAFETY: all structs outlive the call.
-    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|e| Error::NoVulkan(format!("vkCreateInstance: {e:?}")))?;
+    let instance = unsafe { entry.create_instance(&info, None) }.map_err(|e| match e {
+        vk::Result::ERROR_INCOMPATIBLE_DRIVER => Error::NoVulkan(NO_DRIVER.into()),
+        e => Error::NoVulkan(format!("vkCreateInstance failed ({e:?}); look at the drivers installed")),
+    })?;
     Ok(Session { entry, instance, debug })
 }
 
@@ -64,7 +71,7 @@ fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::Physica
     let all: Vec<_> = devices.into_iter().map(|d| (d, DeviceReport::new(instance, d))).collect();
     let names = || all.iter().enumerate().map(|(i, (_, r))| format!("{i}: {}", r.name)).collect::<Vec<_>>().join(", ");
     if all.is_empty() {
-        return Err(Error::NoDevice("the Vulkan loader finds no driver; install one (mesa-vulkan-drivers runs on any processor)".into()));
+        return Err(Error::NoDevice(NO_DRIVER.into()));
     }
     if let Some(wanted) = wanted {
         let lower = wanted.to_lowercase();

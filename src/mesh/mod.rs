@@ -6,6 +6,8 @@ mod procedural;
 pub use kuhn::{kuhn, kuhn_jittered};
 pub use procedural::{graded, shell, slivers};
 
+use crate::error::{Error, Result};
+
 /// A tetrahedral mesh with scalar fields.
 #[derive(Clone, Debug, Default)]
 pub struct Mesh {
@@ -33,6 +35,18 @@ pub enum On {
     Points,
     /// One value per tetrahedron, constant in it.
     Cells,
+}
+
+impl On {
+    /// Refuses values that are not as many as a mesh has points, or tetrahedra.
+    pub(crate) fn check(self, values: &[f32], [points, tets]: [usize; 2]) -> Result<()> {
+        let expected = if self == Self::Points { points } else { tets };
+        if values.len() == expected {
+            return Ok(());
+        }
+        let what = if self == Self::Points { "points" } else { "tetrahedra" };
+        Err(Error::Invalid(format!("a field of {} values where the mesh has {expected} {what}", values.len())))
+    }
 }
 
 /// A named scalar field.

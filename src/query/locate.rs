@@ -229,10 +229,7 @@ pub fn locate(
     let scene = Scene::new(mesh, tree);
     let field = match field {
         Some((values, on)) => {
-            let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-            if values.len() != expected as usize {
-                return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
-            }
+            on.check(values, mesh.sizes())?;
             Some((gpu.upload("olbvh.query.field", values)?, on))
         }
         None => None,

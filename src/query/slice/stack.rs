@@ -63,13 +63,11 @@ impl<'a> Slicing<'a> {
     ) -> Result<Self> {
         let gpu = mesh.gpu();
         voxels.plan(mesh.grid())?;
-        if let Some((values, on)) = field {
-            let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-            if values.len() != expected as usize {
-                return Err(Error::Invalid(format!("a field of {} values where the mesh has {expected}", values.len())));
-            }
-        }
-        let field = field.map(|(values, on)| Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))).transpose()?;
+        let upload = |(values, on): (&[f32], On)| {
+            on.check(values, mesh.sizes())?;
+            Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))
+        };
+        let field = field.map(upload).transpose()?;
         let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE) / PER_VOXEL);
         let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size[0], rows);

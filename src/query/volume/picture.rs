@@ -82,12 +82,9 @@ impl<'a> Canvas<'a> {
     ) -> Result<Self> {
         let gpu = mesh.gpu();
         let searched = Searched::new(mesh, structure);
-        let expected = if on == On::Points { mesh.input().points } else { mesh.input().tets };
-        if values.len() != expected as usize || normals.is_some_and(|n| n.len() != mesh.input().points as usize) {
-            return Err(Error::Invalid(format!(
-                "a field of {} values where the mesh has {expected}, or normals for another mesh",
-                values.len()
-            )));
+        on.check(values, mesh.sizes())?;
+        if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
+            return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));
         }
         let field = (gpu.upload("olbvh.query.field", values)?, on);
         let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
