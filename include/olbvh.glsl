@@ -39,7 +39,7 @@
 const uint olbvh_NONE = OLBVH_NONE;
 // Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
 // many fetches (OLBVH_WIDE).
-#if defined(OLBVH_WIDE) && !defined(OLBVH_GLSL)
+#ifdef OLBVH_WIDE
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #define FLOATS u64vec2
 #define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
@@ -489,6 +489,12 @@ vec4 olbvh_barycentric(olbvh_Sides r) {
     float k = r.sum <= 0.0 ? 0.0 : olbvh_reciprocal(r.sum);
     precise vec4 b = r.w * k;
     return b;
+}
+
+// What has these values at the corners, at barycentric coordinates.
+float olbvh_weighed(vec4 b, vec4 at_corners) {
+    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    return r;
 }
 
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;

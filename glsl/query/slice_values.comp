@@ -22,11 +22,6 @@ BUFFER(6, readonly, uint, answers)
 BUFFER(7, writeonly, float, values)
 BUFFER(8, READ_WRITE, SliceStatus, status)
 
-float value_by(vec4 at_vertices, vec4 b) {
-    precise float sum = (b.x * at_vertices.x + b.y * at_vertices.y) + (b.z * at_vertices.z + b.w * at_vertices.w);
-    return sum;
-}
-
 // The value of a voxel with its centre at x that its owner touches.
 float touched_value(uint owner, vec3 x) {
     if (ON_CELLS != 0u) return field.at[owner];
@@ -34,11 +29,11 @@ float touched_value(uint owner, vec3 x) {
     Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
     vec4 at_vertices = vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
     Weights w = weights(tet, x);
-    if (LINEAR != 0u && w.sum > 0.0) return value_by(at_vertices, barycentric(w, tet.rank));
+    if (LINEAR != 0u && w.sum > 0.0) return weighed(barycentric(w, tet.rank), at_vertices);
     vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
     vec4 c;
     closest(v, c);
-    return value_by(at_vertices, vec4(c[tet.rank.x], c[tet.rank.y], c[tet.rank.z], c[tet.rank.w]));
+    return weighed(vec4(c[tet.rank.x], c[tet.rank.y], c[tet.rank.z], c[tet.rank.w]), at_vertices);
 }
 
 void main() {

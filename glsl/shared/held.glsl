@@ -12,10 +12,4 @@ vec4 field_behind(vec4 held, Stand s, Exchange e) {
     return exchange(held, e, field.at[e.fresh]);
 }
 
-// What has these values at the corners, at barycentric coordinates.
-float weighed(vec4 b, vec4 at_corners) {
-    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
-    return r;
-}
-
 float value_of(vec4 held, vec4 b) { return ON_CELLS != 0u ? held.x : weighed(b, held); }

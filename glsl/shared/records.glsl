@@ -1,6 +1,6 @@
 // Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
 // many fetches (OLBVH_WIDE).
-#if defined(OLBVH_WIDE) && !defined(OLBVH_GLSL)
+#ifdef OLBVH_WIDE
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #define FLOATS u64vec2
 #define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)

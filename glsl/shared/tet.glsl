@@ -144,6 +144,12 @@ vec4 barycentric(Sides r) {
     return b;
 }
 
+// What has these values at the corners, at barycentric coordinates.
+float weighed(vec4 b, vec4 at_corners) {
+    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    return r;
+}
+
 const float SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; the smallest float for a flat cell.

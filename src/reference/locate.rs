@@ -8,7 +8,7 @@ use super::halves::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
-use super::walk::{HINTED, Room, STRIDE, Walked, Walker};
+use super::walk::{HINTED, Room, STRIDE, Walked, Walker, weighed};
 use crate::mesh::{Field, Mesh, On};
 use crate::options::Lists;
 use crate::slicing::RUN;
@@ -172,7 +172,7 @@ impl<'a> Locator<'a> {
         let Some(&ids) = self.mesh.tets.get(location.owner as usize) else { return f32::NAN };
         let (b, v) = (location.barycentric, ids.map(at));
         match field.on {
-            On::Points => (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3]),
+            On::Points => weighed(b, v),
             On::Cells => at(location.owner),
         }
     }
