@@ -8,14 +8,18 @@ ARGUMENTS(4)
     uint tets;
     uint points;
     uint stride;  // floats from one point to the next
-    uint groups;  // workgroups of this dispatch; each invocation takes every (groups * WORKGROUP)-th tetrahedron
+    uint share;   // tetrahedra of a workgroup
 END_ARGUMENTS
 BUFFER(0, readonly, float, positions)
 RECORDS(1, uvec4, cells)
 BUFFER(2, READ_WRITE, uint, bad) // one bit per tetrahedron, zeroed
 BUFFER(3, READ_WRITE, MeshStatus, status)
 
+#include "shared/positions.glsl"
+
 const uint LIMIT = (125u + 127u) << 23; // coordinates from 2^125 on count as infinite
+
+uvec3 magnitude(vec3 x) { return floatBitsToUint(x) & 0x7fffffffu; }
 
 // A key; denormals count as 0.
 uint key_of(float x) {
@@ -24,37 +28,34 @@ uint key_of(float x) {
 }
 
 void main() {
-    // No arrays as in `MeshStatus`: the optimiser would give them its type, layout included, which local variables must not have.
-    uvec3 lo = uvec3(0u), hi = uvec3(0u);
+    const float FAR = uintBitsToFloat(LIMIT);
+    vec3 lo = vec3(FAR), hi = vec3(-FAR);
     uint bad_cells = 0u;
-    for (uint t = item_index(); t < tets; t += groups * WORKGROUP) {
+    uint begin = group_index() * share, end = min(begin + share, tets);
+    for (uint t = begin + local_index(); t < end; t += WORKGROUP) {
         uvec4 v = words(cells.at[t]);
         bool ok = max(max(v.x, v.y), max(v.z, v.w)) < points && v.x != v.y && v.x != v.z && v.x != v.w && v.y != v.z && v.y != v.w && v.z != v.w;
-        uvec3 tl = uvec3(0u), th = uvec3(0u);
-        for (uint i = 0u; ok && i < 4u; ++i) {
-            for (uint c = 0u; c < 3u; ++c) {
-                float x = positions.at[v[i] * stride + c];
-                ok = ok && (floatBitsToUint(x) & 0x7fffffffu) < LIMIT;
-                tl[c] = max(tl[c], ~key_of(x));
-                th[c] = max(th[c], key_of(x));
+        if (ok) {
+            vec3 a = position(v.x, stride), b = position(v.y, stride), c = position(v.z, stride), d = position(v.w, stride);
+            ok = all(lessThan(max(max(magnitude(a), magnitude(b)), max(magnitude(c), magnitude(d))), uvec3(LIMIT)));
+            if (ok) {
+                lo = min(lo, min(min(a, b), min(c, d)));
+                hi = max(hi, max(max(a, b), max(c, d)));
             }
         }
-        if (ok) {
-            lo = max(lo, tl);
-            hi = max(hi, th);
-        } else {
+        if (!ok) {
             atomicOr(bad.at[t >> 5u], 1u << (t & 31u));
             bad_cells += 1u;
         }
     }
     bad_cells = subgroupAdd(bad_cells);
-    lo = subgroupMax(lo);
+    lo = subgroupMin(lo);
     hi = subgroupMax(hi);
     if (subgroupElect()) {
         if (bad_cells > 0u) atomicAdd(status.at[0].bad, bad_cells);
-        for (uint c = 0u; c < 3u; ++c) {
-            if (lo[c] != 0u) atomicMax(status.at[0].lo[c], lo[c]);
-            if (hi[c] != 0u) atomicMax(status.at[0].hi[c], hi[c]);
+        for (uint c = 0u; hi.x > -FAR && c < 3u; ++c) {
+            atomicMax(status.at[0].lo[c], ~key_of(lo[c]));
+            atomicMax(status.at[0].hi[c], key_of(hi[c]));
         }
     }
 }

@@ -3,9 +3,10 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
+#include "shared/mates.glsl"
 // Finds the two tetrahedra of every face (SPEC 2.3) through a table with open addressing. A face looks first near the place of its
 // smallest vertex, where its neighbours in the file looked just before (memory that is still close), then anywhere.
-// mates[face] becomes the other face's number and side, or ALONE or CROWDED: the same whichever face came first.
+// mates[face] becomes the other face (see mates.glsl): the same whichever came first, since a word only grows.
 ARGUMENTS(7)
     uint tets;
     uint slots;      // of the table
@@ -14,15 +15,13 @@ END_ARGUMENTS
 RECORDS(0, vec4, vertices)
 RECORDS(1, uvec4, cells)
 BUFFER(2, readonly, uint, bad)
-BUFFER(3, READ_WRITE, uint, table) // faces, or NONE; filled with NONE
-BUFFER(4, READ_WRITE, uint, mates) // filled with NONE, which is ALONE
+BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled with NONE
+BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
 BUFFER(5, READ_WRITE, MeshStatus, status)
 BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron without volume, zeroed
 
-const uint CROWDED = 0xfffffffeu;
-const uint SIDE = 0x80000000u;
 const uint NEAR_PROBES = 16u;
-const uint MAX_PROBES = 16384u;
+const uint MAX_PROBES = 8192u;
 
 uint mix_bits(uint h) {
     h ^= h >> 16;
@@ -62,20 +61,21 @@ void main() {
             umulExtended(h, near_slots, place, unused);
             uint probe = 0u;
             for (; probe < MAX_PROBES; ++probe) {
-                // Anywhere anew at each probe: where the faces of many vertices crowd, long stretches of the table are full.
-                uint anywhere, low;
-                umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, anywhere, low);
-                uint slot = probe < NEAR_PROBES ? near_base + place : anywhere;
+                uint slot = near_base + place;
                 place = place + 1u == near_slots ? 0u : place + 1u;
+                // Anywhere anew at each probe: where the faces of many vertices crowd, long stretches of the table are full.
+                if (probe >= NEAR_PROBES) umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, slot, unused);
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
                 uint other_face = other & ~SIDE;
                 if (face_of(words(cells.at[other_face >> 2]), other_face & 3u) == face) {
-                    if (atomicCompSwap(mates.at[other_face], NONE, me) == NONE) {
-                        mates.at[4u * t + f] = other;
+                    uint third = atomicCompSwap(mates.at[other_face], ALONE, mate(me, other));
+                    if (third == ALONE) {
+                        atomicMax(mates.at[4u * t + f], mate(other, me));
                     } else {
                         atomicExchange(mates.at[other_face], CROWDED);
-                        mates.at[4u * t + f] = CROWDED;
+                        atomicExchange(mates.at[4u * t + f], CROWDED);
+                        if (third != CROWDED) atomicExchange(mates.at[face_of_mate(third)], CROWDED);
                     }
                     break;
                 }

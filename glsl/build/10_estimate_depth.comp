@@ -6,7 +6,7 @@
 ARGUMENTS(5)
     uint tets;
     uint stride;
-    uint groups;
+    uint share; // tetrahedra of a workgroup
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
@@ -31,24 +31,20 @@ void main() {
     Grid g = grid.at[0];
     uvec2 sums[12];
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
-    for (uint t = item_index(); t < tets; t += groups * WORKGROUP) {
+    uint begin = group_index() * share, end = min(begin + share, tets);
+    for (uint t = begin + local_index(); t < end; t += WORKGROUP) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);
-        vec3 lo = position(ids.x, stride), hi = lo;
-        for (uint i = 1u; i < 4u; ++i) {
-            vec3 p = position(ids[i], stride);
-            lo = min(lo, p);
-            hi = max(hi, p);
-        }
+        vec3 a = position(ids.x, stride), b = position(ids.y, stride), c = position(ids.z, stride), d = position(ids.w, stride);
+        vec3 lo = min(min(a, b), min(c, d)), hi = max(max(a, b), max(c, d));
         lo = vec3(canonical(lo.x), canonical(lo.y), canonical(lo.z));
         hi = vec3(canonical(hi.x), canonical(hi.y), canonical(hi.z));
-        precise vec3 d = hi - lo;
-        precise vec3 extent = floor(vec3(canonical(d.x), canonical(d.y), canonical(d.z)) * g.inv.xyz);
+        precise vec3 size = hi - lo;
+        precise vec3 extent = floor(vec3(canonical(size.x), canonical(size.y), canonical(size.z)) * g.inv.xyz);
         float largest = min(max(max(extent.x, extent.y), extent.z), 1024.0);
-        uint across = uint(largest);
-        sums[0].x += across == 0u ? 0u : uint(findMSB(across));
+        sums[0].x += max(floatBitsToUint(largest) >> 23, 127u) - 127u; // its logarithm, downwards
         uvec3 first = quantize(g, lo), last = quantize(g, hi); // the box of the vertices' cells, since quantization is monotone
-        for (uint level = 0u; level <= MAX_LEVEL; ++level) {
+        [[unroll]] for (uint level = 0u; level <= MAX_LEVEL; ++level) {
             uvec3 n = (last >> MAX_LEVEL - level) - (first >> MAX_LEVEL - level) + 1u;
             uint before = sums[1u + level].x, product = n.x * n.y * n.z;
             sums[1u + level].x = before + product;

@@ -5,7 +5,7 @@ use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::LbvhNode;
-use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
+use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Structure};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
@@ -76,7 +76,7 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     let MeshArrays { grid, bad, boundary, vertices, status, .. } = mesh.arrays;
     let (BinaryTree { nodes, root, ids }, LbvhScratch { codes, arrivals, sort }) = (*tree, *scratch);
     r.stage("lbvh.codes", |r| {
-        r.fill(arrivals, u32::MAX);
+        cmd_fill(r, arrivals, u32::MAX)?;
         r.fill(root, u32::MAX);
         let workgroup = r.gpu().target().each;
         let spec = LbvhCodesSpec { workgroup, ..Default::default() };

@@ -9,8 +9,9 @@
 //!
 //! | stage | reads and writes |
 //! |---|---|
-//! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p, the fills of the tables 36 t |
-//! | `mesh.boundary` | cells 16 t, vertices 16 p, faces 16 t and mates 16 t to and fro, neighbours 16 t |
+//! | `mesh.clear` | the table of faces 20 t, mates 16 t |
+//! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
+//! | `mesh.boundary` | cells 16 t, vertices 16 p, faces 16 t and mates 16 t to and fro, neighbours 16 t to and fro |
 //! | `build.depth` | cells 16 t, points 12 p |
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan |
 //! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; with marks 8^l / 8 bytes three times |
@@ -51,8 +52,9 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let halves = if options.lists == Lists::Boundary { cells_and_vertices + 12 * n } else { 0 };
     let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
     let stages = [
-        ("mesh.bounds", 16 * t + 24 * p + 16 * p + 36 * t),
-        ("mesh.boundary", 16 * t + 16 * p + 4 * 16 * t + 16 * t),
+        ("mesh.clear", 36 * t),
+        ("mesh.bounds", 16 * t + 24 * p + 16 * p),
+        ("mesh.boundary", 16 * t + 16 * p + 6 * 16 * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
         ("build.count", cells_and_vertices + 4 * t + SCAN * t),
         ("build.filter", if filtered { filter } else { 0 }),

@@ -8,13 +8,13 @@ use crate::kernels::{
 };
 use crate::layout::{Grid, MeshStatus};
 use crate::mesh::Mesh;
-use crate::primitives::Arena;
+use crate::primitives::{Arena, cmd_fill};
 use crate::reference::boundary::fault_of;
 
 /// Most tetrahedra of one mesh: faces are numbered in 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
-/// Workgroups of kernels whose invocations take every n-th cell.
-pub(crate) const STRIDED_GROUPS: u32 = 256;
+/// Most workgroups of kernels that end in a sum over all cells.
+const SUMMING_GROUPS: u32 = 256;
 
 /// A mesh as it lies in device memory, the caller's or ours.
 #[derive(Clone, Copy, Debug)]
@@ -66,11 +66,10 @@ impl MeshArrays {
     }
 }
 
-/// Scratch memory of stage 0: 36 bytes and a bit per tetrahedron.
+/// Scratch memory of stage 0: 20 bytes and a bit per tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshScratch {
     table: BufferRef,
-    mates: BufferRef,
     flat_cells: BufferRef,
 }
 
@@ -81,8 +80,13 @@ impl MeshScratch {
     /// [`Error::Invalid`] if the arena is too small.
     pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
         let tets = u64::from(tets);
-        Ok(Self { table: arena.words(5 * tets + 16)?, mates: arena.words(4 * tets)?, flat_cells: arena.words(tets.div_ceil(32))? })
+        Ok(Self { table: arena.words(5 * tets + 16)?, flat_cells: arena.words(tets.div_ceil(32))? })
     }
+}
+
+/// How many tetrahedra, one after the other, a workgroup of such a kernel takes; at least one.
+pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
+    tets.div_ceil(SUMMING_GROUPS).max(1).next_multiple_of(workgroup)
 }
 
 /// Records stage 0. Reads `input` in compute shaders; writes `arrays` and `scratch` in transfers and compute shaders. The caller makes
@@ -115,17 +119,19 @@ fn cmd_prepare(
     let workgroup = r.gpu().target().each;
     let once = r.gpu().subgroup_size();
     let all_tets = Groups::Count(tets.div_ceil(workgroup));
-    r.stage("mesh.bounds", |r| {
+    r.stage("mesh.clear", |r| {
         r.fill(status, 0);
         r.fill(bad, 0);
         r.fill(boundary, 0);
         r.fill(scratch.flat_cells, 0);
-        r.fill(scratch.table, u32::MAX);
-        r.fill(scratch.mates, u32::MAX);
-        r.barrier("mesh.clear → mesh.check_cells");
-        let groups = tets.div_ceil(workgroup).clamp(1, STRIDED_GROUPS);
+        cmd_fill(r, scratch.table, u32::MAX)?;
+        cmd_fill(r, neighbours, 0)
+    })?;
+    r.barrier("mesh.clear → mesh.check_cells");
+    r.stage("mesh.bounds", |r| {
+        let share = summing_share(tets, workgroup);
         let spec = CheckCellsSpec { workgroup, ..Default::default() };
-        r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, groups }, spec, Groups::Count(groups))?;
+        r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, share }, spec, Groups::Count(tets.div_ceil(share)))?;
         r.barrier("mesh.check_cells → mesh.make_grid");
         if let Some(given) = given {
             r.copy(given, grid.part(0, given.size));
@@ -139,14 +145,18 @@ fn cmd_prepare(
     })?;
     r.barrier("mesh.normalise_vertices → mesh.match_faces");
     r.stage("mesh.boundary", |r| {
-        let MeshScratch { table, mates, flat_cells } = *scratch;
+        let MeshScratch { table, flat_cells } = *scratch;
         let slots = (table.size / 4) as u32;
         let near_slots = (slots / points.max(1)).max(1);
         let spec = MatchFacesSpec { workgroup, ..Default::default() };
-        r.dispatch(&MatchFaces { vertices, cells, bad, table, mates, status, flat_cells, tets, slots, near_slots }, spec, all_tets)?;
+        r.dispatch(
+            &MatchFaces { vertices, cells, bad, table, mates: neighbours, status, flat_cells, tets, slots, near_slots },
+            spec,
+            all_tets,
+        )?;
         r.barrier("mesh.match_faces → mesh.find_neighbours");
         let spec = FindNeighboursSpec { workgroup, ..Default::default() };
-        r.dispatch(&FindNeighbours { bad, mates, flat_cells, neighbours, boundary, status, tets }, spec, all_tets)
+        r.dispatch(&FindNeighbours { bad, flat_cells, neighbours, boundary, status, tets }, spec, all_tets)
     })
 }
 

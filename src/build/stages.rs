@@ -1,6 +1,6 @@
 //! The stages of a build as functions that append to a recorder; [`super`] puts them in order.
 
-use super::mesh::{MeshArrays, MeshInput, STRIDED_GROUPS};
+use super::mesh::{MeshArrays, MeshInput, summing_share};
 use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SeedScratch, SortedScratch, TreeMemory, TryScratch, filtered};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
@@ -50,9 +50,9 @@ pub(crate) fn cmd_depth(
         r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
         r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
         r.barrier("depth.clear → depth.estimate");
-        let groups = tets.div_ceil(workgroup).clamp(1, STRIDED_GROUPS);
-        let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, groups };
-        r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(groups))?;
+        let share = summing_share(tets, workgroup);
+        let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, share };
+        r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(share)))?;
         r.barrier("depth.estimate → depth.choose");
         let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
         let candidates = scratch.candidates;

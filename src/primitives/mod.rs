@@ -2,6 +2,7 @@
 
 #[cfg(feature = "cli")]
 mod copy;
+mod fill;
 mod reduce;
 mod scan;
 mod selftest;
@@ -9,6 +10,7 @@ mod sort;
 
 #[cfg(feature = "cli")]
 pub(crate) use copy::cmd_copy;
+pub(crate) use fill::cmd_fill;
 pub use reduce::{REDUCE_SCRATCH, Reduction, cmd_reduce};
 pub use scan::{ScanScratch, cmd_exclusive_scan};
 pub(crate) use selftest::self_test;
