@@ -15,7 +15,7 @@ bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) 
     b = vec3(canonical(b.x), canonical(b.y), canonical(b.z));
     size = vec3(canonical(size.x), canonical(size.y), canonical(size.z));
     precise vec3 qa = floor(a * g.inv.xyz), qb = floor(b * g.inv.xyz);
-    lo = uvec3(clamp(qa, vec3(0.0), vec3(1023.0)));
-    hi = uvec3(clamp(qb, vec3(0.0), vec3(1023.0)));
+    lo = uvec3(ivec3(clamp(qa, vec3(0.0), vec3(1023.0)))); // signed: see quantize
+    hi = uvec3(ivec3(clamp(qb, vec3(0.0), vec3(1023.0))));
     return all(greaterThanEqual(b, vec3(0.0))) && all(lessThanEqual(a, size));
 }

@@ -31,7 +31,7 @@ uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint e
         leave = min(leave, t);
     }
     precise float number = floor(leave * view.inverse_step - 0.5);
-    uint last = uint(clamp(number, float(k), float(end - 1u)));
+    uint last = uint(int(clamp(number, float(k), float(end - 1u)))); // signed: see quantize
     for (uint i = 0u; i < 2u && last > k; ++i) {
         if (quantize(g, sample_at(view, origin, way, last)) >> shift == cell) return last + 1u;
         --last;
