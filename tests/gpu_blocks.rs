@@ -77,6 +77,7 @@ fn answers_are_those_of_the_whole() {
     overlapped(&gpu, &mesh);
     sliced(&gpu, &mesh);
     drawn(&gpu, &mesh);
+    hidden(&gpu, &mesh);
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
 }
@@ -200,4 +201,24 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         assert!(whole.drawn.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
         assert!(took.trees > 4 && took.peak <= memory, "{} trees, {} bytes", took.trees, took.peak);
     }
+}
+
+/// Of a field that grows along x only what lies near the far end is shown: no tree is built over the rest.
+fn hidden(gpu: &Gpu, mesh: &Mesh) {
+    let values: Vec<f32> = mesh.points.iter().map(|p| p[0]).collect();
+    let field = Field { name: "x".into(), on: On::Points, values };
+    let trees = |opacity: Vec<(f32, f32)>, memory: u64| {
+        let transfer = TransferFunction::default().with_opacity(opacity).unwrap();
+        let settings = RenderSettings { size: [41, 33], transfer, ..RenderSettings::default() };
+        let asked = View { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
+        let (picture, took) = render(gpu, memory, &asked, QUIET).unwrap().apart();
+        (picture.drawn.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
+    };
+    let end = vec![(0.0, 0.0), (0.8, 0.0), (1.0, 0.5)];
+    let (whole, one) = trees(end.clone(), 64 << 20);
+    let (found, some) = trees(end, 768 << 10);
+    let (_, all) = trees(vec![(0.0, 0.3), (1.0, 0.5)], 768 << 10);
+    println!("{one}, {some} and {all} trees");
+    assert!(whole == found && whole.iter().any(|c| f32::from_bits(c[3]) > 0.1));
+    assert!(one == 1 && some > 1 && some + 1 < all, "{one}, {some} and {all} trees");
 }

@@ -9,6 +9,7 @@ use crate::layout::Grid;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Drawn, Rays};
+use crate::reference::ranges::visible;
 use crate::render::{Bounds, Plan, Prepared, RenderSettings};
 use rayon::prelude::*;
 
@@ -106,9 +107,9 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Draws a block, or cuts it: the nearer part, then the farther one.
+    /// Draws a block, or cuts it: the nearer part, then the farther one. One without anything to see is passed over.
     fn visit(&mut self, block: &Block, rays: &mut Rays) -> Result<Option<[Block; 2]>> {
-        let met = self.rows_met(block, rays);
+        let met = if self.shows(block) { self.rows_met(block, rays) } else { Vec::new() };
         if !met.contains(&true) {
             return Ok(None);
         }
@@ -148,6 +149,19 @@ impl Job<'_> {
         Ok(())
     }
 
+    /// Whether a block has values that are drawn. A surface may lie between the samples of two blocks, so that neither can be left out.
+    fn shows(&self, block: &Block) -> bool {
+        let Plan { iso, drawn, .. } = &self.prepared.plan;
+        let Field { values, on, .. } = self.field;
+        let range = |&t: &u32| {
+            let ids = self.source.mesh.tets[t as usize];
+            let values = if *on == On::Points { ids.map(|i| values[i as usize]) } else { [values[t as usize]; 4] };
+            let finite = values.iter().all(|v| v.is_finite());
+            if finite { values.map(|v| [v; 2]).into_iter().fold(NO_RANGE, union) } else { NO_RANGE }
+        };
+        !iso.is_empty() || visible(&[block.tets.par_iter().map(range).reduce(|| NO_RANGE, union)], drawn) != [0]
+    }
+
     /// The rows of the picture with rays that may meet a block and are not opaque yet.
     fn rows_met(&self, block: &Block, rays: &Rays) -> Vec<bool> {
         let plan = &self.prepared.plan;
@@ -172,6 +186,13 @@ impl Job<'_> {
         let seen = |x: u32, y: u32| rays.colors[(y as usize) * width as usize + x as usize][3] < plan.termination;
         (0..height).into_par_iter().map(|y| (0..width).any(|x| seen(x, y) && meets(x, y))).collect()
     }
+}
+
+/// Of no values.
+const NO_RANGE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
+
+fn union(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
+    [a[0].min(b[0]), a[1].max(b[1])]
 }
 
 /// Whether the cells up to `last` on an axis come before those behind it on all rays that meet both; `None` if on some they do, and on some they do not.
