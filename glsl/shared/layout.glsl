@@ -105,6 +105,10 @@ struct LbvhNode {
 
 // A stack of layers of voxels over a mesh; see src/slicing.
 struct SlicePlan {
+    uint listed; // Voxels of the band whose centre lies in no cell. First of all, since it is bound by itself.
+    uint pad0;   // Unused.
+    uint pad1;   // Unused.
+    uint pad2;   // Unused.
     vec4 origin; // Centre of voxel (0, 0) of layer 0.
     vec4 across; // From one voxel of a row to the next.
     vec4 down;   // From one row to the next.
@@ -121,10 +125,6 @@ struct SlicePlan {
     uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
     uint first_cell; // The first cell of the finest grid that is looked at, 10 bits per axis, x lowest.
     uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
-    uint listed; // Voxels of the band whose centre lies in no cell.
-    uint pad0;   // Unused.
-    uint pad1;   // Unused.
-    uint pad2;   // Unused.
 };
 
 // Where the search for the primitive closest to a voxel stands between two dispatches.

@@ -54,6 +54,7 @@ const RECIPES: &[Entry] = &[
     ("two-apart", Group::Quick, || of(&with(&UNIT.map(|p| p.map(|x| x + 3.0))), &[[0, 1, 2, 3], [4, 5, 6, 7]])),
     ("two-coincident-faces", Group::Full, || of(&with(&[[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0; 3]]), &[[0, 1, 2, 3], [4, 5, 6, 7]])),
     ("three-on-a-face", Group::Quick, || of(&with(&[[1.0; 3], [0.4; 3]]), &[[0, 1, 2, 3], [4, 1, 2, 3], [5, 3, 2, 1]])),
+    ("crowd-on-a-face", Group::Quick, || of(&with(&(0..300u16).map(f32::from).map(|i| [1.0 + i * 0.01, 0.5, 1.0 - i * 0.02]).collect::<Vec<_>>()), &(4..304).map(|i| [i, 1, 2, 3]).collect::<Vec<_>>())),
     ("fold", Group::Quick, || of(&with(&[[-0.5, 0.1, 0.2]]), &[[0, 1, 2, 3], [4, 3, 2, 1]])),
     ("coplanar", Group::Quick, || of(&[[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0], [2.0, 2.0, 0.0]], &[[0, 1, 2, 3], [1, 2, 3, 4]])),
     ("collinear", Group::Quick, || of(&[[0.0; 3], [1.0; 3], [2.0; 3], [3.0; 3]], &[[0, 1, 2, 3]])),
