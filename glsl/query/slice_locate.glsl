@@ -4,8 +4,8 @@
 #include "shared/tet.glsl"
 #include "shared/structure.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels of a row, and looks for each in the
-// cell of the one before and a short walk across faces from it, before it asks the structure. Twin of src/reference/slice.rs.
+// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels of a row, and looks
+// for each in the cell of the one before and a short walk across faces from it, before it asks the structure. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 32;
 layout(constant_id = 3) const uint WALK = 6;
 layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block

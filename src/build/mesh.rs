@@ -84,7 +84,7 @@ impl MeshScratch {
     }
 }
 
-/// How many tetrahedra, one after the other, a workgroup of such a kernel takes; at least one.
+/// How many tetrahedra, one after the other, a workgroup of a kernel that sums over all cells takes; at least one.
 pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
     tets.div_ceil(SUMMING_GROUPS).max(1).next_multiple_of(workgroup)
 }
