@@ -18,7 +18,7 @@ BUFFER(5, readonly, uint, offsets)
 BUFFER(6, READ_WRITE, uint, hits)
 BUFFER(7, READ_WRITE, uint, counts)
 BUFFER(8, readonly, uint, marks)
-BUFFER16(9, readonly, uvec4, neighbours)
+RECORDS(9, uvec4, neighbours)
 BUFFER(10, readonly, uint, doubts)
 BUFFER(11, readonly, uint, doubt_count)
 #include "shared/cells.glsl"

@@ -29,7 +29,7 @@ BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, guides)
 BUFFER(10, READ_WRITE, uint, owners)
 BUFFER16(11, READ_WRITE, vec4, barycentrics) // between slices: inside, in_box, smallest
-BUFFER16(12, readonly, uvec4, neighbours)
+RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"

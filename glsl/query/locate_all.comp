@@ -26,7 +26,7 @@ BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, owners)
 BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: where the next one goes
 BUFFER(11, READ_WRITE, uint, found)
-BUFFER16(12, readonly, uvec4, neighbours)
+RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"

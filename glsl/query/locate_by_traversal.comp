@@ -24,7 +24,7 @@ RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, writeonly, uint, owners)
 BUFFER16(10, writeonly, vec4, barycentrics)
-BUFFER16(11, readonly, uvec4, neighbours)
+RECORDS(11, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"

@@ -19,7 +19,7 @@ END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
-BUFFER16(3, readonly, uvec4, neighbours)
+RECORDS(3, uvec4, neighbours)
 BUFFER16(4, readonly, SlicePlan, plans)
 BUFFER(5, READ_WRITE, RunState, states)
 BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING

@@ -18,7 +18,7 @@ END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
-BUFFER16(3, readonly, uvec4, neighbours)
+RECORDS(3, uvec4, neighbours)
 BUFFER(4, readonly, float, field)
 BUFFER(5, readonly, float, normals) // three per vertex
 BUFFER16(6, readonly, Frame, frames)

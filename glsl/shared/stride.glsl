@@ -5,6 +5,7 @@ struct Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
     uvec4 ids;  // and ascending
+    uvec4 beside; // tetrahedra across the faces opposite to `cell`, read together with it: a cache misses both at once
     vec4 x, y, z;
     Bounds box;
 };
@@ -16,7 +17,7 @@ struct Exchange {
     bvec3 before; // whether the fresh one comes before each of the corners kept
 };
 
-Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
 
 vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
 
@@ -26,6 +27,7 @@ Stand stand_in(uint t) {
     Stand s;
     s.t = t;
     s.cell = words(cells.at[t]);
+    s.beside = words(neighbours.at[t]);
     uvec4 rank = ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
     vec3 a = floats(vertices.at[s.ids.x]).xyz, b = floats(vertices.at[s.ids.y]).xyz, c = floats(vertices.at[s.ids.z]).xyz, d = floats(vertices.at[s.ids.w]).xyz;
@@ -65,10 +67,11 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     e.fresh = 0u;
     if (least >= 0.0) return false;
     uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
-    s.t = neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
+    s.t = s.cell.x == left ? s.beside.x : s.cell.y == left ? s.beside.y : s.cell.z == left ? s.beside.z : s.beside.w;
     if (s.t == NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
     s.cell = words(cells.at[s.t]);
+    s.beside = words(neighbours.at[s.t]);
     e.fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
     vec3 v = floats(vertices.at[e.fresh]).xyz;
     e.before = lessThan(uvec3(e.fresh), kept(s.ids, e.beyond));
@@ -89,7 +92,7 @@ bool step_on(inout Stand s, Sides at) {
 uint owner_at_face(Stand s, vec3 x) {
     Tet tet = tet_of(s);
     Weights here = weights(tet, x);
-    uint u = near_one_face(here) ? neighbours.at[s.t][outermost(own_weights(here, tet))] : NONE;
+    uint u = near_one_face(here) ? s.beside[outermost(own_weights(here, tet))] : NONE;
     if (u == NONE) return NONE;
     Weights there = weights(load_tet(words(cells.at[u])), x);
     // The face weighs the same from either side.

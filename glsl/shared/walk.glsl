@@ -30,7 +30,7 @@ bool in_star(uint t) {
 // Takes into the star what lies beside `t`, one of it.
 void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     vec4 own = own_weights(w, tet);
-    uvec4 beside = neighbours.at[t];
+    uvec4 beside = words(neighbours.at[t]);
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
@@ -62,7 +62,7 @@ bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best bes
         if (w.clear || (near(w) && !leave)) return !w.clear;
         leave = false;
         vec4 own = own_weights(w, tet);
-        uint face = outermost(own), next = own[face] < 0.0 ? neighbours.at[t][face] : NONE;
+        uint face = outermost(own), next = own[face] < 0.0 ? words(neighbours.at[t])[face] : NONE;
         if (next == NONE) return false;
         t = next;
     }
@@ -75,7 +75,7 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
     for (uint s = 0u; s < LEG; ++s) {
         Tet tet = load_tet(words(cells.at[t]));
         vec4 before = own_weights(weights(tet, a), tet), behind = own_weights(weights(tet, b), tet);
-        uvec4 beside = neighbours.at[t];
+        uvec4 beside = words(neighbours.at[t]);
         float first = 3.40282347e38;
         uint next = NONE;
         for (uint f = 0u; f < 4u; ++f) {
