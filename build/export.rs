@@ -26,8 +26,11 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// The name that a line at the outermost level declares: a struct, a constant, a variable, a function, a buffer.
+/// The name that a line at the outermost level declares: a struct, a constant, a variable, a function, a buffer, a macro.
 fn declared(line: &str) -> Option<&str> {
+    if let Some(of_macro) = line.strip_prefix("#define ") {
+        return of_macro.split(|c| !is_word(c)).next();
+    }
     if let Some(buffer) = line.strip_prefix("OLBVH_BUFFER(") {
         return buffer.strip_suffix(')')?.rsplit(", ").next();
     }

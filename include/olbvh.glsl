@@ -41,13 +41,13 @@ const uint olbvh_NONE = OLBVH_NONE;
 // many fetches (OLBVH_WIDE).
 #ifdef OLBVH_WIDE
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#define FLOATS u64vec2
-#define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
+#define olbvh_FLOATS u64vec2
+#define olbvh_RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
 uvec4 olbvh_words(u64vec2 record) { return uvec4(unpack32(record.x), unpack32(record.y)); }
 vec4 olbvh_floats(u64vec2 record) { return uintBitsToFloat(olbvh_words(record)); }
 #else
-#define FLOATS vec4
-#define RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
+#define olbvh_FLOATS vec4
+#define olbvh_RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
 uvec4 olbvh_words(uvec4 record) { return record; }
 vec4 olbvh_floats(vec4 record) { return record; }
 #endif
@@ -699,6 +699,7 @@ struct olbvh_Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
     uvec4 ids;  // and ascending
+    uvec4 beside; // tetrahedra across the faces opposite to `cell`, read together with it: a cache misses both at once
     vec4 x, y, z;
     olbvh_Bounds box;
 };
@@ -710,7 +711,7 @@ struct olbvh_Exchange {
     bvec3 before; // whether the fresh one comes before each of the corners kept
 };
 
-olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
 
 vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
 
@@ -720,6 +721,7 @@ olbvh_Stand olbvh_stand_in(uint t) {
     olbvh_Stand s;
     s.t = t;
     s.cell = olbvh_words(olbvh_cells.at[t]);
+    s.beside = olbvh_words(olbvh_neighbours.at[t]);
     uvec4 rank = olbvh_ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
     vec3 a = olbvh_floats(olbvh_vertices.at[s.ids.x]).xyz, b = olbvh_floats(olbvh_vertices.at[s.ids.y]).xyz, c = olbvh_floats(olbvh_vertices.at[s.ids.z]).xyz, d = olbvh_floats(olbvh_vertices.at[s.ids.w]).xyz;
@@ -759,10 +761,11 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     e.fresh = 0u;
     if (least >= 0.0) return false;
     uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
-    s.t = olbvh_neighbours.at[s.t][s.cell.x == left ? 0u : s.cell.y == left ? 1u : s.cell.z == left ? 2u : 3u];
+    s.t = s.cell.x == left ? s.beside.x : s.cell.y == left ? s.beside.y : s.cell.z == left ? s.beside.z : s.beside.w;
     if (s.t == olbvh_NONE) return false;
     // Three corners are shared; the fourth takes the place of the one left behind.
     s.cell = olbvh_words(olbvh_cells.at[s.t]);
+    s.beside = olbvh_words(olbvh_neighbours.at[s.t]);
     e.fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
     vec3 v = olbvh_floats(olbvh_vertices.at[e.fresh]).xyz;
     e.before = lessThan(uvec3(e.fresh), olbvh_kept(s.ids, e.beyond));
@@ -783,7 +786,7 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
 uint olbvh_owner_at_face(olbvh_Stand s, vec3 x) {
     olbvh_Tet tet = olbvh_tet_of(s);
     olbvh_Weights here = olbvh_weights(tet, x);
-    uint u = olbvh_near_one_face(here) ? olbvh_neighbours.at[s.t][olbvh_outermost(olbvh_own_weights(here, tet))] : olbvh_NONE;
+    uint u = olbvh_near_one_face(here) ? s.beside[olbvh_outermost(olbvh_own_weights(here, tet))] : olbvh_NONE;
     if (u == olbvh_NONE) return olbvh_NONE;
     olbvh_Weights there = olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x);
     // The face weighs the same from either side.
@@ -827,7 +830,7 @@ bool olbvh_in_star(uint t) {
 // Takes into the star what lies beside `t`, one of it.
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
-    uvec4 beside = olbvh_neighbours.at[t];
+    uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
         uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
@@ -859,7 +862,7 @@ bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout ol
         if (w.clear || (olbvh_near(w) && !leave)) return !w.clear;
         leave = false;
         vec4 own = olbvh_own_weights(w, tet);
-        uint face = olbvh_outermost(own), next = own[face] < 0.0 ? olbvh_neighbours.at[t][face] : olbvh_NONE;
+        uint face = olbvh_outermost(own), next = own[face] < 0.0 ? olbvh_words(olbvh_neighbours.at[t])[face] : olbvh_NONE;
         if (next == olbvh_NONE) return false;
         t = next;
     }
@@ -872,7 +875,7 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
     for (uint s = 0u; s < olbvh_LEG; ++s) {
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
-        uvec4 beside = olbvh_neighbours.at[t];
+        uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
         uint next = olbvh_NONE;
         for (uint f = 0u; f < 4u; ++f) {
@@ -1050,10 +1053,19 @@ bool olbvh_visit_leaf(olbvh_Node node);
 // explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
-// and may define ENTER_NODE(node), done before F_N is asked about the node's children.
+// and may define
+//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the node's children, which these are, `first` the index of the first
+//     KEEPS(node)                    // whether a node that F_N accepted earlier is to be looked at still
+//     FLIP                           // the children of a node are visited in the order of their digits XOR this
 // STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
-#ifndef ENTER_NODE
-#define ENTER_NODE(node)
+#ifndef olbvh_ENTER_NODE
+#define olbvh_ENTER_NODE(node, mask, first)
+#endif
+#ifndef olbvh_KEEPS
+#define olbvh_KEEPS(node) true
+#endif
+#ifndef olbvh_FLIP
+#define olbvh_FLIP 0u
 #endif
 const uint olbvh_MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
 
@@ -1071,13 +1083,14 @@ bool olbvh_traverse(uint level) {
     for (uint visits = 0u; visits < olbvh_MAX_VISITS; ++visits) {
         bool leaves = node.level + 1u == level;
         uint mask = olbvh_child_mask(node.index), first = olbvh_co.at[node.index] + 1u;
-        uint accepted = 0u, place = first; // bit per digit
-        ENTER_NODE(node);
-        for (uint digit = 0u; digit < 8u; ++digit) {
+        uint accepted = 0u; // bit per child, in their order
+        olbvh_ENTER_NODE(node, mask, first);
+        for (uint k = 0u; k < 8u; ++k) {
+            uint digit = k ^ olbvh_FLIP;
             if ((mask >> digit & 1u) == 0u) continue;
-            olbvh_Node child = olbvh_Node(place++, node.level + 1u, node.code << 3 | digit);
+            olbvh_Node child = olbvh_Node(first + bitCount(mask & ((1u << digit) - 1u)), node.level + 1u, node.code << 3 | digit);
             if (!olbvh_visit_node(child)) continue;
-            if (!leaves) accepted |= 1u << digit;
+            if (!leaves) accepted |= 1u << k;
             else if (olbvh_visit_leaf(child)) return true;
         }
         uint n = bitCount(accepted);
@@ -1088,8 +1101,8 @@ bool olbvh_traverse(uint level) {
             // Siblings behind the next node, last first; then the next node itself.
             olbvh_Node parent = node;
             for (uint k = 0u; k <= left; ++k) {
-                uint digit = uint(findMSB(accepted));
-                accepted ^= 1u << digit;
+                uint highest = uint(findMSB(accepted)), digit = highest ^ olbvh_FLIP;
+                accepted ^= 1u << highest;
                 node = olbvh_Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
                 if (k < left) {
                     stack[top] = node;
@@ -1099,18 +1112,20 @@ bool olbvh_traverse(uint level) {
             }
             continue;
         }
-        if (trail == 0u) return true;
-        uint at = uint(findMSB(trail)) / 3u;
-        trail -= 1u << (3u * at);
-        if (held > 0u) {
-            top = top == 0u ? olbvh_STACK - 1u : top - 1u;
-            --held;
-            node = stack[top];
-            resume = 0u;
-        } else {
-            node = olbvh_Node(0u, 0u, 0u);
-            resume = at + 1u;
-        }
+        do {
+            if (trail == 0u) return true;
+            uint at = uint(findMSB(trail)) / 3u;
+            trail -= 1u << (3u * at);
+            if (held > 0u) {
+                top = top == 0u ? olbvh_STACK - 1u : top - 1u;
+                --held;
+                node = stack[top];
+                resume = 0u;
+            } else {
+                node = olbvh_Node(0u, 0u, 0u);
+                resume = at + 1u;
+            }
+        } while (resume == 0u && !olbvh_KEEPS(node));
     }
     return false;
 }

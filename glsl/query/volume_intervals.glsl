@@ -95,8 +95,13 @@ bool visit_all() {
 #include "shared/tree.glsl"
 
 Slabs lower, upper; // of the children of the node that is looked at: they share three planes per axis
+uint marked_from, marked; // flags of these children, a bit each, from the node of this index on
 
-void enter_node(Node node) {
+void enter_node(Node node, uint mask, uint first_child) {
+    uint word = first_child >> 5u, shift = first_child & 31u;
+    marked_from = first_child;
+    marked = flags.at[word] >> shift;
+    if (shift + bitCount(mask) > 32u) marked |= flags.at[word + 1u] << (32u - shift);
     uvec3 k = 2u * unmorton(node.code);
     vec3 side[3];
     for (uint c = 0u; c < 3u; ++c) {
@@ -105,7 +110,7 @@ void enter_node(Node node) {
     lower = slabs_of(side[0], side[1]);
     upper = slabs_of(side[1], side[2]);
 }
-#define ENTER_NODE(node) enter_node(node)
+#define ENTER_NODE(node, mask, first_child) enter_node(node, mask, first_child)
 
 bool meets(Node node) {
     if (node.level == 0u) return hit(g.lo.xyz, g.hi.xyz);
@@ -113,20 +118,42 @@ bool meets(Node node) {
     return hit(Slabs(mix(lower.near, upper.near, up), mix(lower.far, upper.far, up)));
 }
 
-bool visit_node(Node node) {
-    return (flags.at[node.index >> 5u] >> (node.index & 31u) & 1u) != 0u && meets(node) && !is_spanned();
+// First for where the mesh begins, nearest nodes first, then for where it ends, farthest first.
+bool from_behind;
+uint flip;
+#define FLIP flip
+
+bool extends() { return from_behind ? left > last : entered < first; }
+
+bool visit_node(Node node) { return (marked >> (node.index - marked_from) & 1u) != 0u && meets(node) && extends(); }
+
+bool keeps(Node node) {
+    vec3 lo, hi;
+    cell_box(g, node.level, node.code, lo, hi);
+    return hit(lo, hi) && extends();
 }
+#define KEEPS(node) keeps(node)
 
 bool visit_leaf(Node node) {
-    meets(node);
-    extend();
+    extend(); // by the node that was asked about last, this one
     return false;
 }
 #include "shared/traverse.glsl"
 
 bool starts_within() { return find_leaf(g.level, quantize(g, origin)) != NONE; }
 
-bool visit_all() { return traverse(g.level); }
+bool visit_all() {
+    flip = uint(inverse_way.x < 0.0) << 2 | uint(inverse_way.y < 0.0) << 1 | uint(inverse_way.z < 0.0);
+    bool ended = true;
+    [[dont_unroll]] for (uint side = 0u; side < 2u && ended && (side == 0u || first <= last); ++side) {
+        from_behind = side == 1u;
+        marked_from = 0u; // the root
+        marked = flags.at[0];
+        ended = traverse(g.level);
+        flip ^= 7u;
+    }
+    return ended;
+}
 #endif
 
 // The first of the samples [k, end) that the block's cells are not ahead of; `past`: that lies behind them. Cells are monotone along a ray, so those between

@@ -2,10 +2,19 @@
 // explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
 //     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
-// and may define ENTER_NODE(node), done before F_N is asked about the node's children.
+// and may define
+//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the node's children, which these are, `first` the index of the first
+//     KEEPS(node)                    // whether a node that F_N accepted earlier is to be looked at still
+//     FLIP                           // the children of a node are visited in the order of their digits XOR this
 // STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
 #ifndef ENTER_NODE
-#define ENTER_NODE(node)
+#define ENTER_NODE(node, mask, first)
+#endif
+#ifndef KEEPS
+#define KEEPS(node) true
+#endif
+#ifndef FLIP
+#define FLIP 0u
 #endif
 const uint MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
 
@@ -23,13 +32,14 @@ bool traverse(uint level) {
     for (uint visits = 0u; visits < MAX_VISITS; ++visits) {
         bool leaves = node.level + 1u == level;
         uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
-        uint accepted = 0u, place = first; // bit per digit
-        ENTER_NODE(node);
-        for (uint digit = 0u; digit < 8u; ++digit) {
+        uint accepted = 0u; // bit per child, in their order
+        ENTER_NODE(node, mask, first);
+        for (uint k = 0u; k < 8u; ++k) {
+            uint digit = k ^ FLIP;
             if ((mask >> digit & 1u) == 0u) continue;
-            Node child = Node(place++, node.level + 1u, node.code << 3 | digit);
+            Node child = Node(first + bitCount(mask & ((1u << digit) - 1u)), node.level + 1u, node.code << 3 | digit);
             if (!visit_node(child)) continue;
-            if (!leaves) accepted |= 1u << digit;
+            if (!leaves) accepted |= 1u << k;
             else if (visit_leaf(child)) return true;
         }
         uint n = bitCount(accepted);
@@ -40,8 +50,8 @@ bool traverse(uint level) {
             // Siblings behind the next node, last first; then the next node itself.
             Node parent = node;
             for (uint k = 0u; k <= left; ++k) {
-                uint digit = uint(findMSB(accepted));
-                accepted ^= 1u << digit;
+                uint highest = uint(findMSB(accepted)), digit = highest ^ FLIP;
+                accepted ^= 1u << highest;
                 node = Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
                 if (k < left) {
                     stack[top] = node;
@@ -51,18 +61,20 @@ bool traverse(uint level) {
             }
             continue;
         }
-        if (trail == 0u) return true;
-        uint at = uint(findMSB(trail)) / 3u;
-        trail -= 1u << (3u * at);
-        if (held > 0u) {
-            top = top == 0u ? STACK - 1u : top - 1u;
-            --held;
-            node = stack[top];
-            resume = 0u;
-        } else {
-            node = Node(0u, 0u, 0u);
-            resume = at + 1u;
-        }
+        do {
+            if (trail == 0u) return true;
+            uint at = uint(findMSB(trail)) / 3u;
+            trail -= 1u << (3u * at);
+            if (held > 0u) {
+                top = top == 0u ? STACK - 1u : top - 1u;
+                --held;
+                node = stack[top];
+                resume = 0u;
+            } else {
+                node = Node(0u, 0u, 0u);
+                resume = at + 1u;
+            }
+        } while (resume == 0u && !KEEPS(node));
     }
     return false;
 }
