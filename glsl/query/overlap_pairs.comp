@@ -39,7 +39,8 @@ BUFFER(14, READ_WRITE, OverlapStatus, status)
 bool walk_ended = false;
 uvec3 lo, hi;
 
-bool enters(Node node) { return meets_range(node, lo, hi); }
+bool enters(Node node) { return true; }
+#include "shared/halves.glsl"
 #include "shared/leaf_walk.glsl"
 
 void main() {
@@ -70,7 +71,7 @@ void main() {
             to_joint(own, v);
             lo = quantize(g, own.lo);
             hi = quantize(g, own.hi);
-            LeafWalk at = walk_from(state.code);
+            LeafWalk at = walk_from(g.level, state.code);
             uint leaf = WALK_PAUSED;
             for (uint work = 0u; work < BUDGET;) {
                 leaf = next_leaf(at, g.level, work, BUDGET);

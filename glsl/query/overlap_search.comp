@@ -56,11 +56,11 @@ bool touches_node(Node node) {
 }
 
 bool enters(Node node) {
-    if (!meets_range(node, lo, hi)) return false;
     if (is_boundary_node(node.index)) return phase != 0u || node.level < g.level;
     if (phase == 0u) walk_ended = touches_node(node);
     return false;
 }
+#include "shared/halves.glsl"
 #include "shared/leaf_walk.glsl"
 
 void add_wide(uint n, bool elected) {
@@ -87,7 +87,7 @@ void main() {
             uint leaf = WALK_DONE;
             if (enters(Node(0u, 0u, 0u))) {
                 leaf = WALK_PAUSED;
-                LeafWalk at = walk_from(state.code);
+                LeafWalk at = walk_from(g.level, state.code);
                 while (work < BUDGET) {
                     leaf = next_leaf(at, g.level, work, BUDGET);
                     if (leaf >= WALK_PAUSED) break;

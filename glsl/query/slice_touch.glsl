@@ -82,7 +82,8 @@ uvec3 lo, hi;
 
 bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
-bool enters(Node node) { return is_boundary_node(node.index) && meets_range(node, lo, hi); }
+bool enters(Node node) { return is_boundary_node(node.index); }
+#include "shared/halves.glsl"
 #include "shared/leaf_walk.glsl"
 
 // Goes on with a voxel; true once it is done.
@@ -92,7 +93,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
     lo = max(lo, unpack_cell(plans.at[0].first_cell));
     hi = min(hi, unpack_cell(plans.at[0].last_cell));
     if (any(greaterThan(lo, hi))) return true;
-    LeafWalk at = walk_from(state.code);
+    LeafWalk at = walk_from(g.level, state.code);
     uint leaf = WALK_PAUSED;
     for (uint work = 0u; work < budget;) {
         leaf = next_leaf(at, g.level, work, budget);

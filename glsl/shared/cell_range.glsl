@@ -1,11 +1,4 @@
-// Boxes of cells of the finest grid. Twin of src/reference/leaf_walk.rs. Needs grid.glsl and node.glsl.
-
-// Whether the cell of a node meets a range of cells of the finest grid.
-bool meets_range(Node node, uvec3 lo, uvec3 hi) {
-    uvec3 cell = unmorton(node.code);
-    uint shift = MAX_LEVEL - node.level;
-    return all(lessThanEqual(lo >> shift, cell)) && all(lessThanEqual(cell, hi >> shift));
-}
+// Boxes of cells of the finest grid. Twin of src/reference/leaf_walk.rs. Needs grid.glsl.
 
 // The cells of the finest grid that the box around `centre` meets; false: it lies outside of the bounds.
 bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) {
