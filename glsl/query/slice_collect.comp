@@ -13,7 +13,7 @@ BUFFER16(2, READ_WRITE, SlicePlan, plans)
 BUFFER(3, writeonly, TouchState, states)
 
 void main() {
-    uint begin = 32u * item_index(), wait = 0u, inside = 0u, refused = 0u;
+    uint begin = 32u * item_index(), wait = 0u, inside = 0u, others = 0u;
     // Only once all centres have been located.
     if (begin < voxels && status.at[0].locating == 0u) {
         for (uint k = 0u; k < min(32u, voxels - begin); ++k) {
@@ -21,13 +21,13 @@ void main() {
             wait |= uint(answer == SLICE_PENDING) << k;
             inside += uint(answer < SLICE_TOUCHED);
         }
-        if (plans.at[0].refused != 0u) refused = min(32u, voxels - begin);
+        others = min(32u, voxels - begin) - inside; // empty, unless it turns out that something touches them
     }
     inside = subgroupAdd(inside);
-    refused = subgroupAdd(refused);
+    others = subgroupAdd(others);
     if (subgroupElect()) {
         if (inside > 0u) atomicAdd(status.at[0].inside, inside);
-        if (refused > 0u) atomicAdd(status.at[0].empty, refused);
+        if (others > 0u) atomicAdd(status.at[0].empty, others);
     }
     uint count = bitCount(wait), total = subgroupAdd(count), before = subgroupExclusiveAdd(count), place = 0u;
     if (subgroupElect() && total > 0u) place = atomicAdd(plans.at[0].listed, total);

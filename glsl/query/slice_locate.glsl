@@ -65,6 +65,36 @@ void settle_inside(Sides sides) {
     settle(stand.t, FIELD == 0u ? 0.0 : value_of(held, barycentric(sides)));
 }
 
+#ifndef BINARY_TREE
+#include "shared/cell_range.glsl"
+
+// Cells of the finest grid around the last voxel outside that nothing comes near to, an octree cell; none at first.
+uvec3 empty_lo = uvec3(1u), empty_hi = uvec3(0u);
+
+bool within_empty(uvec3 lo, uvec3 hi) { return all(lessThanEqual(empty_lo, lo)) && all(lessThanEqual(hi, empty_hi)); }
+
+// Whether the voxel at `at` lies in those cells, as the one before did.
+bool is_still_empty(Grid g, vec3 at) {
+    uvec3 lo, hi;
+    return reached_cells(g, at, plan.reach.xyz, lo, hi) && within_empty(lo, hi);
+}
+
+// Whether nothing can touch the voxel at `at`, the centre of which is in no cell: it lies outside of the bounds, or in one empty octree cell.
+bool is_empty(Grid g, vec3 at) {
+    uvec3 lo, hi;
+    if (!reached_cells(g, at, plan.reach.xyz, lo, hi)) return true;
+    uvec3 cell = quantize(g, at);
+    uint level = empty_level(g.level, morton(cell)), shift = MAX_LEVEL - level;
+    if (level == 0u) return false;
+    empty_lo = cell >> shift << shift;
+    empty_hi = empty_lo + (1u << shift) - 1u;
+    return within_empty(lo, hi);
+}
+#else
+bool is_still_empty(Grid g, vec3 at) { return false; }
+bool is_empty(Grid g, vec3 at) { return false; }
+#endif
+
 bool is_ours(Grid g, vec3 at) { return PART == 0u || in_part(plan.first_cell, plan.last_cell, quantize(g, at)); }
 
 void main() {
@@ -115,6 +145,10 @@ void main() {
                 settle(SLICE_PENDING, 0.0);
                 continue;
             }
+            if (is_still_empty(g, at)) {
+                settle(NONE, uintBitsToFloat(NAN));
+                continue;
+            }
             vec3 x = normalise(g, at);
             OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
             uint owner;
@@ -130,7 +164,7 @@ void main() {
                 settle_inside(sides_of(stand, x));
             } else {
                 state.hint = NONE;
-                settle(SLICE_PENDING, 0.0);
+                settle(is_empty(g, at) ? NONE : SLICE_PENDING, uintBitsToFloat(NAN));
             }
         }
         unfinished = uint(state.next < count);

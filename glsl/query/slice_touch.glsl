@@ -76,15 +76,31 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
 }
 #else
 #include "shared/tree.glsl"
+#include "shared/owner_list.glsl"
 
 bool walk_ended = false;
 uvec3 lo, hi;
-
-bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
-
-bool enters(Node node) { return is_boundary_node(node.index); }
-#include "shared/halves.glsl"
+uint leaf_level;
+bool enters(Node node);
 #include "shared/leaf_walk.glsl"
+
+// Leaves are marked with the octants that their primitives come near to.
+bool enters(Node node) {
+    if (!is_boundary_node(node.index)) return false;
+    return node.level < leaf_level || leaf_level == MAX_LEVEL || (child_mask(node.index) & octants_met(node.level, node.code)) != 0u;
+}
+
+// What an entry of a leaf is measured for: its box meets the cells, and so do the halves of the leaf's cell that it is near to. Where the cells meet
+// both halves along an axis, either will do.
+Sought sought_in(Grid g, uint code) {
+    uvec3 reach = reach_of(g, 1u);
+    Sought s = Sought(x, lo - min(lo, reach), hi + reach, 0u);
+    if (g.ids == NONE || g.level == MAX_LEVEL) return s;
+    uvec3 met = halves_met(g.level, code);
+    met = mix(met, uvec3(0u), equal(met, uvec3(3u)));
+    s.halves = met.x | met.y << 2u | met.z << 4u;
+    return s;
+}
 
 // Goes on with a voxel; true once it is done.
 bool measure_all(Grid g, vec3 centre, vec3 reach) {
@@ -93,6 +109,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
     lo = max(lo, unpack_cell(plans.at[0].first_cell));
     hi = min(hi, unpack_cell(plans.at[0].last_cell));
     if (any(greaterThan(lo, hi))) return true;
+    leaf_level = g.level;
     LeafWalk at = walk_from(g.level, state.code);
     uint leaf = WALK_PAUSED;
     for (uint work = 0u; work < budget;) {
@@ -100,9 +117,12 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
         if (leaf >= WALK_PAUSED) break;
         uvec2 range = entry_range(leaf);
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
-        for (uint e = from; e < to; ++e) {
-            uint t = listed_tet(e);
-            if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) measure(t);
+        Sought s = sought_in(g, at.code);
+        for (uint e = from; e < to; e += 32u) {
+            for (uint near = near_among(e, to, s); near != 0u; near &= near - 1u) {
+                uint t = listed_tet(e + findLSB(near));
+                if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) measure(t);
+            }
         }
         work += to - from;
         state.entry = to - range.x;

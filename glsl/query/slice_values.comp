@@ -37,13 +37,12 @@ float touched_value(uint owner, vec3 x) {
 }
 
 void main() {
-    uint i = item_index(), touched = 0u, empty = 0u;
+    uint i = item_index(), touched = 0u;
     SlicePlan plan = plans.at[0];
     // Only once all answers are there.
     if (i < min(plan.listed, voxels) && (status.at[0].locating | status.at[0].touching) == 0u) {
         uint voxel = states.at[i].voxel, answer = answers.at[voxel];
         touched = uint(answer != NONE);
-        empty = 1u - touched;
         if (FIELD != 0u) {
             float value = uintBitsToFloat(NAN);
             if (answer != NONE) value = touched_value(answer & ~SLICE_TOUCHED, normalise(grid.at[0], voxel_centre(plan, voxel)));
@@ -51,9 +50,8 @@ void main() {
         }
     }
     touched = subgroupAdd(touched);
-    empty = subgroupAdd(empty);
-    if (subgroupElect()) {
-        if (touched > 0u) atomicAdd(status.at[0].touched, touched);
-        if (empty > 0u) atomicAdd(status.at[0].empty, empty);
+    if (subgroupElect() && touched > 0u) {
+        atomicAdd(status.at[0].touched, touched);
+        atomicAdd(status.at[0].empty, 0u - touched);
     }
 }

@@ -75,7 +75,7 @@ bool go_on(Sides at) {
 // Colour, and opacity of one step, at a value.
 vec4 lookup(float value) {
     precise float x = clamp((value - view.value_lo) * view.value_scale, 0.0, 1.0) * float(TABLE - 1u);
-    uint i = min(uint(int(x)), TABLE - 2u); // signed: see quantize
+    uint i = min(whole_of(x), TABLE - 2u);
     precise float t = x - float(i);
     vec4 a = floats(frames.at[0].table[i]), b = floats(frames.at[0].table[i + 1u]);
     precise vec4 r = a + (b - a) * t;

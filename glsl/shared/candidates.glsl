@@ -16,7 +16,7 @@ struct Sought {
 // That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
 Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = quantize(g, at);
-    uint least = 1u + uint(clamp(tolerance, 0.0, 1.0) * 4096.0);
+    uint least = 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
     uvec3 reach = reach_of(g, least);
     return Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == NONE ? 0u : halves_around(g.level, cell));
 }

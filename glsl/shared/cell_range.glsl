@@ -7,8 +7,8 @@ bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) 
     a = vec3(canonical(a.x), canonical(a.y), canonical(a.z));
     b = vec3(canonical(b.x), canonical(b.y), canonical(b.z));
     size = vec3(canonical(size.x), canonical(size.y), canonical(size.z));
-    precise vec3 qa = floor(a * g.inv.xyz), qb = floor(b * g.inv.xyz);
-    lo = uvec3(ivec3(clamp(qa, vec3(0.0), vec3(1023.0)))); // signed: see quantize
-    hi = uvec3(ivec3(clamp(qb, vec3(0.0), vec3(1023.0))));
+    precise vec3 qa = a * g.inv.xyz, qb = b * g.inv.xyz;
+    lo = cell_at(qa);
+    hi = cell_at(qb);
     return all(greaterThanEqual(b, vec3(0.0))) && all(lessThanEqual(a, size));
 }

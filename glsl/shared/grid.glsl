@@ -7,6 +7,13 @@ float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 // x without denormals.
 float canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
+// The whole part of x in [0, 2^23), from the bits of a sum: drivers for CPUs convert lane by lane, with tests for what no integer is. Of other x, any word
+// below 2^23.
+uint whole_of(float x) {
+    precise float sum = floor(x) + 8388608.0;
+    return floatBitsToUint(sum) & 0x7fffffu;
+}
+
 // Distance from the lower corner, per axis.
 vec3 from_corner(Grid g, vec3 x) {
     precise vec3 d = vec3(canonical(x.x), canonical(x.y), canonical(x.z)) - g.lo.xyz;
@@ -19,10 +26,16 @@ bool near_bounds(Grid g, vec3 x) {
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid, clamped into the grid. By signed integers, since drivers for CPUs convert to unsigned ones lane by lane.
+// Cell of the finest grid at so many of its cells from the lower corner, clamped into the grid.
+uvec3 cell_at(vec3 q) {
+    vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
+    return min(uvec3(whole_of(r.x), whole_of(r.y), whole_of(r.z)), 1023u);
+}
+
+// Cell of the finest grid that a point lies in, clamped into the grid.
 uvec3 quantize(Grid g, vec3 x) {
-    precise vec3 q = floor(from_corner(g, x) * g.inv.xyz);
-    return uvec3(ivec3(clamp(q, vec3(0.0), vec3(1023.0))));
+    precise vec3 q = from_corner(g, x) * g.inv.xyz;
+    return cell_at(q);
 }
 
 // A finest cell in one word.

@@ -31,11 +31,16 @@ bool walk_past(inout LeafWalk w, uint level, uint at) {
     return true;
 }
 
-// The children that meet the cells, of a node with this level and code.
-uint children_among(uint level, uint code) {
+// The halves of a node's cell that the cells meet along each axis: 1 the lower one, 2 the upper.
+uvec3 halves_met(uint level, uint code) {
     uvec3 middle = 2u * unmorton(code) + 1u;
     uint shift = MAX_LEVEL - level - 1u;
-    uvec3 met = uvec3(lessThan(lo >> shift, middle)) + 2u * uvec3(greaterThanEqual(hi >> shift, middle));
+    return uvec3(lessThan(lo >> shift, middle)) + 2u * uvec3(greaterThanEqual(hi >> shift, middle));
+}
+
+// The octants that they meet, a bit for each digit.
+uint octants_met(uint level, uint code) {
+    uvec3 met = halves_met(level, code);
     return octants_of(met.x | met.y << 2u | met.z << 4u);
 }
 
@@ -45,7 +50,7 @@ uint next_leaf(inout LeafWalk w, uint level, inout uint work, uint budget) {
         if (w.depth == level) return w.path[level];
         uint shift = 3u * (level - w.depth - 1u), node = w.path[w.depth];
         uint digit = w.code >> shift & 7u, mask = child_mask(node);
-        uint rest = (mask & children_among(w.depth, w.code >> shift >> 3u)) >> digit;
+        uint rest = (mask & octants_met(w.depth, w.code >> shift >> 3u)) >> digit;
         if (rest == 0u) {
             if (!walk_past(w, level, w.depth)) return WALK_DONE;
             continue;

@@ -30,8 +30,8 @@ uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint e
         precise float t = (cell_side(g, c, level, cell[c] + uint(inverse_way[c] > 0.0)) - origin[c]) * inverse_way[c];
         leave = min(leave, t);
     }
-    precise float number = floor(leave * view.inverse_step - 0.5);
-    uint last = uint(int(clamp(number, float(k), float(end - 1u)))); // signed: see quantize
+    precise float number = leave * view.inverse_step - 0.5;
+    uint last = min(whole_of(clamp(number, float(k), float(end - 1u))), end - 1u);
     for (uint i = 0u; i < 2u && last > k; ++i) {
         if (quantize(g, sample_at(view, origin, way, last)) >> shift == cell) return last + 1u;
         --last;

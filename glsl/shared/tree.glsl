@@ -9,6 +9,18 @@ uint find_leaf(uint level, uvec3 finest) {
     return (child_mask(leaf) >> (code >> (3u * (MAX_LEVEL - 1u - level)) & 7u) & 1u) != 0u ? leaf : NONE;
 }
 
+// The level of the largest cell around one of the finest grid, given by its code, that no primitive comes near to: a node that there is not, or an octant of a
+// leaf; 0 if there is none.
+uint empty_level(uint level, uint code) {
+    uint node = 0u;
+    for (uint at = 1u; at <= min(level + 1u, MAX_LEVEL); ++at) {
+        uint digit = code >> (3u * (MAX_LEVEL - at)) & 7u, mask = child_mask(node);
+        if ((mask >> digit & 1u) == 0u) return at;
+        if (at <= level) node = child_of(node, mask, digit);
+    }
+    return 0u;
+}
+
 // The primitive of an entry; the bits above are halves.
 uint listed_tet(uint entry) { return p.at[entry] & grid.at[0].ids; }
 
