@@ -193,7 +193,7 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         let asked = View { mesh, options, field: wave, settings: &settings };
         let (whole, took) = render(gpu, 64 << 20, &asked, QUIET).unwrap().apart();
         assert_eq!(took.trees, 1);
-        let memory = 768 << 10;
+        let memory = 640 << 10;
         let (found, took) = render(gpu, memory, &asked, QUIET).unwrap().apart();
         println!("{camera}: {} samples, {} trees, peak {}", found.drawn.found_samples, took.trees, took.peak);
         let first = (0..whole.drawn.colors.len()).find(|&i| bits(&whole.drawn.colors[i]) != bits(&found.drawn.colors[i]));

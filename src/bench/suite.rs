@@ -2,7 +2,7 @@
 
 use super::{Budget, Kind};
 use crate::error::{Error, Result};
-use crate::options::Assign;
+use crate::options::{Assign, Lists};
 use serde::Serialize;
 
 /// A choice of meshes and sizes.
@@ -27,7 +27,7 @@ impl Suite {
     /// The structures that are measured.
     pub(super) fn kinds(self) -> Vec<Kind> {
         let plain = |kind: &Kind| match kind {
-            Kind::Octree { alpha, assign, .. } => *alpha == 0 && *assign == Assign::Aabb,
+            Kind::Octree { alpha, assign, lists } => *alpha == 0 && (*assign == Assign::Aabb || *lists == Lists::Boundary),
             Kind::Lbvh => true,
             Kind::Rays(_) => false,
         };

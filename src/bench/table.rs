@@ -113,8 +113,13 @@ fn main_tables(report: &Report) -> Vec<Table> {
     tables.extend(total.into_iter().chain(paper));
     tables.extend(Quantity::ALL[1..].iter().filter_map(|&q| figures(report, q)));
     tables.extend(lost);
-    tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", |s| s.alpha == Some(0) && s.assign == Some("aabb"))));
+    tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", |s| is_main(s))));
     tables
+}
+
+/// Whether it is a tree of the main tables: at α = 0 the paper's, and the one by default.
+fn is_main(s: &StructureReport) -> bool {
+    s.alpha == Some(0) && (s.assign == Some("aabb") || s.lists == Some("boundary"))
 }
 
 /// The stages of the constructions chosen, against the copy rate; `None` where stages are not timed.
@@ -145,7 +150,7 @@ fn detail_tables(report: &Report) -> Vec<Table> {
         let header = text_of(&["", "l", "entries", "device ms per stage"]);
         Table { title: format!("Construction by stage, {}", m.name), header, rows: m.structures.iter().map(row).collect() }
     });
-    let traffic = report.meshes.iter().filter_map(|m| self::stages(m, "other trees, ", |s| s.alpha != Some(0) || s.assign != Some("aabb")));
+    let traffic = report.meshes.iter().filter_map(|m| self::stages(m, "other trees, ", |s| !is_main(s)));
     let arrays = report.meshes.iter().map(|m| {
         let row = |s: &StructureReport| {
             let arrays = s.memory.arrays.iter().filter(|a| a.1 > 0).map(|(name, n)| format!("{name} {n}"));

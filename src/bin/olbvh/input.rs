@@ -13,9 +13,9 @@ pub struct TreeArgs {
     /// Coarseness of the tree, 0 to 10: each whole number takes one level off. Coarser trees are smaller and quicker to build; answers are the same.
     #[arg(long, default_value_t = 0.0, value_name = "A")]
     pub alpha: f32,
-    /// Which octree cells list a tetrahedron: those its box meets, those its face planes leave, or exactly those it touches; shorter lists take longer to
-    /// build. Answers are the same.
-    #[arg(long, default_value = "aabb", value_name = "aabb|planes|exact")]
+    /// Which octree cells list a tetrahedron: those its box meets, as in the paper; of those the ones that its face planes leave; or exactly those it touches,
+    /// the shortest lists, which take longest to build. Answers are the same.
+    #[arg(long, default_value_t = BuildOptions::default().assign, value_name = "aabb|planes|exact")]
     pub assign: Assign,
     /// Which tetrahedra a leaf lists: all where the surface is and elsewhere one, from which points are walked to; or all everywhere, as in the
     /// paper. Answers are the same.

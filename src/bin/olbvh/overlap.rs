@@ -10,7 +10,7 @@ use glam::{DQuat, DVec3};
 use olbvh::error::Error;
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::Lists;
+use olbvh::options::{Assign, Lists};
 use serde_json::json;
 use std::path::PathBuf;
 
@@ -54,7 +54,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu])?;
     let mut options = args.tree.options(false)?;
     if args.pairs {
-        options.lists = Lists::All; // pairs are found by lists
+        (options.lists, options.assign) = (Lists::All, Assign::Aabb); // pairs are found by lists, by those of boxes only once
     }
     let engine = engine::open(common)?;
     let a = args.tree.mesh(&args.a, common)?.mesh;

@@ -88,7 +88,8 @@ struct Stage {
 fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
     let device = &handle(gpu, "gpu").unwrap().0;
     let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
-    let build = OlbvhBuildOptions { lists: 0, ..olbvh_default_build_options() };
+    // Lists of boxes, by which pairs are found once.
+    let build = OlbvhBuildOptions { lists: 0, assign: 0, ..olbvh_default_build_options() };
     let plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build };
     let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
     let (positions, cells) = (device.upload("olbvh.test.positions", &mesh.points), device.upload("olbvh.test.cells", &mesh.tets));
