@@ -207,8 +207,8 @@ struct olbvh_SliceStatus {
     uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
     uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
     uint inside;   // Voxels with their centre in the mesh; counted once all centres are located.
-    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at, as the next.
-    uint empty;    // Voxels that it does not.
+    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at.
+    uint empty;    // Voxels that it does not, and until then those that it may touch.
 };
 
 // The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.
@@ -284,6 +284,13 @@ float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 // x without denormals.
 float olbvh_canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
+// The whole part of x in [0, 2^23), from the bits of a sum: drivers for CPUs convert lane by lane, with tests for what no integer is. Of other x, any word
+// below 2^23.
+uint olbvh_whole_of(float x) {
+    precise float sum = floor(x) + 8388608.0;
+    return floatBitsToUint(sum) & 0x7fffffu;
+}
+
 // Distance from the lower corner, per axis.
 vec3 olbvh_from_corner(olbvh_Grid g, vec3 x) {
     precise vec3 d = vec3(olbvh_canonical(x.x), olbvh_canonical(x.y), olbvh_canonical(x.z)) - g.lo.xyz;
@@ -296,10 +303,16 @@ bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid, clamped into the grid. By signed integers, since drivers for CPUs convert to unsigned ones lane by lane.
+// Cell of the finest grid at so many of its cells from the lower corner, clamped into the grid.
+uvec3 olbvh_cell_at(vec3 q) {
+    vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
+    return min(uvec3(olbvh_whole_of(r.x), olbvh_whole_of(r.y), olbvh_whole_of(r.z)), 1023u);
+}
+
+// Cell of the finest grid that a point lies in, clamped into the grid.
 uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
-    precise vec3 q = floor(olbvh_from_corner(g, x) * g.inv.xyz);
-    return uvec3(ivec3(clamp(q, vec3(0.0), vec3(1023.0))));
+    precise vec3 q = olbvh_from_corner(g, x) * g.inv.xyz;
+    return olbvh_cell_at(q);
 }
 
 // A finest cell in one word.
@@ -544,6 +557,18 @@ uint olbvh_find_leaf(uint level, uvec3 finest) {
     return (olbvh_child_mask(leaf) >> (code >> (3u * (olbvh_MAX_LEVEL - 1u - level)) & 7u) & 1u) != 0u ? leaf : olbvh_NONE;
 }
 
+// The level of the largest cell around one of the finest grid, given by its code, that no primitive comes near to: a node that there is not, or an octant of a
+// leaf; 0 if there is none.
+uint olbvh_empty_level(uint level, uint code) {
+    uint node = 0u;
+    for (uint at = 1u; at <= min(level + 1u, olbvh_MAX_LEVEL); ++at) {
+        uint digit = code >> (3u * (olbvh_MAX_LEVEL - at)) & 7u, mask = olbvh_child_mask(node);
+        if ((mask >> digit & 1u) == 0u) return at;
+        if (at <= level) node = olbvh_child_of(node, mask, digit);
+    }
+    return 0u;
+}
+
 // The primitive of an entry; the bits above are halves.
 uint olbvh_listed_tet(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
 
@@ -601,7 +626,7 @@ struct olbvh_Sought {
 // That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
 olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = olbvh_quantize(g, at);
-    uint least = 1u + uint(clamp(tolerance, 0.0, 1.0) * 4096.0);
+    uint least = 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
     uvec3 reach = olbvh_reach_of(g, least);
     return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == olbvh_NONE ? 0u : olbvh_halves_around(g.level, cell));
 }

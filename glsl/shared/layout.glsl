@@ -154,8 +154,8 @@ struct SliceStatus {
     uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
     uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
     uint inside;   // Voxels with their centre in the mesh; counted once all centres are located.
-    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at, as the next.
-    uint empty;    // Voxels that it does not.
+    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at.
+    uint empty;    // Voxels that it does not, and until then those that it may touch.
 };
 
 // The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.

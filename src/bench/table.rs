@@ -113,7 +113,7 @@ fn main_tables(report: &Report) -> Vec<Table> {
     tables.extend(total.into_iter().chain(paper));
     tables.extend(Quantity::ALL[1..].iter().filter_map(|&q| figures(report, q)));
     tables.extend(lost);
-    tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", |s| is_main(s))));
+    tables.extend(report.meshes.iter().filter_map(|m| stages(m, "", is_main)));
     tables
 }
 

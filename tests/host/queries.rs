@@ -4,7 +4,7 @@ use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
 use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::{BuildOptions, Lists};
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
     LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, Path, PointInput, PointOrder, RenderInput, RenderMemory, Rounds,
@@ -46,8 +46,9 @@ impl Queries {
     pub fn new(gpu: &Gpu, frame: &Frame, field: &[f32], other: &Mesh, room: u64) -> Self {
         let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
         let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
-        // Pairs are found by lists.
-        let other_tree = Tree::build(gpu, &other, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
+        // Pairs are found by lists, and once by those of boxes.
+        let options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, ..BuildOptions::default() };
+        let other_tree = Tree::build(gpu, &other, &options).unwrap();
         let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
         let voxels = VoxelGrid {
             origin: [-1.0; 3],
