@@ -35,10 +35,10 @@ impl Path {
     ///
     /// | | 262,144 points | 1,048,576 points |
     /// |---|---|---|
-    /// | random, [`Path::Descent`] | 407–463 | 416–437 |
-    /// | random, [`Path::Sorted`] | 444–535 | 327–348 |
-    /// | along a Z curve, [`Path::Descent`] | 268–280 | 232–240 |
-    /// | along a Z curve, [`Path::Runs`] | 300–348 | 159–188 |
+    /// | random, [`Path::Descent`] | 194–279 | 193–242 |
+    /// | random, [`Path::Sorted`] | 251–254 | 153–159 |
+    /// | along a Z curve, [`Path::Descent`] | 108–138 | 90–92 |
+    /// | along a Z curve, [`Path::Runs`] | 160–178 | 77–83 |
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
         // Only what is sorted together gets nearer.
         let together = if in_order { points } else { points.min(CHUNK) };
