@@ -197,8 +197,8 @@ struct olbvh_RunState {
     uint best;      // Best candidate so far, or all ones.
     uint in_box;    // Whether the best one's box holds the centre.
     float olbvh_smallest; // Its smallest barycentric coordinate.
-    uint pad0;      // Unused.
-    uint pad1;      // Unused.
+    uint inside;    // Voxels with their centre in a cell.
+    uint waiting;   // Voxels whose boxes must be looked at and have not been listed.
 };
 
 // What has become of a slice.
@@ -662,16 +662,24 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
 
-// Of up to 32 entries from `begin` on, those before `end` that are near, a bit each. Most are not; each test is made for all of them before the next, so that
-// invocations wait for each other less.
-uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) {
-    uint ids = olbvh_grid.at[0].ids, count = min(32u, end - begin), left = 0u, olbvh_near = 0u;
+// Of up to 32 entries from `begin` on, those before `end` that are in the halves of the leaf's cell, a bit each. Most are not, nor are most of those near;
+// each test is made for all of them before the next, so that invocations wait for each other less.
+uint olbvh_in_halves(uint begin, uint end, olbvh_Sought s) {
+    uint count = min(32u, end - begin), left = 0u;
     for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] >> olbvh_ID_BITS & s.halves) == s.halves) << k;
+    return left;
+}
+
+// Those that are near.
+uint olbvh_near_of(uint begin, uint left, olbvh_Sought s) {
+    uint ids = olbvh_grid.at[0].ids, olbvh_near = 0u;
     for (; left != 0u; left &= left - 1u) {
         if (olbvh_is_near(olbvh_words(olbvh_cells.at[olbvh_p.at[begin + findLSB(left)] & ids]), s)) olbvh_near |= left & -left;
     }
     return olbvh_near;
 }
+
+uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) { return olbvh_near_of(begin, olbvh_in_halves(begin, end, s), s); }
 
 // Looks at entries [begin, end) in order, ends at the first that contains the point.
 void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {

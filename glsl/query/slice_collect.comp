@@ -2,39 +2,43 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), between the parts: the voxels whose centre lies in no cell, in no order, so that looking at boxes costs nothing for the others.
-// One invocation per 32 voxels. What has been listed is marked, and not listed again; what is settled without it is counted.
-ARGUMENTS(4)
-    uint voxels;
+// Slicing (SPEC 3.4), between the parts: the voxels whose boxes must be looked at, in no order, so that looking at them costs nothing for the others.
+// One invocation per run of voxels. A run is listed once; how many voxels are settled without it is counted.
+layout(constant_id = 2) const uint RUN = 32;
+ARGUMENTS(5)
+    uint width; // of the rows
+    uint rows;  // of the band
 END_ARGUMENTS
-BUFFER(0, READ_WRITE, uint, answers)
+BUFFER(0, readonly, uint, answers)
 BUFFER(1, READ_WRITE, SliceStatus, status)
 BUFFER16(2, READ_WRITE, SlicePlan, plans)
-BUFFER(3, writeonly, TouchState, states)
+BUFFER(3, READ_WRITE, RunState, runs)
+BUFFER(4, writeonly, TouchState, states)
 
 void main() {
-    uint begin = 32u * item_index(), wait = 0u, inside = 0u, others = 0u;
+    uint i = item_index(), lines = i / width * RUN, count = 0u, inside = 0u, wait = 0u;
     // Only once all centres have been located.
-    if (begin < voxels && status.at[0].locating == 0u) {
-        for (uint k = 0u; k < min(32u, voxels - begin); ++k) {
-            uint answer = answers.at[begin + k];
-            wait |= uint(answer == SLICE_PENDING) << k;
-            inside += uint(answer < SLICE_TOUCHED);
-        }
-        others = min(32u, voxels - begin) - inside; // empty, unless it turns out that something touches them
+    if (lines < rows && status.at[0].locating == 0u) {
+        count = min(RUN, rows - lines);
+        inside = runs.at[i].inside;
+        wait = runs.at[i].waiting;
     }
-    inside = subgroupAdd(inside);
-    others = subgroupAdd(others);
+    uint all_inside = subgroupAdd(inside), others = subgroupAdd(count - inside), total = subgroupAdd(wait), place = 0u;
     if (subgroupElect()) {
-        if (inside > 0u) atomicAdd(status.at[0].inside, inside);
-        if (others > 0u) atomicAdd(status.at[0].empty, others);
+        if (all_inside > 0u) atomicAdd(status.at[0].inside, all_inside);
+        if (others > 0u) atomicAdd(status.at[0].empty, others); // unless it turns out that something touches them
+        if (total > 0u) place = atomicAdd(plans.at[0].listed, total);
     }
-    uint count = bitCount(wait), total = subgroupAdd(count), before = subgroupExclusiveAdd(count), place = 0u;
-    if (subgroupElect() && total > 0u) place = atomicAdd(plans.at[0].listed, total);
-    place = subgroupBroadcastFirst(place) + before;
-    for (; wait != 0u; wait &= wait - 1u) {
-        uint voxel = begin + uint(findLSB(wait));
-        answers.at[voxel] = SLICE_LISTED;
-        states.at[place++] = TouchState(0u, 0u, NONE, 3.40282347e38, voxel);
+    if (total == 0u) return;
+    place = subgroupBroadcastFirst(place);
+    if (wait > 0u) runs.at[i].waiting = 0u;
+    uint line = lines * width + i % width;
+    // Row by row: what stands side by side there is near to the same.
+    for (uint k = 0u; k < RUN; ++k) {
+        uint voxel = line + k * width;
+        bool waits = wait > 0u && k < count && answers.at[voxel] == SLICE_PENDING;
+        uvec4 waiting = subgroupBallot(waits);
+        if (waits) states.at[place + subgroupBallotExclusiveBitCount(waiting)] = TouchState(0u, 0u, NONE, 3.40282347e38, voxel);
+        place += subgroupBallotBitCount(waiting);
     }
 }

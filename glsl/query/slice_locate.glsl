@@ -4,8 +4,9 @@
 #include "shared/tet.glsl"
 #include "shared/structure.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels of a row, and looks
-// for each in the cell of the one before and a short walk across faces from it, before it asks the structure. Twin of src/reference/slice.rs.
+// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels below each
+// other, and looks for each in the cell of the one before and a short walk across faces from it, before it asks the structure. Invocations side by side
+// have runs side by side: they are in the same cells and leave them together. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 32;
 layout(constant_id = 3) const uint WALK = 6;
 layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
@@ -33,7 +34,8 @@ STRUCTURE(10)
 
 SlicePlan plan;
 RunState state;
-uint line; // first voxel of the run
+uint column, line; // of the run: its place in the rows, its first voxel
+uvec2 row;         // of the next voxel: in its layer, its layer
 
 // Where the run stands, and the field there.
 Stand stand;
@@ -54,14 +56,24 @@ bool go_on(Sides sides) {
 
 // The next voxel of the run.
 void settle(uint answer, float value) {
-    answers.at[line + state.next] = answer;
-    if (FIELD != 0u && answer != SLICE_PENDING) values.at[line + state.next] = value;
+    uint voxel = line + state.next * plan.width;
+    answers.at[voxel] = answer;
+    if (FIELD != 0u && answer != SLICE_PENDING) values.at[voxel] = value;
     ++state.next;
+    bool ends = ++row.x == plan.height;
+    row = ends ? uvec2(0u, row.y + 1u) : row;
+}
+
+// The next voxel, the box of which must be looked at.
+void wait() {
+    ++state.waiting;
+    settle(SLICE_PENDING, 0.0);
 }
 
 // The next voxel, which lies so in the stand.
 void settle_inside(Sides sides) {
     state.hint = stand.t;
+    ++state.inside;
     settle(stand.t, FIELD == 0u ? 0.0 : value_of(held, barycentric(sides)));
 }
 
@@ -101,16 +113,16 @@ void main() {
     uint i = item_index();
     uint unfinished = 0u;
     plan = plans.at[0];
-    uint runs = (plan.width + RUN - 1u) / RUN;
     if (i == 0u) status.at[0].refused = plan.refused;
-    if (i < plan.rows * runs) {
+    uint lines = i / plan.width * RUN;
+    if (lines < plan.rows) {
         Grid g = grid.at[0];
         state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
         if (fresh == 0u) state = states.at[i];
-        uint row = i / runs, begin = (i - row * runs) * RUN, count = min(RUN, plan.width - begin);
-        line = row * plan.width + begin;
-        uvec3 place = voxel_place(plan, line);
-        vec3 origin = row_origin(plan, place.y, place.z);
+        uint count = min(RUN, plan.rows - lines);
+        column = i % plan.width;
+        line = lines * plan.width + column;
+        row = voxel_row(plan, lines + state.next);
         while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
         bool stands = state.hint != NONE && state.cursor == 0u;
         stand = stand_nowhere();
@@ -119,7 +131,7 @@ void main() {
             // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
             uint misses = 0u;
             for (; stands && state.next < count && work < BUDGET; ++work) {
-                vec3 at = voxel_centre(plan, origin, place.x + state.next);
+                vec3 at = voxel_centre(plan, row_origin(plan, row), column);
                 if (!is_ours(g, at)) break;
                 vec3 x = normalise(g, at);
                 Sides sides = sides_of(stand, x);
@@ -140,9 +152,9 @@ void main() {
                 }
             }
             if (state.next >= count || work >= BUDGET) break;
-            vec3 at = voxel_centre(plan, origin, place.x + state.next);
+            vec3 at = voxel_centre(plan, row_origin(plan, row), column);
             if (!is_ours(g, at)) {
-                settle(SLICE_PENDING, 0.0);
+                wait();
                 continue;
             }
             if (is_still_empty(g, at)) {
@@ -164,7 +176,8 @@ void main() {
                 settle_inside(sides_of(stand, x));
             } else {
                 state.hint = NONE;
-                settle(is_empty(g, at) ? NONE : SLICE_PENDING, uintBitsToFloat(NAN));
+                if (is_empty(g, at)) settle(NONE, uintBitsToFloat(NAN));
+                else wait();
             }
         }
         unfinished = uint(state.next < count);

@@ -90,6 +90,16 @@ bool enters(Node node) {
     return node.level < leaf_level || leaf_level == MAX_LEVEL || (child_mask(node.index) & octants_met(node.level, node.code)) != 0u;
 }
 
+// Of entries from `begin` on those that are boundary primitives, a bit each.
+uint at_boundary(uint begin, uint left) {
+    uint found = 0u;
+    for (; left != 0u; left &= left - 1u) {
+        uint t = listed_tet(begin + findLSB(left));
+        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) found |= left & -left;
+    }
+    return found;
+}
+
 // What an entry of a leaf is measured for: its box meets the cells, and so do the halves of the leaf's cell that it is near to. Where the cells meet
 // both halves along an axis, either will do.
 Sought sought_in(Grid g, uint code) {
@@ -119,10 +129,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
         Sought s = sought_in(g, at.code);
         for (uint e = from; e < to; e += 32u) {
-            for (uint near = near_among(e, to, s); near != 0u; near &= near - 1u) {
-                uint t = listed_tet(e + findLSB(near));
-                if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) measure(t);
-            }
+            for (uint near = near_of(e, at_boundary(e, in_halves(e, to, s)), s); near != 0u; near &= near - 1u) measure(listed_tet(e + findLSB(near)));
         }
         work += to - from;
         state.entry = to - range.x;
@@ -143,7 +150,7 @@ void main() {
     if (i < plan.listed) {
         state = states.at[i];
         uint voxel = state.voxel;
-        if (answers.at[voxel] == SLICE_LISTED) {
+        if (answers.at[voxel] == SLICE_PENDING) {
             Grid g = grid.at[0];
             vec3 centre = voxel_centre(plan, voxel);
             x = normalise(g, centre);

@@ -144,8 +144,8 @@ struct RunState {
     uint best;      // Best candidate so far, or all ones.
     uint in_box;    // Whether the best one's box holds the centre.
     float smallest; // Its smallest barycentric coordinate.
-    uint pad0;      // Unused.
-    uint pad1;      // Unused.
+    uint inside;    // Voxels with their centre in a cell.
+    uint waiting;   // Voxels whose boxes must be looked at and have not been listed.
 };
 
 // What has become of a slice.

@@ -2,8 +2,8 @@
 //!
 //! ```text
 //! plan      the voxels as the kernels need them, over bounds that the device knows
-//! locate    centres, in runs along the rows, and the field there                      a round: locate, collect, touch
-//! collect   the voxels whose centre lies in no cell
+//! locate    centres, in runs down the rows, and the field there                       a round: locate, collect, touch
+//! collect   the voxels whose boxes must be looked at
 //! touch     their boxes
 //! values    their kinds, and the field there
 //! ```
@@ -53,9 +53,14 @@ impl SliceInput<'_> {
     pub fn count(&self) -> u32 {
         self.rows.count * self.voxels.size[0]
     }
+
+    /// Number of runs, one below the other and side by side.
+    fn runs(&self) -> u32 {
+        self.rows.count.div_ceil(RUN) * self.voxels.size[0]
+    }
 }
 
-/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel.
+/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel, and 32 per voxel of a row.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceMemory {
     /// Per voxel, row by row: the owner, plus 2^31 if the voxel is merely touched; all ones: empty.
@@ -85,7 +90,7 @@ impl SliceMemory {
             values: arena.words(width * rows)?,
             status: arena.take(size_of::<SliceStatus>() as u64)?,
             plan: arena.take(size_of::<SlicePlan>() as u64)?,
-            runs: arena.take(size_of::<RunState>() as u64 * rows * width.div_ceil(u64::from(RUN)))?,
+            runs: arena.take(size_of::<RunState>() as u64 * width * rows.div_ceil(u64::from(RUN)))?,
             touches: arena.take(size_of::<TouchState>() as u64 * width * rows)?,
             groups: arena.words(3)?,
         })
@@ -145,7 +150,7 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, m
 
 fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, asked: &SliceInput<'_>, begins: u32) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let items = asked.rows.count * asked.voxels.size[0].div_ceil(RUN);
+    let items = asked.runs();
     let (run, walk, part, lists) = (RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
     let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
     let (buffer, field, on_cells) = of_field(r, asked);
@@ -176,10 +181,11 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
     let (boundary, voxels) = (arrays.boundary, part.count());
     let workgroup = r.gpu().target().query;
     r.stage("query.slice_touch", |r| {
-        let SliceMemory { answers, status, plan: plans, touches: states, .. } = *memory;
-        let collect = SliceCollect { answers, status, plans, states, voxels };
-        let spec = SliceCollectSpec { workgroup, ..Default::default() };
-        r.dispatch(&collect, spec, Groups::Count(voxels.div_ceil(32).div_ceil(workgroup)))?;
+        let SliceMemory { answers, status, plan: plans, runs, touches: states, .. } = *memory;
+        let (width, rows) = (part.voxels.size[0], part.rows.count);
+        let collect = SliceCollect { answers, status, plans, runs, states, width, rows };
+        let spec = SliceCollectSpec { workgroup, run: RUN, ..Default::default() };
+        r.dispatch(&collect, spec, Groups::Count(part.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");
         let listed = Count::device(voxels, plans.part(offset_of!(SlicePlan, listed) as u64, 16));
         let groups = listed.groups(r, workgroup, memory.groups, "slice.arguments → slice.touch")?;

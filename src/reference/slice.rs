@@ -78,24 +78,23 @@ impl<'a> Slicer<'a> {
 
     /// The voxels of these rows.
     pub fn band(&self, rows: Rows) -> Band {
-        let [w, h] = self.voxels.size;
-        let runs = w.div_ceil(RUN);
-        let run = |i: u64| {
-            let [y, layer] = rows.row((i / u64::from(runs)) as u32, h);
-            self.run([(i % u64::from(runs)) as u32 * RUN, y, layer])
-        };
-        let answers: Vec<Vec<Voxel>> = (0..u64::from(rows.count) * u64::from(runs)).into_par_iter().map(run).collect();
-        let all = || answers.iter().flatten();
+        let (width, run) = (self.voxels.size[0] as usize, RUN as usize);
+        let count = rows.count.div_ceil(RUN) as usize * width;
+        let runs: Vec<Vec<Voxel>> =
+            (0..count).into_par_iter().map(|i| self.run(rows, (i % width) as u32, (i / width) as u32 * RUN)).collect();
+        let voxel = |i: usize| runs[i / width / run * width + i % width][i / width % run];
+        let all = || (0..rows.count as usize * width).map(voxel);
         let (values, kinds) = (all().map(|v| v.value).collect(), all().map(|v| v.kind).collect());
         Band { rows, values, kinds, owners: all().map(|v| v.owner).collect() }
     }
 
-    /// The voxels of a run: located one after the other, each first in the cell of the one before; then those outside by their boxes.
-    fn run(&self, [begin, y, layer]: [u32; 3]) -> Vec<Voxel> {
+    /// The voxels of a run, at `x` of the rows from `first` on: located one after the other, each first in the cell of the one before; then those outside
+    /// by their boxes.
+    fn run(&self, rows: Rows, x: u32, first: u32) -> Vec<Voxel> {
         let mut hint = NONE;
-        let end = self.voxels.size[0].min(begin + RUN);
-        (begin..end)
-            .map(|x| {
+        (first..rows.count.min(first + RUN))
+            .map(|row| {
+                let [y, layer] = rows.row(row, self.voxels.size[1]);
                 let centre = self.voxels.centre([x, y, layer]);
                 if !self.part.contains(self.tree.grid.quantize(centre)) {
                     return self.touched(centre);

@@ -27,7 +27,7 @@ pub const TOUCHED: u8 = 1;
 /// Kind of a voxel whose centre lies in the mesh.
 pub const INSIDE: u8 = 2;
 
-/// Voxels of a row whose centres are located together, each from the owner of the one before.
+/// Voxels below each other whose centres are located together, each from the owner of the one before.
 pub const RUN: u32 = 32;
 /// Steps of a walk across faces before the tree is asked.
 pub const WALK: u32 = 6;

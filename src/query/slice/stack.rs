@@ -4,7 +4,7 @@ use super::{SliceInput, SliceMemory, cmd_slice};
 use crate::build::DeviceMesh;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, Gpu};
-use crate::layout::SliceStatus;
+use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Searched, Structure};
@@ -68,7 +68,8 @@ impl<'a> Slicing<'a> {
             Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))
         };
         let field = field.map(upload).transpose()?;
-        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE) / PER_VOXEL);
+        let per_row = size_of::<RunState>() as u64 * u64::from(voxels.size[0]);
+        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_row) / PER_VOXEL);
         let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size[0], rows);
         let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
