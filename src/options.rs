@@ -5,6 +5,9 @@ use crate::error::{Error, Result};
 /// How far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf, unless the caller says otherwise (SPEC 3.1).
 pub const TOLERANCE: f32 = 1e-5;
 
+/// Points that are located one after the other, each from the owner of the one before, where they lie near each other.
+pub const RUN: u32 = 32;
+
 /// Which cells list a primitive (SPEC 2.2). The stronger the test, the shorter the lists and the longer the construction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]

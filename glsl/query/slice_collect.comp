@@ -4,7 +4,7 @@
 #include "shared/voxels.glsl"
 // Slicing (SPEC 3.4), between the parts: the voxels whose boxes must be looked at, in no order, so that looking at them costs nothing for the others.
 // One invocation per run of voxels. A run is listed once; how many voxels are settled without it is counted.
-layout(constant_id = 2) const uint RUN = 32;
+layout(constant_id = 2) const uint RUN = 64;
 ARGUMENTS(5)
     uint width; // of the rows
     uint rows;  // of the band

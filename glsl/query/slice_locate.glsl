@@ -7,10 +7,10 @@
 // Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels below each
 // other, and looks for each in the cell of the one before and a short walk across faces from it, before it asks the structure. Invocations side by side
 // have runs side by side: they are in the same cells and leave them together. Twin of src/reference/slice.rs.
-layout(constant_id = 2) const uint RUN = 32;
+layout(constant_id = 2) const uint RUN = 64;
 layout(constant_id = 3) const uint WALK = 6;
 layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
-layout(constant_id = 6) const uint BUDGET = 4096; // candidates tested per run and dispatch, roughly
+layout(constant_id = 6) const uint BUDGET = 8192; // candidates tested per run and dispatch, roughly
 layout(constant_id = 7) const uint TOLERANCE = 0; // a float's bits
 layout(constant_id = 8) const uint FIELD = 0; // there is one
 layout(constant_id = 9) const uint ON_CELLS = 0;

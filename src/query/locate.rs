@@ -7,10 +7,9 @@ use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
-use crate::options::TOLERANCE;
+use crate::options::{RUN, TOLERANCE};
 use crate::primitives::Arena;
 use crate::reference::locate::{CHUNK, SLICE};
-use crate::slicing::RUN;
 
 /// How the leaf of a point is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

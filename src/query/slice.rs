@@ -28,7 +28,7 @@ use crate::slicing::{Extrapolate, RUN, Rows, VoxelGrid, WALK};
 use std::mem::offset_of;
 
 /// Candidates that a run of voxels may test in one dispatch.
-const LOCATE_BUDGET: u32 = 4096;
+const LOCATE_BUDGET: u32 = 8192;
 /// Nodes and candidates that a voxel may test in one dispatch.
 const TOUCH_BUDGET: u32 = 1024;
 

@@ -28,7 +28,7 @@ pub const TOUCHED: u8 = 1;
 pub const INSIDE: u8 = 2;
 
 /// Voxels below each other whose centres are located together, each from the owner of the one before.
-pub const RUN: u32 = 32;
+pub const RUN: u32 = 64;
 /// Steps of a walk across faces before the tree is asked.
 pub const WALK: u32 = 6;
 /// Most voxels along an axis: numbers up to this are exact in single precision.
