@@ -16,6 +16,7 @@ mod detect;
 mod gmsh;
 mod gmsh_data;
 mod gmsh_elements;
+mod integers;
 mod medit;
 mod meditb;
 mod npy;

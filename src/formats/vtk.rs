@@ -2,6 +2,7 @@
 
 use super::assemble::{Array, Assembly};
 use super::cells;
+use super::integers::Integers;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
 use crate::error::Result;
@@ -14,11 +15,23 @@ struct Reader<'a> {
 }
 
 /// Cells as the file has them.
-#[derive(Default)]
-struct Cells {
-    /// End of each cell in `nodes`.
-    ends: Vec<usize>,
-    nodes: Vec<i64>,
+struct Cells<'a> {
+    count: usize,
+    /// Where each begins in `nodes`, and where the last one ends; `None`: every cell's nodes follow their number.
+    offsets: Option<Integers<'a>>,
+    nodes: Integers<'a>,
+}
+
+impl Cells<'_> {
+    /// The nodes of cell `i`. `at`: where the one before ended, and then this one.
+    fn nodes(&mut self, i: usize, at: &mut usize) -> &[i64] {
+        let (begin, end) = match &mut self.offsets {
+            Some(offsets) => (*at, offsets.at(i + 1) as usize),
+            None => (*at + 1, *at + 1 + self.nodes.at(*at) as usize),
+        };
+        *at = end;
+        self.nodes.slice(begin..end)
+    }
 }
 
 /// What `POINT_DATA` or `CELL_DATA` said.
@@ -52,20 +65,20 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
     }
     let missing = |what: &str| source.error_line(source.bytes.len(), format!("the file ends, and there was no {what}"));
     assembly.points = points.ok_or_else(|| missing("POINTS"))?;
-    let cells: Cells = cells.ok_or_else(|| missing("CELLS"))?;
-    let types: Vec<i64> = types.ok_or_else(|| missing("CELL_TYPES"))?;
-    if types.len() != cells.ends.len() {
-        return Err(source.error(format!("CELL_TYPES has {} entries, CELLS has {}", types.len(), cells.ends.len())));
+    let mut cells: Cells<'_> = cells.ok_or_else(|| missing("CELLS"))?;
+    let mut types: Integers<'_> = types.ok_or_else(|| missing("CELL_TYPES"))?;
+    if types.len() != cells.count {
+        return Err(source.error(format!("CELL_TYPES has {} entries, CELLS has {}", types.len(), cells.count)));
     }
     assembly.reserve(types.len());
-    let mut start = 0;
-    for (cell, (&number, &end)) in types.iter().zip(&cells.ends).enumerate() {
+    let mut end = 0;
+    for cell in 0..cells.count {
+        let number = types.at(cell);
         let kind = cells::vtk(number);
         let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
         // A polyhedron's entry lists its faces, not its points.
-        let nodes = if number == 42 { &[] } else { &cells.nodes[start..end] };
-        assembly.push(kind, nodes, 0)?;
-        start = end;
+        let nodes = cells.nodes(cell, &mut end);
+        assembly.push(kind, if number == 42 { &[] } else { nodes }, 0)?;
     }
     for array in &assembly.arrays {
         let (count, what) = if array.on == On::Points { (assembly.points.len(), "POINTS") } else { (types.len(), "CELLS") };
@@ -78,7 +91,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
     Ok(assembly)
 }
 
-impl Reader<'_> {
+impl<'a> Reader<'a> {
     fn header(&mut self) -> Result<String> {
         let (first, _) = self.tokens.line().unwrap_or_default();
         let first = first.trim_ascii();
@@ -142,15 +155,27 @@ impl Reader<'_> {
         Ok(values)
     }
 
-    fn binary_values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
+    /// `count` whole numbers.
+    fn integers(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Integers<'a>> {
+        let Some(scalar) = scalar.filter(|_| self.binary) else { return self.values(scalar, count, what).map(Integers::parsed) };
+        self.tokens.line();
+        Ok(Integers::stored(self.bytes(Some(scalar), count, what)?.into(), scalar, true))
+    }
+
+    /// The bytes of `count` binary numbers.
+    fn bytes(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<&'a [u8]> {
         let at = self.tokens.at;
         let size = scalar.map_or(Some(count.div_ceil(8)), |s| count.checked_mul(s.size()));
         let size = size.filter(|&s| s <= self.tokens.left()).ok_or_else(|| {
             self.source
                 .error_byte(at, format!("{count} numbers ({what} each) are announced, but only {} bytes are left", self.tokens.left()))
         })?;
-        let bytes = &self.source.bytes[at..at + size];
         self.tokens.at += size;
+        Ok(&self.source.bytes[at..at + size])
+    }
+
+    fn binary_values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
+        let bytes = self.bytes(scalar, count, what)?;
         Ok(match scalar {
             Some(scalar) => scalar.convert(bytes, true),
             None => (0..count).map(|i| T::from_i64(i64::from(bytes[i / 8] >> (7 - i % 8) & 1))).collect(),
@@ -164,63 +189,64 @@ impl Reader<'_> {
         Ok(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect())
     }
 
-    fn types(&mut self) -> Result<Vec<i64>> {
+    fn types(&mut self) -> Result<Integers<'a>> {
         let n = self.tokens.count("the number of cell types")?;
-        self.values(Some(Scalar::I32), n, "a cell type")
+        self.integers(Some(Scalar::I32), n, "a cell type")
     }
 
     /// `CELLS n size` with lists of a count and that many points, or, since 5.0, `CELLS n+1 size` with offsets and connectivity.
-    fn cells(&mut self) -> Result<Cells> {
+    fn cells(&mut self) -> Result<Cells<'a>> {
         let at = self.tokens.at;
         let n = self.tokens.count("the number of cells")?;
         let size = self.tokens.count("the size of the cell list")?;
         if self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"OFFSETS")) {
             return self.offsets(at, n, size);
         }
-        let list: Vec<i64> = self.values(Some(Scalar::I32), size, "a point of a cell")?;
-        let mut cells = Cells { ends: Vec::with_capacity(n.min(list.len())), nodes: Vec::with_capacity(list.len().saturating_sub(n)) };
-        let mut rest = list.as_slice();
+        let mut list = self.integers(Some(Scalar::I32), size, "a point of a cell")?;
+        let mut next = 0;
         for cell in 0..n {
             let fail = |message: String| self.source.error_line(at, format!("CELLS: cell {cell} {message}"));
-            let Some((&length, after)) = rest.split_first() else {
+            if next == list.len() {
                 return Err(fail(format!("lies beyond the {size} numbers of the list")));
-            };
-            let fits = usize::try_from(length).ok().filter(|&l| l <= after.len());
-            let length = fits.ok_or_else(|| fail(format!("announces {length} points, but {} numbers are left", after.len())))?;
-            cells.nodes.extend_from_slice(&after[..length]);
-            cells.ends.push(cells.nodes.len());
-            rest = &after[length..];
+            }
+            let (length, left) = (list.at(next), list.len() - next - 1);
+            let fits = usize::try_from(length).ok().filter(|&l| l <= left);
+            next += 1 + fits.ok_or_else(|| fail(format!("announces {length} points, but {left} numbers are left")))?;
         }
-        if !rest.is_empty() {
-            return Err(self.source.error_line(at, format!("CELLS: {} of {size} numbers are left over after {n} cells", rest.len())));
+        if next < list.len() {
+            let left = list.len() - next;
+            return Err(self.source.error_line(at, format!("CELLS: {left} of {size} numbers are left over after {n} cells")));
         }
-        Ok(cells)
+        Ok(Cells { count: n, offsets: None, nodes: list })
     }
 
-    fn offsets(&mut self, at: usize, n: usize, size: usize) -> Result<Cells> {
+    fn offsets(&mut self, at: usize, n: usize, size: usize) -> Result<Cells<'a>> {
         self.tokens.next_token();
         let scalar = self.scalar()?;
-        let offsets: Vec<i64> = self.values(scalar, n, "an offset")?;
+        let mut offsets = self.integers(scalar, n, "an offset")?;
         let (word, word_at) = self.tokens.word("CONNECTIVITY")?;
         if !word.eq_ignore_ascii_case(b"CONNECTIVITY") {
             return Err(self.source.error_line(word_at, format!("`{}` where CONNECTIVITY should be", printable(word))));
         }
         let scalar = self.scalar()?;
-        let nodes: Vec<i64> = self.values(scalar, size, "a point of a cell")?;
+        let nodes = self.integers(scalar, size, "a point of a cell")?;
         let fail = |message: String| self.source.error_line(at, format!("CELLS: {message}"));
-        match offsets.first() {
-            None if nodes.is_empty() => return Ok(Cells::default()),
-            Some(0) => {}
-            first => return Err(fail(format!("the first offset is {first:?}, not 0"))),
+        let (count, first) = (offsets.len().saturating_sub(1), offsets.at(0));
+        if first != 0 {
+            return Err(fail(format!("the first offset is {first}, not 0")));
         }
-        if let Some(cell) = offsets.windows(2).position(|w| w[1] < w[0]) {
-            return Err(fail(format!("the offsets of cell {cell} go backwards")));
+        let mut last = 0;
+        for cell in 0..count {
+            let end = offsets.at(cell + 1);
+            if end < last {
+                return Err(fail(format!("the offsets of cell {cell} go backwards")));
+            }
+            last = end;
         }
-        let last = offsets.last().copied().unwrap_or(0);
         if last != nodes.len() as i64 {
             return Err(fail(format!("the last offset is {last}, but there are {} points of cells", nodes.len())));
         }
-        Ok(Cells { ends: offsets[1..].iter().map(|&end| end as usize).collect(), nodes })
+        Ok(Cells { count, offsets: Some(offsets), nodes })
     }
 
     /// Skips a block of meta data, which an empty line ends.

@@ -313,10 +313,11 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
         let found = piece.topology.iter().find(|a| a.name == name);
         found.ok_or_else(|| source.error_line(piece.at, format!("piece {index}: no array `{name}` in <Cells>")))
     };
-    let types = codec.integers(source, find("types")?, Some(piece.cells))?;
-    let offsets = codec.integers(source, find("offsets")?, Some(piece.cells))?;
+    let mut types = codec.integers(source, find("types")?, Some(piece.cells))?;
+    let mut offsets = codec.integers(source, find("offsets")?, Some(piece.cells))?;
     let mut previous = 0;
-    for (cell, &end) in offsets.iter().enumerate() {
+    for cell in 0..offsets.len() {
+        let end = offsets.at(cell);
         if end < previous {
             return Err(
                 source.error_in("array `offsets`", format!("cell {cell} of piece {index} would end at {end}, but begins at {previous}"))
@@ -324,19 +325,19 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
         }
         previous = end;
     }
-    let connectivity = codec.integers(source, find("connectivity")?, None)?;
+    let mut connectivity = codec.integers(source, find("connectivity")?, None)?;
     if previous != connectivity.len() as i64 {
         let message = format!("the last cell of piece {index} ends at {previous}, but `connectivity` has {} values", connectivity.len());
         return Err(source.error_in("array `offsets`", message));
     }
     let ghosts = piece.cell_data.iter().find(|a| a.name == "vtkGhostType" && a.components == 1);
-    let ghosts = ghosts.map(|a| codec.integers(source, a, Some(piece.cells))).transpose()?;
+    let mut ghosts = ghosts.map(|a| codec.integers(source, a, Some(piece.cells))).transpose()?;
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
-    for (cell, (&number, &end)) in types.iter().zip(&offsets).enumerate() {
-        let end = end as usize;
-        let nodes = &connectivity[start..end];
+    for cell in 0..types.len() {
+        let (number, end) = (types.at(cell), offsets.at(cell) as usize);
+        let nodes = connectivity.slice(start..end);
         start = end;
         if kind.is_none_or(|(n, _)| n != number) {
             let found = cells::vtk(number);
@@ -345,7 +346,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
-        if ghosts.as_ref().is_some_and(|g| g[cell] & 1 != 0) {
+        if ghosts.as_mut().is_some_and(|g| g.at(cell) & 1 != 0) {
             assembly.skip("ghost cell", Fate::Ghost);
         } else if let Some((_, kind)) = kind {
             assembly.push(kind, nodes, offset)?;

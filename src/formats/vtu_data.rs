@@ -10,6 +10,7 @@ use base64::Engine as _;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
 
+use super::integers::Integers;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
 use super::unpack::Compressor;
@@ -104,14 +105,15 @@ impl Codec {
     }
 
     /// All values of an array of indices; `count` of them if it is given.
-    pub fn integers(&mut self, source: &Source, array: &StoredArray, count: Option<u64>) -> Result<Vec<i64>> {
-        if array.scalar.is_none_or(Scalar::is_float) {
-            return Err(place(source, array, "its type must be an integer type"));
-        }
+    pub fn integers<'a>(&mut self, source: &'a Source, array: &StoredArray, count: Option<u64>) -> Result<Integers<'a>> {
+        let scalar = array.scalar.filter(|s| !s.is_float()).ok_or_else(|| place(source, array, "its type must be an integer type"))?;
         if array.components != 1 {
             return Err(place(source, array, &format!("it must have 1 component, not {}", array.components)));
         }
-        self.values(source, array, count)
+        Ok(match &array.place {
+            Place::Ascii(parts) => Integers::parsed(ascii(source, array, scalar, parts, count)?),
+            _ => Integers::stored(self.bytes(source, array, scalar, count)?, scalar, self.big_endian),
+        })
     }
 
     fn values<T: Number>(&mut self, source: &Source, array: &StoredArray, count: Option<u64>) -> Result<Vec<T>> {
@@ -119,16 +121,20 @@ impl Codec {
         if let Place::Ascii(parts) = &array.place {
             return ascii(source, array, scalar, parts, count);
         }
+        Ok(scalar.convert(&self.bytes(source, array, scalar, count)?, self.big_endian))
+    }
+
+    /// The bytes of an array that is no text.
+    fn bytes<'a>(&mut self, source: &'a Source, array: &StoredArray, scalar: Scalar, count: Option<u64>) -> Result<Cow<'a, [u8]>> {
         if count == Some(0) {
-            return Ok(Vec::new());
+            return Ok(Cow::Borrowed(&[]));
         }
         let stream = self.stream(source, array)?;
         let bytes = match self.compressor {
             None => self.plain(&stream, scalar, count),
             Some(compressor) => self.unpack(&stream, compressor, scalar, count),
         };
-        let bytes = bytes.map_err(|message| place(source, array, &message))?;
-        Ok(scalar.convert(&bytes, self.big_endian))
+        bytes.map_err(|message| place(source, array, &message))
     }
 
     fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
