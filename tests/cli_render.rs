@@ -98,6 +98,11 @@ fn info_tells_mesh_and_tree() {
     let bytes = result["tree"]["bytes"].as_object().unwrap();
     let sum: u64 = bytes.iter().filter(|(name, _)| *name != "total").map(|(_, n)| n.as_u64().unwrap()).sum();
     assert_eq!(bytes["total"].as_u64(), Some(sum));
+    let finer = json(folder.path(), &["info", "kuhn:6,5,4", "--level", "4", "--device", "cpu"]);
+    assert_eq!(
+        (result["tree"]["l"].as_u64(), finer["tree"]["l"].as_u64(), finer["tree"]["l_wanted"].as_u64()),
+        (Some(2), Some(4), Some(4))
+    );
     let page = olbvh(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
     for part in ["720", "jet", "level of the leaves", "as the paper counts"] {
         assert!(text(&page.stdout).contains(part), "no {part} in {}", text(&page.stdout));

@@ -105,7 +105,7 @@ pub struct Summary {
     pub bounds: Bounds,
     /// Level of the leaves.
     pub level: u32,
-    /// The level that alpha asks for.
+    /// The level that alpha asks for, or the options.
     pub wanted: u32,
     /// Entries.
     pub entries: u64,

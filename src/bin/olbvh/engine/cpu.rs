@@ -124,7 +124,10 @@ impl<'a> CpuTree<'a> {
             bad: topology.bad.clone(),
             bounds: Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) },
             level: tree.grid.level,
-            wanted: measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
+            wanted: match options.level {
+                Some(level) => level,
+                None => measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
+            },
             entries: tree.p.len() as u64,
             nodes: u64::from(tree.nodes()),
             leaves: tree.leaves().len() as u64,

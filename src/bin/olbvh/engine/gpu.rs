@@ -77,7 +77,7 @@ impl Engine for Device {
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
             bounds: Bounds { lo: corner(tree.grid().lo), hi: corner(tree.grid().hi) },
             level: built.level,
-            wanted: built.heuristic_level,
+            wanted: options.level.unwrap_or(built.heuristic_level),
             entries: u64::from(built.entries),
             nodes: u64::from(built.nodes),
             leaves: u64::from(built.leaves),
