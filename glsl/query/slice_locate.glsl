@@ -9,6 +9,7 @@
 // have runs side by side: they are in the same cells and leave them together. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 64;
 layout(constant_id = 3) const uint WALK = 6;
+const uint LEAP = 8u; // voxels of a run that are found to be empty at once
 layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
 layout(constant_id = 6) const uint BUDGET = 8192; // candidates tested per run and dispatch, roughly
 layout(constant_id = 7) const uint TOLERANCE = 0; // a float's bits
@@ -158,7 +159,11 @@ void main() {
                 continue;
             }
             if (is_still_empty(g, at)) {
-                settle(NONE, uintBitsToFloat(NAN));
+                // What lies between two voxels of a layer that are in the same cells is there too.
+                uint leap = min(LEAP, min(count - state.next, plan.height - row.x));
+                vec3 last = voxel_centre(plan, row_origin(plan, uvec2(row.x + leap - 1u, row.y)), column);
+                if (!is_ours(g, last) || !is_still_empty(g, last)) leap = 1u;
+                for (uint k = 0u; k < leap; ++k) settle(NONE, uintBitsToFloat(NAN));
                 continue;
             }
             vec3 x = normalise(g, at);
