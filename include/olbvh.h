@@ -642,7 +642,7 @@ typedef struct olbvh_slicing {
  */
 typedef struct olbvh_slicing_parts_data {
   /*
-   Bytes of the memory, 29 per voxel.
+   Bytes of the memory: 29 per voxel, and 32 per voxel of a row.
    */
   uint64_t bytes;
   /*

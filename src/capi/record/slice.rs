@@ -33,7 +33,7 @@ pub struct OlbvhSlicing {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhSlicingParts {
-    /// Bytes of the memory, 29 per voxel.
+    /// Bytes of the memory: 29 per voxel, and 32 per voxel of a row.
     pub bytes: u64,
     /// A word per voxel, row by row, as `olbvh_slice` gives it.
     pub answers: OlbvhBuffer,
