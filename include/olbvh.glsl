@@ -62,7 +62,7 @@ struct olbvh_Grid {
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
-    uint ids;     // Bits of an entry of P that are its primitive; those above are its halves, if there are any.
+    uint ids;     // Bits of an entry of P that are its primitive; those above are its quarters, if there are any.
 };
 
 // What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
@@ -569,7 +569,7 @@ uint olbvh_empty_level(uint level, uint code) {
     return 0u;
 }
 
-// The primitive of an entry; the bits above are halves.
+// The primitive of an entry; the bits above are quarters.
 uint olbvh_listed_tet(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.
@@ -585,42 +585,66 @@ olbvh_Tet olbvh_load_tet(uvec4 ids) {
     return olbvh_make_tet(ids, olbvh_floats(olbvh_vertices.at[ids.x]).xyz, olbvh_floats(olbvh_vertices.at[ids.y]).xyz, olbvh_floats(olbvh_vertices.at[ids.z]).xyz, olbvh_floats(olbvh_vertices.at[ids.w]).xyz);
 }
 
-// The halves of its leaf's cell that an entry is near to, per axis: bit 2 c the lower one along axis c, bit 2 c + 1 the upper. They stand in the
-// top bits of its word in P. Twin of src/reference/halves.rs, which explains it. Needs grid.glsl.
-const uint olbvh_ID_BITS = 26u; // below the halves
-const uint olbvh_BOTH_HALVES = 0x3fu;
+// The quarters of its leaf's cell that an entry is near to, a bit each, axis by axis, in the top bits of its word in P; halves, where ids leave fewer bits.
+// Twin of src/reference/quarters.rs, which explains it. Needs grid.glsl.
 const uint olbvh_ALL_OCTANTS = 0xffu;
+
+uint olbvh_id_bits(olbvh_Grid g) { return uint(bitCount(g.ids)); }
+
+// How often a leaf's cell is cut in two along each axis: not beyond finest cells.
+uint olbvh_cuts(olbvh_Grid g) { return min((32u - olbvh_id_bits(g)) / 6u, olbvh_MAX_LEVEL - g.level); }
 
 // By how many finest cells per axis boxes grow: by all of them where normalised coordinates are too coarse to tell those cells apart.
 uvec3 olbvh_reach_of(olbvh_Grid g, uint least) { return mix(uvec3(least), uvec3(1024u), lessThan(g.extent.xyz, vec3(olbvh_two_to(-30)))); }
 
-// Those that the box of finest cells [lo, hi] meets once it has grown.
-uint olbvh_halves_near(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
-    if (g.level == olbvh_MAX_LEVEL) return olbvh_BOTH_HALVES;
-    uvec3 middle = (2u * olbvh_unmorton(code) + 1u) << (olbvh_MAX_LEVEL - 1u - g.level), reach = olbvh_reach_of(g, 1u);
-    uvec3 met = uvec3(lessThan(lo, middle + reach)) + 2u * uvec3(greaterThanEqual(hi + reach, middle));
-    return met.x | met.y << 2u | met.z << 4u;
+// Quarters of each axis as they stand in an entry.
+uint olbvh_in_entry(olbvh_Grid g, uvec3 quarters) {
+    uint n = olbvh_cuts(g), width = 1u << n;
+    return n == 0u ? 0u : (quarters.x | quarters.y << width | quarters.z << 2u * width) << olbvh_id_bits(g);
+}
+
+// Those of a leaf's cell that the box of finest cells [lo, hi] meets, or is nearest to.
+uvec3 olbvh_quarters_met(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
+    uint n = olbvh_cuts(g), shift = olbvh_MAX_LEVEL - g.level - n;
+    uvec3 first = olbvh_unmorton(code) << n, last = first + ((1u << n) - 1u);
+    uvec3 from = clamp(lo >> shift, first, last) - first, to = clamp(hi >> shift, first, last) - first;
+    return (uvec3(2u) << to) - (uvec3(1u) << from);
+}
+
+// Those that it meets once it has grown, as they stand in an entry.
+uint olbvh_quarters_near(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
+    uvec3 reach = olbvh_reach_of(g, 1u);
+    return olbvh_in_entry(g, olbvh_quarters_met(g, code, lo - min(lo, reach), hi + reach));
 }
 
 // Those around a finest cell.
-uint olbvh_halves_around(uint level, uvec3 cell) {
-    if (level == olbvh_MAX_LEVEL) return 0u;
-    uvec3 around = 1u + (cell >> (olbvh_MAX_LEVEL - 1u - level) & 1u);
-    return around.x | around.y << 2u | around.z << 4u;
+uint olbvh_quarters_around(olbvh_Grid g, uvec3 cell) {
+    uint n = olbvh_cuts(g);
+    return olbvh_in_entry(g, uvec3(1u) << (cell >> olbvh_MAX_LEVEL - g.level - n & (1u << n) - 1u));
 }
 
-// The octants of the cell that an entry is near to, one bit for each 3-bit Morton digit.
-uint olbvh_octants_of(uint halves) {
-    uint x = (halves & 1u) * 0x0fu | (halves >> 1u & 1u) * 0xf0u;
-    uint y = (halves >> 2u & 1u) * 0x33u | (halves >> 3u & 1u) * 0xccu;
-    return x & y & ((halves >> 4u & 1u) * 0x55u | (halves >> 5u & 1u) * 0xaau);
+// A bit for each octant, that is 3-bit Morton digit, in these halves of each axis: 1 the lower one, 2 the upper.
+uint olbvh_octants_of(uvec3 halves) {
+    uint x = (halves.x & 1u) * 0x0fu | (halves.x >> 1u) * 0xf0u;
+    uint y = (halves.y & 1u) * 0x33u | (halves.y >> 1u) * 0xccu;
+    return x & y & ((halves.z & 1u) * 0x55u | (halves.z >> 1u) * 0xaau);
+}
+
+// The octants of its leaf's cell that an entry is near to.
+uint olbvh_octants_near(olbvh_Grid g, uint entry) {
+    uint n = olbvh_cuts(g), width = 1u << n;
+    if (n == 0u) return olbvh_ALL_OCTANTS;
+    uint quarters = entry >> olbvh_id_bits(g);
+    uvec3 each = uvec3(quarters, quarters >> width, quarters >> 2u * width) & (1u << width) - 1u;
+    uint lower = (1u << width / 2u) - 1u;
+    return olbvh_octants_of(uvec3(notEqual(each & lower, uvec3(0u))) + 2u * uvec3(greaterThan(each, uvec3(lower))));
 }
 
 // A point that an owner is sought for.
 struct olbvh_Sought {
     vec3 x;             // in normalised coordinates
     uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
-    uint halves;        // of the leaf that it lies in
+    uint quarters;      // of the leaf that it lies in
 };
 
 // That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
@@ -628,7 +652,7 @@ olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = olbvh_quantize(g, at);
     uint least = 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
     uvec3 reach = olbvh_reach_of(g, least);
-    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == olbvh_NONE ? 0u : olbvh_halves_around(g.level, cell));
+    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : olbvh_quarters_around(g, cell));
 }
 
 // Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
@@ -662,11 +686,11 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
 
-// Of up to 32 entries from `begin` on, those before `end` that are in the halves of the leaf's cell, a bit each. Most are not, nor are most of those near;
+// Of up to 32 entries from `begin` on, those before `end` that are in the quarters of the leaf's cell, a bit each. Most are not, nor are most of those near;
 // each test is made for all of them before the next, so that invocations wait for each other less.
-uint olbvh_in_halves(uint begin, uint end, olbvh_Sought s) {
+uint olbvh_in_quarters(uint begin, uint end, olbvh_Sought s) {
     uint count = min(32u, end - begin), left = 0u;
-    for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] >> olbvh_ID_BITS & s.halves) == s.halves) << k;
+    for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] & s.quarters) == s.quarters) << k;
     return left;
 }
 
@@ -679,7 +703,7 @@ uint olbvh_near_of(uint begin, uint left, olbvh_Sought s) {
     return olbvh_near;
 }
 
-uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) { return olbvh_near_of(begin, olbvh_in_halves(begin, end, s), s); }
+uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) { return olbvh_near_of(begin, olbvh_in_quarters(begin, end, s), s); }
 
 // Looks at entries [begin, end) in order, ends at the first that contains the point.
 void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {

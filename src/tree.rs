@@ -23,8 +23,8 @@ pub struct TreeArrays {
     pub grid: Grid,
     /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
     pub p: Vec<u32>,
-    /// Halves of its leaf's cell that each entry is near to (see [`crate::reference::halves`]); empty where entries have none.
-    pub halves: Vec<u8>,
+    /// Quarters of its leaf's cell that each entry is near to (see [`crate::reference::quarters`]); empty where entries have none.
+    pub quarters: Vec<u16>,
     /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper has offsets for every node; those of the
     /// other nodes follow from their leaves.
     pub po: Vec<u32>,

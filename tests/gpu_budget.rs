@@ -12,8 +12,8 @@ use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, l
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
-use olbvh::reference::halves::taken_apart;
 use olbvh::reference::locate::Locator;
+use olbvh::reference::quarters::taken_apart;
 use olbvh::reference::vertices::Vertices;
 use olbvh::tree::{Memory, TreeArrays};
 
@@ -153,13 +153,13 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     let words = |part: BufferRef, n: u32| content[part.offset as usize / 4..][..n as usize].to_vec();
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
-    let (p, halves) = taken_apart(words(tree.p, status.entries), &grid);
+    let (p, quarters) = taken_apart(words(tree.p, status.entries), &grid);
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,
         grid,
         p,
-        halves,
+        quarters,
         po: words(tree.po, status.leaves + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),

@@ -218,3 +218,15 @@ fn overlaps() {
     assert_eq!(sets[0], sets[1]);
     quiet(&gpu);
 }
+
+/// Entries of meshes beyond 2^20 tetrahedra have halves for quarters.
+#[test]
+fn more_than_a_million() {
+    let gpu = gpu(Binding::Address);
+    let subject = Subject::new(&gpu, "a million", kuhn_jittered([56, 56, 56], 0.2, 5).unwrap());
+    assert!(subject.mesh.tets.len() > 1 << 20);
+    let (_, tree) = subject.tree(&gpu, &options(0.0, Assign::Planes, Lists::Boundary));
+    assert_eq!((tree.grid.ids.count_ones(), tree.quarters.iter().max()), (26, Some(&0x3f)));
+    subject.locations(&gpu, &options(0.0, Assign::Planes, Lists::Boundary), 5000);
+    quiet(&gpu);
+}

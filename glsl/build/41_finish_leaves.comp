@@ -26,7 +26,7 @@ RECORDS(8, vec4, vertices)
 BUFFER(9, readonly, uint, marks)
 BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/marks.glsl"
-#include "shared/halves.glsl"
+#include "shared/quarters.glsl"
 
 const uint ASKED = 16u;
 const uint OCTANTS_ASKED = 16384u;
@@ -50,7 +50,7 @@ uint octants(Grid g, uint begin, uint end) {
     if (end - begin > OCTANTS_ASKED) return ALL_OCTANTS;
     uint mask = 0u;
     for (uint i = begin; i < end && mask != ALL_OCTANTS; ++i) {
-        mask |= octants_of(p.at[i] >> ID_BITS);
+        mask |= octants_near(g, p.at[i]);
     }
     return mask;
 }

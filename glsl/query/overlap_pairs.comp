@@ -40,7 +40,7 @@ bool walk_ended = false;
 uvec3 lo, hi;
 
 bool enters(Node node) { return true; }
-#include "shared/halves.glsl"
+#include "shared/quarters.glsl"
 #include "shared/leaf_walk.glsl"
 
 void main() {

@@ -60,7 +60,7 @@ bool enters(Node node) {
     if (phase == 0u) walk_ended = touches_node(node);
     return false;
 }
-#include "shared/halves.glsl"
+#include "shared/quarters.glsl"
 #include "shared/leaf_walk.glsl"
 
 void add_wide(uint n, bool elected) {

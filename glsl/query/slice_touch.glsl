@@ -100,16 +100,12 @@ uint at_boundary(uint begin, uint left) {
     return found;
 }
 
-// What an entry of a leaf is measured for: its box meets the cells, and so do the halves of the leaf's cell that it is near to. Where the cells meet
-// both halves along an axis, either will do.
+// What an entry of a leaf is measured for: its box meets the cells, and so do the quarters of the leaf's cell that it is near to. Where the cells meet
+// several along an axis, any of them will do.
 Sought sought_in(Grid g, uint code) {
-    uvec3 reach = reach_of(g, 1u);
-    Sought s = Sought(x, lo - min(lo, reach), hi + reach, 0u);
-    if (g.ids == NONE || g.level == MAX_LEVEL) return s;
-    uvec3 met = halves_met(g.level, code);
-    met = mix(met, uvec3(0u), equal(met, uvec3(3u)));
-    s.halves = met.x | met.y << 2u | met.z << 4u;
-    return s;
+    uvec3 reach = reach_of(g, 1u), met = quarters_met(g, code, lo, hi);
+    met = mix(uvec3(0u), met, equal(met & met - 1u, uvec3(0u)));
+    return Sought(x, lo - min(lo, reach), hi + reach, in_entry(g, met));
 }
 
 // Goes on with a voxel; true once it is done.
@@ -129,7 +125,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
         Sought s = sought_in(g, at.code);
         for (uint e = from; e < to; e += 32u) {
-            for (uint near = near_of(e, at_boundary(e, in_halves(e, to, s)), s); near != 0u; near &= near - 1u) measure(listed_tet(e + findLSB(near)));
+            for (uint near = near_of(e, at_boundary(e, in_quarters(e, to, s)), s); near != 0u; near &= near - 1u) measure(listed_tet(e + findLSB(near)));
         }
         work += to - from;
         state.entry = to - range.x;

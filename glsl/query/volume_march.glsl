@@ -37,7 +37,7 @@ const uint WALK = 6u;   // steps of a walk across faces before the structure is 
 const uint BURST = 32u; // passes before rays that wait for the structure are served
 
 // The ray, and where it stands.
-vec3 origin, way, halfway;
+vec3 origin, way, inverse_way, halfway;
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
@@ -145,6 +145,22 @@ void pass_by() {
     ++samples;
 }
 
+#ifndef BINARY_TREE
+// Passes by samples where no primitive comes near, those in one cell of the octree at once: rays beside the mesh catch up with rays in it.
+void pass_empty(Grid g, inout uint work) {
+    for (; state.next < state.end && !is_to_look(); ++work) {
+        uvec3 finest = quantize(g, sample_at(view, origin, way, state.next));
+        uint level = empty_level(g.level, morton(finest));
+        if (level == 0u) return;
+        uint end = SKIP != 0u ? min(state.end, state.check) : state.end;
+        uint last = sample_behind(g, origin, way, inverse_way, state.next, end, finest, level) - 1u;
+        samples += last - state.next;
+        state.next = last;
+        pass_by();
+    }
+}
+#endif
+
 // Adds the next sample, which lies so in the tetrahedron of the stand.
 void take(Sides sides) {
     uint k = state.next, before = state.last;
@@ -185,7 +201,7 @@ void main() {
             precise vec3 unit = h * inverse_sqrt(square);
             halfway = unit;
         }
-        vec3 inverse_way = SKIP != 0u ? inverse_of(way) : vec3(0.0);
+        inverse_way = inverse_of(way);
         bool stands = state.hint != NONE && state.cursor == 0u;
         if (stands) enter(state.hint);
         ahead = 1u;
@@ -207,6 +223,7 @@ void main() {
                 }
             }
 #ifndef BINARY_TREE
+            if (!stands) pass_empty(g, work);
             if (state.next < state.end && is_to_look()) {
                 bool hidden;
                 uint behind = stretch_end(g, origin, way, inverse_way, state.next, state.end, hidden);

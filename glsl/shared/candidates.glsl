@@ -4,13 +4,13 @@ Tet load_tet(uvec4 ids) {
     return make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
 }
 
-#include "shared/halves.glsl"
+#include "shared/quarters.glsl"
 
 // A point that an owner is sought for.
 struct Sought {
     vec3 x;             // in normalised coordinates
     uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
-    uint halves;        // of the leaf that it lies in
+    uint quarters;      // of the leaf that it lies in
 };
 
 // That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
@@ -18,7 +18,7 @@ Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = quantize(g, at);
     uint least = 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
     uvec3 reach = reach_of(g, least);
-    return Sought(x, cell - min(cell, reach), cell + reach, least > 1u || g.ids == NONE ? 0u : halves_around(g.level, cell));
+    return Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : quarters_around(g, cell));
 }
 
 // Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.

@@ -9,7 +9,7 @@ struct Grid {
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
-    uint ids;     // Bits of an entry of P that are its primitive; those above are its halves, if there are any.
+    uint ids;     // Bits of an entry of P that are its primitive; those above are its quarters, if there are any.
 };
 
 // What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.

@@ -1,5 +1,5 @@
 // The leaves of a tree among some cells, in Morton order, below the nodes that a predicate lets through, to be left and taken up again at any code.
-// Twin of src/reference/leaf_walk.rs. Needs tree.glsl, node.glsl and halves.glsl; before including this a kernel defines
+// Twin of src/reference/leaf_walk.rs. Needs tree.glsl, node.glsl and quarters.glsl; before including this a kernel defines
 //     uvec3 lo, hi;            // the cells of the finest grid that leaves meet
 //     bool enters(Node node);  // asked for every node on the way but the root, leaves included
 //     bool walk_ended;         // set to end the walk
@@ -31,17 +31,11 @@ bool walk_past(inout LeafWalk w, uint level, uint at) {
     return true;
 }
 
-// The halves of a node's cell that the cells meet along each axis: 1 the lower one, 2 the upper.
-uvec3 halves_met(uint level, uint code) {
+// The octants of a node's cell that the cells meet, a bit for each digit.
+uint octants_met(uint level, uint code) {
     uvec3 middle = 2u * unmorton(code) + 1u;
     uint shift = MAX_LEVEL - level - 1u;
-    return uvec3(lessThan(lo >> shift, middle)) + 2u * uvec3(greaterThanEqual(hi >> shift, middle));
-}
-
-// The octants that they meet, a bit for each digit.
-uint octants_met(uint level, uint code) {
-    uvec3 met = halves_met(level, code);
-    return octants_of(met.x | met.y << 2u | met.z << 4u);
+    return octants_of(uvec3(lessThan(lo >> shift, middle)) + 2u * uvec3(greaterThanEqual(hi >> shift, middle)));
 }
 
 // The next leaf at or behind the code. `work` counts nodes, up to `budget`.

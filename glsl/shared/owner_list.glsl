@@ -2,11 +2,11 @@
 
 #include "shared/candidates.glsl"
 
-// Of up to 32 entries from `begin` on, those before `end` that are in the halves of the leaf's cell, a bit each. Most are not, nor are most of those near;
+// Of up to 32 entries from `begin` on, those before `end` that are in the quarters of the leaf's cell, a bit each. Most are not, nor are most of those near;
 // each test is made for all of them before the next, so that invocations wait for each other less.
-uint in_halves(uint begin, uint end, Sought s) {
+uint in_quarters(uint begin, uint end, Sought s) {
     uint count = min(32u, end - begin), left = 0u;
-    for (uint k = 0u; k < count; ++k) left |= uint((p.at[begin + k] >> ID_BITS & s.halves) == s.halves) << k;
+    for (uint k = 0u; k < count; ++k) left |= uint((p.at[begin + k] & s.quarters) == s.quarters) << k;
     return left;
 }
 
@@ -19,7 +19,7 @@ uint near_of(uint begin, uint left, Sought s) {
     return near;
 }
 
-uint near_among(uint begin, uint end, Sought s) { return near_of(begin, in_halves(begin, end, s), s); }
+uint near_among(uint begin, uint end, Sought s) { return near_of(begin, in_quarters(begin, end, s), s); }
 
 // Looks at entries [begin, end) in order, ends at the first that contains the point.
 void search(inout Best best, uint begin, uint end, Sought s) {

@@ -8,20 +8,9 @@ layout(constant_id = 5) const uint SKIP = 0;
 
 bool is_visible_node(uint node) { return (flags.at[plan.visible_at + (node >> 5u)] >> (node & 31u) & 1u) != 0u; }
 
-// The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf.
-// Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a node lies in it.
-uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, out bool hidden) {
-    uvec3 finest = quantize(g, sample_at(view, origin, way, k));
-    uint code = morton(finest), node = 0u, level = 0u;
-    hidden = !is_visible_node(node);
-    while (!hidden && level < g.level) {
-        ++level;
-        uint digit = code >> (3u * (MAX_LEVEL - level)) & 7u, mask = child_mask(node);
-        hidden = (mask >> digit & 1u) == 0u;
-        if (hidden) break;
-        node = child_of(node, mask, digit);
-        hidden = !is_visible_node(node);
-    }
+// The sample behind those, from `k` on and before `end`, that lie in the same cell of a level as sample `k`, which is in `finest`.
+// Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a cell lies in it.
+uint sample_behind(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, uvec3 finest, uint level) {
     uint shift = MAX_LEVEL - level;
     uvec3 cell = finest >> shift;
     float leave = 3.40282347e38;
@@ -37,5 +26,22 @@ uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint e
         --last;
     }
     return k + 1u;
+}
+
+// The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf.
+// Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a node lies in it.
+uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, out bool hidden) {
+    uvec3 finest = quantize(g, sample_at(view, origin, way, k));
+    uint code = morton(finest), node = 0u, level = 0u;
+    hidden = !is_visible_node(node);
+    while (!hidden && level < g.level) {
+        ++level;
+        uint digit = code >> (3u * (MAX_LEVEL - level)) & 7u, mask = child_mask(node);
+        hidden = (mask >> digit & 1u) == 0u;
+        if (hidden) break;
+        node = child_of(node, mask, digit);
+        hidden = !is_visible_node(node);
+    }
+    return sample_behind(g, origin, way, inverse_way, k, end, finest, level);
 }
 #endif

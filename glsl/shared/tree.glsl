@@ -21,7 +21,7 @@ uint empty_level(uint level, uint code) {
     return 0u;
 }
 
-// The primitive of an entry; the bits above are halves.
+// The primitive of an entry; the bits above are quarters.
 uint listed_tet(uint entry) { return p.at[entry] & grid.at[0].ids; }
 
 // First entry of a leaf and the one behind its last.

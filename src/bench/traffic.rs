@@ -19,7 +19,7 @@
 //! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
-//! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; with halves also codes 4 n, P 8 n, cells 16 t, vertices 16 p |
+//! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; with quarters also codes 4 n, P 8 n, cells 16 t, vertices 16 p |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value.
@@ -49,7 +49,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
     let sort = if level == 0 || n < 2 { 0 } else { u64::from(passes) * pass + if passes % 2 == 1 { 16 * n } else { 0 } };
     let runs = n.div_ceil(u64::from(target.run.rows)) * u64::from(level + 1);
-    let halves = if options.lists == Lists::Boundary { cells_and_vertices + 12 * n } else { 0 };
+    let quarters = if options.lists == Lists::Boundary { cells_and_vertices + 12 * n } else { 0 };
     let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
     let stages = [
         ("mesh.clear", 36 * t),
@@ -62,7 +62,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
         ("build.sort", sort),
         ("build.count_splits", 4 * n + (4 + SCAN) * runs),
         ("build.splits", 4 * n + 4 * runs + 4 * leaves + 4 * internal + nodes / 8 + nodes),
-        ("build.leaves", 4 * n + 9 * leaves + boxes(leaves) + halves),
+        ("build.leaves", 4 * n + 9 * leaves + boxes(leaves) + quarters),
         ("build.levels", 4 * internal + 8 * leaves + internal + boxes(nodes)),
     ];
     stages.into_iter().filter(|(_, bytes)| *bytes > 0).collect()

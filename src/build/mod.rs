@@ -5,7 +5,7 @@
 //! 1 depth    estimate per tetrahedron → level l                                                            Eq. 11–12
 //! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds · fit] · emit (code, primitive) · stable radix sort    Eq. 1–6
 //! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
-//! 4 leaves   boundary flags, halves of the entries, octants, boxes                                          Alg. 1
+//! 4 leaves   boundary flags, quarters of entries, octants, boxes                                           Alg. 1
 //!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
 //! 5 ranges   smallest and largest value of a field per node: cells · down · up                             (once per field and time step)
 //! ```

@@ -66,7 +66,7 @@ pub struct TreeMemory {
     pub status: BufferRef,
     /// [`Grid`] with the level of the leaves.
     pub grid: BufferRef,
-    /// Primitive ids by Morton code; where leaves within the mesh have no lists, halves above them ([`crate::reference::halves`]).
+    /// Primitive ids by Morton code; where leaves within the mesh have no lists, quarters above them ([`crate::reference::quarters`]).
     pub p: BufferRef,
     /// Ends of the leaves in `p`.
     pub po: BufferRef,

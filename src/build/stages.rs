@@ -7,13 +7,13 @@ use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     ChooseDepth, ChooseDepthSpec, Count as CountCells, CountSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec,
     EmitSplits, EmitSplitsSpec, EstimateDepth, EstimateDepthSpec, Filter, FilterSpec, FinishLeaves, FinishLeavesSpec, Fit, FitSpec,
-    FlagLeaves, FlagLeavesSpec, Mark, MarkHalves, MarkHalvesSpec, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
+    FlagLeaves, FlagLeavesSpec, Mark, MarkQuarters, MarkQuartersSpec, MarkSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
     SettleSeeds, SettleSeedsSpec,
 };
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
-use crate::reference::halves::id_mask;
+use crate::reference::quarters::id_mask;
 
 /// A mesh as the stages see it.
 #[derive(Clone, Copy, Debug)]
@@ -406,9 +406,10 @@ pub(crate) fn cmd_leaves(
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));
         let (live, run, capacity) = (entries.word(r.gpu()), target.run, capacity.entries);
         let (cells, vertices, codes) = (mesh.input.cells, mesh.arrays.vertices, scratch.codes);
-        if id_mask(tree.lists, mesh.input.tets as usize) != u32::MAX {
-            let mark = MarkHalves { entries: live, grid, status, codes, cells, quantized: vertices, p, capacity };
-            r.dispatch(&mark, MarkHalvesSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;
+        let id_mask = id_mask(tree.lists, mesh.input.tets as usize);
+        if id_mask != u32::MAX {
+            let mark = MarkQuarters { entries: live, grid, status, codes, cells, quantized: vertices, p, capacity, id_mask };
+            r.dispatch(&mark, MarkQuartersSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;
         } else if marks.is_none() {
             let flag = FlagLeaves { entries: live, p, po, boundary_cells: mesh.arrays.boundary, status, flags, capacity };
             r.dispatch(&flag, FlagLeavesSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;

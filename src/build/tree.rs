@@ -10,7 +10,7 @@ use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::too_large;
 use crate::reference::grid::MAX_LEVEL;
-use crate::reference::halves::taken_apart;
+use crate::reference::quarters::taken_apart;
 use crate::tree::{Memory, TreeArrays};
 use bytemuck::Pod;
 
@@ -150,13 +150,13 @@ impl Tree {
             None => None,
         };
         let entries = self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?;
-        let (p, halves) = taken_apart(entries, &self.grid);
+        let (p, quarters) = taken_apart(entries, &self.grid);
         Ok(TreeArrays {
             assign: self.options.assign,
             lists: self.options.lists,
             grid: self.grid,
             p,
-            halves,
+            quarters,
             po: words(self.memory.po, u64::from(self.status.leaves) + 1)?,
             co: words(self.memory.co, internal + 1)?,
             no: self.status.levels[..=self.status.level as usize].to_vec(),

@@ -11,7 +11,7 @@ use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::Arena;
-use crate::reference::halves::taken_apart;
+use crate::reference::quarters::taken_apart;
 use crate::tree::{Memory, TreeArrays};
 
 /// Which interface builds, within what.
@@ -153,7 +153,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let n = expected.codes().len();
     compare("build.sort", "codes", expected.codes(), in_scratch(scratch.sorted.codes, n))?;
     let grid = one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?;
-    let (p, halves) = taken_apart(words(tree.p, n), &grid);
+    let (p, quarters) = taken_apart(words(tree.p, n), &grid);
     compare("build.sort", "P", &expected_tree.p, &p)?;
     compare_status(&expected.status, &status)?;
     let (nodes, internal) = (status.nodes as usize, status.internal as usize);
@@ -164,7 +164,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
         lists: options.lists,
         grid,
         p,
-        halves,
+        quarters,
         po: words(tree.po, nodes - internal + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
@@ -204,7 +204,7 @@ fn compare_arrays(expected: &Expected, f: &TreeArrays) -> Verdict {
     let words = |grid| bytemuck::cast_slice::<Grid, u32>(std::slice::from_ref(grid)).to_vec();
     compare("build.choose_depth", "grid", &words(&e.grid), &words(&f.grid))?;
     compare("build.sort", "P", &e.p, &f.p)?;
-    compare("build.mark_halves", "halves", &e.halves, &f.halves)?;
+    compare("build.mark_quarters", "quarters", &e.quarters, &f.quarters)?;
     compare("build.emit_splits", "NO", &e.no, &f.no)?;
     compare("build.emit_splits", "PO", &e.po, &f.po)?;
     compare("build.emit_splits", "CO", &e.co, &f.co)?;

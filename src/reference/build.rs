@@ -5,7 +5,7 @@ use super::codes::Stage;
 use super::grid::Grid;
 use super::marks::Marks;
 use super::vertices::Vertices;
-use super::{depth, halves, leaves, levels};
+use super::{depth, leaves, levels, quarters};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
@@ -44,7 +44,7 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
 /// # Errors
 /// [`Error::TooLarge`] if 32 bits cannot count the entries.
 pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u32, options: &BuildOptions) -> Result<Construction> {
-    let grid = Grid { level, ..topology.grid };
+    let grid = Grid { level, ids: quarters::id_mask(options.lists, mesh.tets.len()), ..topology.grid };
 
     // Stage 2: calculate and sort the Morton codes of the primitives.
     let all = Stage { mesh, topology, vertices, grid: &grid, assign: options.assign, marks: None };
@@ -58,14 +58,13 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
 
     // Stage 4: construct the nodes bottom-up.
     let flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
-    let halved = halves::id_mask(options.lists, mesh.tets.len()) != u32::MAX;
-    let halves = if halved { halves::halves(&entries.codes, &entries.primitives, &grid, mesh, vertices) } else { Vec::new() };
-    let octants = leaves::masks(&splits, &flags, &halves);
+    let quarters = quarters::quarters(&entries.codes, &entries.primitives, &grid, mesh, vertices);
+    let octants = leaves::masks(&splits, &flags, &quarters, &grid);
     let boundary = levels::flags(flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let mask = levels::masks(&octants, &splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    let grid = Grid { first_leaf: co.len() as u32 - 1, ids: halves::id_mask(options.lists, mesh.tets.len()), ..grid };
-    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, halves, po, co, no, boundary, mask, boxes };
+    let grid = Grid { first_leaf: co.len() as u32 - 1, ..grid };
+    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, co, no, boundary, mask, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

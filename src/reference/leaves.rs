@@ -3,7 +3,7 @@
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{Topology, bit};
 use super::grid::{Grid, canonical, unmorton};
-use super::halves::{ALL_OCTANTS, octants_of};
+use super::quarters::{ALL_OCTANTS, octants_near};
 use super::separate::box_touches;
 use super::splits::Splits;
 use super::tet::sub;
@@ -60,18 +60,18 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
 pub const OCTANTS_ASKED: usize = 16_384;
 
 /// The mask of a leaf with entries `listed`: bit d says that one of them is near to the octant of its cell with the 3-bit Morton digit d. All octants of
-/// leaves without boundary primitives, of long lists, and where entries have no halves. In the others no point has an owner (tolerances below 2^-12).
-pub fn octants(listed: Range<usize>, boundary: bool, halves: &[u8]) -> u32 {
-    if !boundary || halves.is_empty() || listed.len() > OCTANTS_ASKED {
+/// leaves without boundary primitives, of long lists, and where entries have no quarters. In the others no point has an owner (tolerances below 2^-12).
+pub fn octants(listed: Range<usize>, boundary: bool, quarters: &[u16], grid: &Grid) -> u32 {
+    if !boundary || quarters.is_empty() || listed.len() > OCTANTS_ASKED {
         return if listed.is_empty() { 0 } else { ALL_OCTANTS };
     }
-    listed.fold(0, |mask, i| mask | octants_of(halves[i].into()))
+    listed.fold(0, |mask, i| mask | octants_near(grid, quarters[i].into()))
 }
 
 /// The mask of each leaf.
-pub fn masks(splits: &Splits, flags: &[bool], halves: &[u8]) -> Vec<u32> {
+pub fn masks(splits: &Splits, flags: &[bool], quarters: &[u16], grid: &Grid) -> Vec<u32> {
     let listed = |i: usize| splits.po[i] as usize..splits.po[i + 1] as usize;
-    flags.par_iter().enumerate().map(|(i, &flag)| octants(listed(i), flag, halves)).collect()
+    flags.par_iter().enumerate().map(|(i, &flag)| octants(listed(i), flag, quarters, grid)).collect()
 }
 
 /// Boundary flag of each leaf.

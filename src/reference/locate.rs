@@ -4,7 +4,7 @@ use super::assign::{cell_centre, half_cell};
 use super::boundary::{NONE, Topology};
 use super::candidates::Best;
 use super::grid::{Grid, MAX_LEVEL, canonical, morton};
-use super::halves::{is_near, reach};
+use super::quarters::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;

@@ -7,10 +7,10 @@ use crate::options::Lists;
 use crate::reference::boundary::Topology;
 use crate::reference::codes::Stage;
 use crate::reference::grid::{MAX_LEVEL, unmorton};
-use crate::reference::halves::{halves_near, id_mask};
 use crate::reference::leaves::{cell_box, flag, octants};
 use crate::reference::levels::union;
 use crate::reference::marks::Marks;
+use crate::reference::quarters::{id_mask, quarters_near};
 use crate::reference::vertices::Vertices;
 use rayon::prelude::*;
 
@@ -67,8 +67,8 @@ impl TreeArrays {
         rule(first as usize == internal, || format!("the grid says that node {first} is the first leaf, NO that {internal} is"))?;
         let length =
             |name: &str, is: usize, needs: usize| rule(is == needs, || format!("{name} has {is} elements, {nodes} nodes need {needs}"));
-        let halves = if self.grid.ids == u32::MAX { 0 } else { self.p.len() };
-        length("halves", self.halves.len(), halves)?;
+        let quarters = if self.grid.ids == u32::MAX { 0 } else { self.p.len() };
+        length("quarters", self.quarters.len(), quarters)?;
         length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
         length("CO", self.co.len(), internal + 1)?;
         length("BF", self.boundary.len(), nodes.div_ceil(32))?;
@@ -139,7 +139,7 @@ impl TreeArrays {
         rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))
     }
 
-    /// P and the halves of its entries: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
+    /// P and the quarters of its entries: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
     /// duplicates, as often as there are pairs, is every pair once.
     fn check_lists(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let vertices = Vertices::new(mesh, &self.grid);
@@ -156,9 +156,9 @@ impl TreeArrays {
                 let ids = mesh.tets[p as usize];
                 let belongs = vertices.cells(ids, self.grid.level).contains(cell) && stage.lists(p)(cell);
                 rule(belongs, || format!("{}: by the assignment {} it does not belong there", at(), self.assign))?;
-                let found = self.halves.get(slots.start + i).map(|&halves| u32::from(halves));
-                let expected = halves_near(&self.grid, codes[leaf as usize], &vertices.cells(ids, MAX_LEVEL));
-                rule(found.is_none_or(|halves| halves == expected), || format!("{}: near halves {found:?}, not {expected}", at()))?;
+                let found = self.quarters.get(slots.start + i).map(|&quarters| u32::from(quarters));
+                let expected = quarters_near(&self.grid, codes[leaf as usize], &vertices.cells(ids, MAX_LEVEL));
+                rule(found.is_none_or(|quarters| quarters == expected), || format!("{}: near quarters {found:?}, not {expected}", at()))?;
             }
             Ok(())
         };
@@ -183,7 +183,7 @@ impl TreeArrays {
             if j < internal {
                 return Ok(());
             }
-            let (mask, expected) = (self.mask_of(j), octants(self.entries(j), expected, &self.halves));
+            let (mask, expected) = (self.mask_of(j), octants(self.entries(j), expected, &self.quarters, &self.grid));
             rule(mask == expected, || format!("mask of leaf {j} is {mask:#010b}, its entries say {expected:#010b}"))
         };
         (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)

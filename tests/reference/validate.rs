@@ -73,7 +73,7 @@ fn masks() {
 }
 
 #[test]
-fn halves() {
+fn quarters() {
     let (mesh, topology) = prepared(kuhn_jittered([7, 5, 6], 0.2, 4).unwrap());
     let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
     tree.validate(&mesh, &topology).unwrap();
@@ -82,8 +82,8 @@ fn halves() {
         change(&mut broken);
         broken.validate(&mesh, &topology).unwrap_err().to_string()
     };
-    assert!(refused(|t| t.halves.truncate(3)).contains("halves has 3 elements"));
-    assert!(refused(|t| t.halves[2] ^= 1 << 3).contains("near halves"));
+    assert!(refused(|t| t.quarters.truncate(3)).contains("quarters has 3 elements"));
+    assert!(refused(|t| t.quarters[2] ^= 1 << 3).contains("near quarters"));
 }
 
 #[test]

@@ -1,0 +1,142 @@
+//! What an entry says of where in its leaf's cell it lies, so that a search passes most of a list over. Twin of `glsl/shared/quarters.glsl`.
+//!
+//! A cell is cut in four along each axis. An entry is *near* a quarter that the quantized box of its primitive meets, once the box has grown by a cell
+//! of the finest grid all around: a bit for each, the lowest of the first axis first. The twelve bits stand above the primitive in the entry's word. In
+//! meshes of more than 2^20 tetrahedra, whose ids leave six bits, they are halves, and cells are not cut beyond the finest ones. A point that a
+//! primitive owns is near it, too: the primitive's box holds it, or it lies outside by at most three times the tolerance of the box (SPEC 3.1.4), which
+//! is less than a finest cell for tolerances below 2^-12. For larger ones boxes grow by more, and quarters are not asked; the octants of leaves still
+//! are, so that a point outside may be found under one α and not under another, as at the border of a leaf. On an axis so short beside the largest that
+//! normalised coordinates cannot tell its finest cells apart, everything is near.
+
+use super::grid::{Grid, MAX_LEVEL, unmorton};
+use super::vertices::{CellRange, Vertices};
+use crate::mesh::Mesh;
+use crate::options::Lists;
+use rayon::prelude::*;
+
+/// A mask of all octants.
+pub const ALL_OCTANTS: u32 = 0xff;
+
+/// An axis of less than this in normalised coordinates has finest cells of less than four of their steps.
+const COARSE: f32 = f32::from_bits((127 - 30) << 23);
+
+/// The bits of an entry's word that are its primitive; quarters or halves stand above. All bits where entries have none: in the paper's lists, and in meshes that
+/// need the bits for their ids.
+pub fn id_mask(lists: Lists, tets: usize) -> u32 {
+    let bits = [20, 26].into_iter().find(|&bits| tets <= 1 << bits);
+    bits.filter(|_| lists == Lists::Boundary).map_or(u32::MAX, |bits| (1 << bits) - 1)
+}
+
+/// How often a leaf's cell is cut in two along each axis.
+fn cuts(grid: &Grid) -> u32 {
+    (grid.ids.leading_zeros() / 6).min(MAX_LEVEL - grid.level)
+}
+
+/// By how many finest cells per axis boxes grow, at least `least`.
+fn grown(grid: &Grid, least: u32) -> [u32; 3] {
+    [0, 1, 2].map(|c| if grid.extent[c] < COARSE { 1024 } else { least })
+}
+
+/// The quarters of the leaf's cell with Morton code `code` that a box of finest cells is near to; `grid` is the tree's.
+pub fn quarters_near(grid: &Grid, code: u32, cells: &CellRange) -> u32 {
+    let (n, leaf, reach) = (cuts(grid), unmorton(code), grown(grid, 1));
+    if n == 0 {
+        return 0;
+    }
+    let along = |c: usize| {
+        let first = leaf[c] << n;
+        let place = |cell: u32| (cell >> (MAX_LEVEL - grid.level - n)).clamp(first, first + (1 << n) - 1) - first;
+        (2 << place(cells.hi[c] + reach[c])) - (1 << place(cells.lo[c].saturating_sub(reach[c])))
+    };
+    along(0) | along(1) << (1 << n) | along(2) << (2 << n)
+}
+
+/// Primitives and quarters of entries as a device holds them, in a tree with this grid.
+pub fn taken_apart(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
+    if grid.ids == u32::MAX {
+        return (entries, Vec::new());
+    }
+    entries.into_iter().map(|entry| (entry & grid.ids, (entry >> grid.ids.count_ones()) as u16)).unzip()
+}
+
+/// The quarters of all entries, which have these Morton codes and primitives; none where entries have no bits for them.
+pub fn quarters(codes: &[u32], primitives: &[u32], grid: &Grid, mesh: &Mesh, vertices: &Vertices) -> Vec<u16> {
+    if grid.ids == u32::MAX {
+        return Vec::new();
+    }
+    let near = |(&code, &p): (&u32, &u32)| quarters_near(grid, code, &vertices.cells(mesh.tets[p as usize], MAX_LEVEL)) as u16;
+    codes.par_iter().zip(primitives).map(near).collect()
+}
+
+/// The octants of its cell that an entry is near to: bit d for the 3-bit Morton digit d.
+pub fn octants_near(grid: &Grid, quarters: u32) -> u32 {
+    let n = cuts(grid);
+    if n == 0 {
+        return ALL_OCTANTS;
+    }
+    let width = 1 << n;
+    let half = |c: u32, upper: u32| quarters >> (c * width + upper * width / 2) & ((1 << (width / 2)) - 1) != 0;
+    let near = |d: &u32| half(0, d >> 2 & 1) && half(1, d >> 1 & 1) && half(2, d & 1);
+    (0..8).filter(near).fold(0, |mask, d| mask | 1 << d)
+}
+
+/// By how many finest cells per axis the box of a primitive grows, so that a point which that tolerance lets it own is within.
+pub fn reach(grid: &Grid, tolerance: f32) -> [u32; 3] {
+    grown(grid, 1 + (tolerance.clamp(0.0, 1.0) * 4096.0) as u32)
+}
+
+/// Whether a primitive's quantized box is so near that it can own a point in that finest cell.
+pub fn is_near(cells: &CellRange, cell: [u32; 3], reach: [u32; 3]) -> bool {
+    (0..3).all(|c| cells.lo[c] <= cell[c] + reach[c] && cell[c].saturating_sub(reach[c]) <= cells.hi[c])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By looking at every finest cell of the leaf.
+    fn counted(grid: &Grid, code: u32, cells: &CellRange, parts: u32) -> u32 {
+        let (leaf, side) = (unmorton(code), 1 << (MAX_LEVEL - grid.level));
+        let mut bits = 0;
+        for (c, at) in leaf.iter().map(|k| k * side).enumerate() {
+            let near = (at..at + side).filter(|&cell| cells.lo[c] <= cell + 1 && cell <= cells.hi[c] + 1);
+            bits |= near.fold(0, |bits, cell| bits | 1 << ((cell - at) * parts / side)) << (c as u32 * parts);
+        }
+        bits
+    }
+
+    #[test]
+    fn quarters_or_halves_are_those_that_a_grown_box_meets() {
+        let cases = [(1 << 20, 6, 4, 8), (1 << 20, 8, 4, 4), (1 << 20, 9, 2, 1), ((1 << 20) + 1, 7, 2, 3), (1 << 26, 8, 2, 3)];
+        for (tets, level, parts, variety) in cases {
+            let grid = Grid { level, extent: [1.0; 4], ids: id_mask(Lists::Boundary, tets), ..Grid::default() };
+            let code = 0o1_234_567 & ((1 << (3 * level)) - 1);
+            let first = unmorton(code).map(|k| k << (MAX_LEVEL - level));
+            let side = 1 << (MAX_LEVEL - level);
+            let mut different = std::collections::HashSet::new();
+            for lo in 0..side + 2 {
+                for hi in lo.max(2)..side + 4 {
+                    // From two cells before the leaf's to two behind them, the same along two of the axes.
+                    let [from, to] = [lo, hi].map(|k| first.map(|f| (f + k).saturating_sub(2)));
+                    let cells = CellRange { lo: [from[0], first[1], from[2]], hi: [to[0], first[1] + hi / 2, to[2]] };
+                    let near = quarters_near(&grid, code, &cells);
+                    assert_eq!(near, counted(&grid, code, &cells, parts), "{tets} {level} {cells:?}");
+                    different.insert(near);
+                    let half = |c: u32, upper: u32| near >> (c * parts + upper * parts / 2) & ((1 << (parts / 2)) - 1) != 0;
+                    let octant = |d: &u32| half(0, d >> 2 & 1) && half(1, d >> 1 & 1) && half(2, d & 1);
+                    assert_eq!(octants_near(&grid, near), (0..8).filter(octant).map(|d| 1 << d).sum::<u32>());
+                }
+            }
+            assert!(different.len() >= variety, "{different:?}");
+        }
+    }
+
+    #[test]
+    fn where_there_are_no_bits_or_no_finer_cells_nothing_is_passed_over() {
+        let cells = CellRange { lo: [3; 3], hi: [3; 3] };
+        for (level, tets, lists) in [(10, 5, Lists::Boundary), (4, (1 << 26) + 1, Lists::Boundary), (4, 5, Lists::All)] {
+            let grid = Grid { level, extent: [1.0; 4], ids: id_mask(lists, tets), ..Grid::default() };
+            assert_eq!((quarters_near(&grid, 0, &cells), octants_near(&grid, 0)), (0, ALL_OCTANTS));
+        }
+    }
+}
