@@ -123,14 +123,18 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     return n;
 }
 
-// Value of the field, which has one value per point of the mesh, in a tetrahedron.
+float no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
+
+// Value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
+    if (scene.at[0].has_field == 0u) return no_value();
     uvec4 v = words(cells.at[owner]);
     return dot(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
 }
 
-// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
+// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
+    if (scene.at[0].has_field == 0u) return vec3(no_value());
     uvec4 v = words(cells.at[owner]);
     vec3 a = floats(vertices.at[v.x]).xyz, e1 = floats(vertices.at[v.y]).xyz - a, e2 = floats(vertices.at[v.z]).xyz - a, e3 = floats(vertices.at[v.w]).xyz - a;
     // Normalised coordinates lie in [0, 2^41).

@@ -259,7 +259,7 @@ struct olbvh_SceneAddresses {
     uvec2 olbvh_neighbours; // Neighbour table.
     uvec2 olbvh_field;      // One float per point, or anything where no field is asked for.
     uint lists;       // 1: leaves within the mesh have a seed instead of a list.
-    uint pad;         // Unused.
+    uint has_field;   // Not 0: `field` is one.
 };
 
 OLBVH_BUFFER(0, 8, olbvh_SceneAddresses, olbvh_scene)
@@ -1074,14 +1074,18 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     return n;
 }
 
-// Value of the field, which has one value per point of the mesh, in a tetrahedron.
+float olbvh_no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
+
+// Value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
+    if (olbvh_scene.at[0].has_field == 0u) return olbvh_no_value();
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
     return dot(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
 }
 
-// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one.
+// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
+    if (olbvh_scene.at[0].has_field == 0u) return vec3(olbvh_no_value());
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
     vec3 a = olbvh_floats(olbvh_vertices.at[v.x]).xyz, e1 = olbvh_floats(olbvh_vertices.at[v.y]).xyz - a, e2 = olbvh_floats(olbvh_vertices.at[v.z]).xyz - a, e3 = olbvh_floats(olbvh_vertices.at[v.w]).xyz - a;
     // Normalised coordinates lie in [0, 2^41).

@@ -97,6 +97,10 @@ typedef struct olbvh_build_options {
    */
   uint32_t lists;
   /*
+   Level of the leaves whatever alpha says, 1 to 10: one finer than alpha 0 asks for suits thin parts. 0: as alpha says.
+   */
+  uint32_t level;
+  /*
    Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
    */
   uint32_t capacity;
@@ -143,7 +147,8 @@ typedef struct olbvh_tree_info_data {
    */
   double build_ms;
   /*
-   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order.
+   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order, and no
+   field: `olbvh_value` is NaN there. Scenes have fields (`olbvh_scene_arrays`).
    */
   uint64_t address;
 } olbvh_tree_info_data;

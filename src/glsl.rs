@@ -10,7 +10,7 @@
 //!    |---|---|
 //!    | `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)` | owner of a point or `OLBVH_NONE`, barycentric coordinates; a tolerance of 1e-5 is usual |
 //!    | `uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS])` | how many contain it, and the first of them; `OLBVH_OWNERS` is 32 unless you define it |
-//!    | `float olbvh_value(uint owner, vec4 weights)` | value of the field, which has a float per point |
+//!    | `float olbvh_value(uint owner, vec4 weights)` | value of the field, which has a float per point; NaN without one |
 //!    | `vec3 olbvh_gradient(uint owner)` | its gradient |
 //!    | `bool olbvh_traverse()` | the paper's traversal, if you define `OLBVH_TRAVERSE`, and below the inclusion `bool olbvh_visit_node(olbvh_Node)` (descend?) and `bool olbvh_visit_leaf(olbvh_Node)` (done?) |
 //!
@@ -37,6 +37,7 @@ pub const OLBVH: &str = include_str!(concat!(env!("OUT_DIR"), "/olbvh.glsl"));
 pub struct SceneBuffers {
     arrays: [BufferRef; Self::COUNT - 1],
     lists: Lists,
+    has_field: bool,
 }
 
 impl SceneBuffers {
@@ -47,15 +48,19 @@ impl SceneBuffers {
     pub fn new(mesh: &MeshView, tree: &TreeMemory, field: Option<BufferRef>) -> Self {
         let TreeMemory { grid, masks, co, po, p, flags, lists, .. } = *tree;
         let (cells, vertices, neighbours) = (mesh.input.cells, mesh.arrays.vertices, mesh.arrays.neighbours);
-        Self { arrays: [grid, masks, co, po, p, flags, cells, vertices, neighbours, field.unwrap_or(grid)], lists }
+        Self {
+            arrays: [grid, masks, co, po, p, flags, cells, vertices, neighbours, field.unwrap_or(grid)],
+            lists,
+            has_field: field.is_some(),
+        }
     }
 
     /// What the shaders find at the tree's address.
     pub fn addresses(&self) -> SceneAddresses {
         let [grid, masks, co, po, p, flags, cells, vertices, neighbours, field] =
             self.arrays.map(|b| [b.address as u32, (b.address >> 32) as u32]);
-        let lists = u32::from(self.lists == Lists::Boundary);
-        SceneAddresses { grid, masks, co, po, p, flags, cells, vertices, neighbours, field, lists, pad: 0 }
+        let (lists, has_field) = (u32::from(self.lists == Lists::Boundary), u32::from(self.has_field));
+        SceneAddresses { grid, masks, co, po, p, flags, cells, vertices, neighbours, field, lists, has_field }
     }
 
     /// The storage buffers in the order of their bindings; `addresses` holds what [`Self::addresses`] gives.

@@ -162,6 +162,8 @@ fn check(binding: Binding) {
             assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
         }
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
+        let without = run(&gpu, &SceneBuffers::new(&view, tree.memory(), None), &mesh.points);
+        assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
     }
     assert!(gpu.validation_messages().is_empty(), "{:#?}", gpu.validation_messages());
 }

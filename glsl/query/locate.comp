@@ -34,6 +34,7 @@ RECORDS(12, uvec4, neighbours)
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
+const uint LEAST_SLICE = 16384u; // where slices are longer, points are still located around the same owners
 const uint HINTS = 1u; // a tetrahedron per point, or NONE
 const uint ORDER = 2u; // which point is at each place
 
@@ -115,7 +116,7 @@ void main() {
         if (++place < end) {
             a = point_at(g, place);
             // Where a list goes on in the next slice, the owner is not known yet.
-            bool known = owner != NONE && (walks || range.y - range.x <= SLICE);
+            bool known = owner != NONE && (walks || range.y - range.x <= LEAST_SLICE);
             from = owner;
             left = known ? HINTED : 0u;
             in_leaf = false;

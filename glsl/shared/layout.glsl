@@ -206,5 +206,5 @@ struct SceneAddresses {
     uvec2 neighbours; // Neighbour table.
     uvec2 field;      // One float per point, or anything where no field is asked for.
     uint lists;       // 1: leaves within the mesh have a seed instead of a list.
-    uint pad;         // Unused.
+    uint has_field;   // Not 0: `field` is one.
 };

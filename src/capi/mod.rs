@@ -101,6 +101,8 @@ pub struct OlbvhBuildOptions {
     pub assign: u32,
     /// 0: all primitives are listed (the paper). 1: where the surface is, seeds and walks elsewhere.
     pub lists: u32,
+    /// Level of the leaves whatever alpha says, 1 to 10: one finer than alpha 0 asks for suits thin parts. 0: as alpha says.
+    pub level: u32,
     /// Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
     pub capacity: u32,
     /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
@@ -117,7 +119,7 @@ impl OlbvhBuildOptions {
             boxes: false,
             capacity: (self.capacity != 0).then_some(self.capacity),
             budget: (self.budget != 0).then_some(self.budget),
-            level: None,
+            level: (self.level != 0).then_some(self.level),
         })
     }
 }
@@ -142,7 +144,8 @@ pub struct OlbvhTreeInfo {
     pub bad_cells: u32,
     /// Milliseconds of device time.
     pub build_ms: f64,
-    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order.
+    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order, and no
+    /// field: `olbvh_value` is NaN there. Scenes have fields (`olbvh_scene_arrays`).
     pub address: u64,
 }
 
@@ -294,8 +297,9 @@ pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
 /// What `olbvh_tree_build` takes where it is given no options.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
-    let BuildOptions { alpha, assign, lists, capacity, budget, .. } = BuildOptions::default();
-    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, capacity: capacity.unwrap_or(0), budget: budget.unwrap_or(0) }
+    let BuildOptions { alpha, assign, lists, level, capacity, budget, .. } = BuildOptions::default();
+    let [level, capacity] = [level, capacity].map(|limit| limit.unwrap_or(0));
+    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, level, capacity, budget: budget.unwrap_or(0) }
 }
 
 /// Builds the tree over a mesh. `options` may be null.

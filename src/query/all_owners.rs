@@ -1,13 +1,13 @@
 //! Every tetrahedron that contains a point (SPEC 3.1): counted, then written within what memory there is.
 
-use super::Scene;
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
+use super::{Scene, slices};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::reference::locate::{CHUNK, SLICE};
+use crate::reference::locate::CHUNK;
 
 /// Answers and scratch memory of all owners: 28 bytes per point, and what a scan takes.
 #[derive(Clone, Copy, Debug)]
@@ -80,9 +80,10 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
     let fill = u32::from(found.is_some());
     let places = if fill == 0 { memory.counts } else { memory.ends };
     let found = found.unwrap_or_else(|| r.gpu().nothing());
-    let spec = LocateAllSpec { workgroup, fill, slice: SLICE, lists: tree.lists as u32, ..Default::default() };
+    let (length, slices) = slices(scene.longest_leaf);
+    let spec = LocateAllSpec { workgroup, fill, slice: length, lists: tree.lists as u32, ..Default::default() };
     r.stage("query.locate_all", |r| {
-        for slice in 0..scene.longest_leaf.div_ceil(SLICE).max(1) {
+        for slice in 0..slices {
             if slice > 0 {
                 r.barrier("locate_all.slice → locate_all.slice");
             }

@@ -1,7 +1,7 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, values of fields.
 
-use super::Scene;
 use super::order::{PointOrder, cmd_sort_points};
+use super::{Scene, slices};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
@@ -9,7 +9,7 @@ use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, Lo
 use crate::mesh::On;
 use crate::options::{RUN, TOLERANCE};
 use crate::primitives::Arena;
-use crate::reference::locate::{CHUNK, SLICE};
+use crate::reference::locate::CHUNK;
 
 /// How the leaf of a point is found.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -142,7 +142,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 groups(1),
             );
         }
-        let slices = scene.longest_leaf.div_ceil(SLICE).max(1);
+        let (length, slices) = slices(scene.longest_leaf);
         let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;
         let guides = guides.unwrap_or_else(|| r.gpu().nothing());
         for slice in 0..slices {
@@ -172,14 +172,15 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             };
             // What runs have left to later slices is located point by point.
             let (run, guide) = if slice == 0 { (run, guide) } else { (1, 0) };
-            let spec = LocateSpec { workgroup, guide, slice: SLICE, lists, run, ..Default::default() };
+            let spec = LocateSpec { workgroup, guide, slice: length, lists, run, ..Default::default() };
             r.dispatch(&arguments, spec, groups(run))?;
         }
         Ok(())
     })
 }
 
-/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float each, NaN without owner.
+/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float each, NaN without owner. Reads `located`, the
+/// field and the cells in compute shaders, writes `values` in compute shaders; no barrier before or after: one from `cmd_locate` to this is yours.
 ///
 /// # Errors
 /// [`Error::Vulkan`] if the pipeline cannot be made.

@@ -21,6 +21,7 @@ pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::gpu::{BufferRef, Groups};
+use crate::reference::locate::SLICE;
 
 /// A binary tree in device memory: what the LBVH baseline is to the queries.
 #[derive(Clone, Copy, Debug)]
@@ -146,8 +147,18 @@ pub struct Scene {
     pub mesh: MeshView,
     /// The tree over it.
     pub tree: TreeMemory,
-    /// At least the entries of the longest leaf: lists are searched in so many slices.
+    /// Entries of the longest leaf: lists are searched slice by slice, up to there, so a smaller number loses points. A host that does not read
+    /// [`crate::layout::BuildStatus::longest_leaf`] back gives the number of tetrahedra, which no list exceeds; that costs up to [`MOST_SLICES`] dispatches.
     pub longest_leaf: u32,
+}
+
+/// Dispatches that the longest list takes: slices are longer than [`SLICE`] rather than more.
+pub const MOST_SLICES: u32 = 16;
+
+/// Entries of a list that one dispatch searches, and how many dispatches that makes of the longest.
+fn slices(longest: u32) -> (u32, u32) {
+    let slice = SLICE.max(longest.div_ceil(MOST_SLICES).next_power_of_two());
+    (slice, longest.div_ceil(slice).max(1))
 }
 
 impl Scene {
@@ -155,5 +166,19 @@ impl Scene {
     pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Self {
         let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
         Self { mesh: view, tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn few_slices_hold_the_longest_list() {
+        for longest in [0, 1, SLICE, SLICE + 1, MOST_SLICES * SLICE, MOST_SLICES * SLICE + 1, 12_290_298, 536_870_911] {
+            let (slice, count) = slices(longest);
+            assert!(slice >= SLICE && count <= MOST_SLICES && slice * count >= longest, "{longest}: {count} of {slice}");
+            assert!(longest > MOST_SLICES * SLICE || (slice, count) == (SLICE, longest.div_ceil(SLICE).max(1)), "{longest}");
+        }
     }
 }

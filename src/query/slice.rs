@@ -108,7 +108,7 @@ impl SliceMemory {
 /// answers.
 ///
 /// # Errors
-/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, or for memory of fewer voxels. Boxes that are flat or too large for the mesh,
+/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, or for memory of fewer voxels or of narrower rows. Boxes that are flat or too large for the mesh,
 /// which the device alone knows, are told by [`SliceStatus::refused`].
 pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, memory: &SliceMemory, rounds: Rounds) -> Result<()> {
     input.voxels.check()?;
@@ -117,8 +117,9 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
     if count == 0 || rows > u64::from(height) * u64::from(input.voxels.layers) {
         return Err(Error::Invalid(format!("{count} rows from row {first} of layer {layer} on, which the stack does not have")));
     }
-    if u64::from(width) * u64::from(count) > memory.answers.size / 4 {
-        return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels", memory.answers.size / 4)));
+    let fits = (memory.answers.size / 4, memory.runs.size / size_of::<RunState>() as u64);
+    if u64::from(width) * u64::from(count) > fits.0 || u64::from(width) * u64::from(count.div_ceil(RUN)) > fits.1 {
+        return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels, {} side by side", fits.0, fits.1)));
     }
     if input.part.is_some() && matches!(searched.structure, Structure::Binary(_)) {
         return Err(Error::Invalid("a part of a binary tree, which has no cells".into()));

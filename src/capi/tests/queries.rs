@@ -270,6 +270,13 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
         let held: *mut OlbvhMesh = made(|out| olbvh_mesh_upload(gpu, points, mesh.points.len(), tets, mesh.tets.len(), reorder, out));
         let tree = made(|out| olbvh_tree_build(held, null(), out));
+        for level in [1, 4] {
+            let options = OlbvhBuildOptions { level, ..olbvh_default_build_options() };
+            let other: *mut OlbvhTree = made(|out| olbvh_tree_build(held, &raw const options, out));
+            let info: OlbvhTreeInfo = made(|out| olbvh_tree_info(other, out));
+            assert_eq!(info.level, level);
+            olbvh_tree_free(other);
+        }
         olbvh_mesh_free(held);
         tree
     };

@@ -8,12 +8,10 @@ use crate::kernels::{
 };
 use crate::layout::SearchState;
 use crate::primitives::{Arena, Count};
-use crate::query::{Rounds, Scene};
+use crate::query::{Rounds, Scene, slices};
 
 /// Nodes and entries that a primitive may look at in one dispatch.
 pub(super) const BUDGET: u32 = 512;
-/// Entries of a list that one dispatch searches for a vertex.
-const SLICE: u32 = 16_384;
 
 /// Arrays of one direction: the primitives of one mesh against the tree of the other.
 #[derive(Clone, Copy, Debug)]
@@ -141,7 +139,7 @@ impl Direction {
     }
 
     fn slices(&self) -> u32 {
-        self.other.longest_leaf.div_ceil(SLICE).max(1)
+        slices(self.other.longest_leaf).1
     }
 
     fn cmd_places(&self, r: &mut Recorder<'_>, slice: u32) -> Result<()> {
@@ -165,7 +163,7 @@ impl Direction {
             stride: own.stride,
             slice,
         };
-        let spec = OverlapPlacesSpec { workgroup, slice: SLICE, ..Default::default() };
+        let spec = OverlapPlacesSpec { workgroup, slice: slices(self.other.longest_leaf).0, ..Default::default() };
         r.dispatch(&arguments, spec, Groups::Count(own.points.div_ceil(workgroup)))
     }
 
