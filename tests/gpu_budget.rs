@@ -145,12 +145,12 @@ struct Built {
 }
 
 fn one<T: bytemuck::AnyBitPattern>(content: &[u32], part: BufferRef) -> T {
-    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&content[part.offset as usize / 4..][..size_of::<T>() / 4]))
+    bytemuck::pod_read_unaligned(bytemuck::cast_slice(&content[part.offset() as usize / 4..][..size_of::<T>() / 4]))
 }
 
 /// The part of a tree that was built.
 fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArrays {
-    let words = |part: BufferRef, n: u32| content[part.offset as usize / 4..][..n as usize].to_vec();
+    let words = |part: BufferRef, n: u32| content[part.offset() as usize / 4..][..n as usize].to_vec();
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
     let (p, quarters) = taken_apart(words(tree.p, status.entries), &grid);
@@ -237,14 +237,14 @@ fn every_capacity() {
                 let level = (0..=deepest).rev().find(|&l| entries(l) <= room).unwrap();
                 assert_eq!((status.overflow, status.level), (0, level), "{lists} {room} {by_entries}");
                 assert!(arrays(&content, t, &status) == trees[level as usize], "{lists} {room}");
-                assert_eq!(content[owners.offset as usize / 4..][..expected.len()], expected, "{lists} {room}");
+                assert_eq!(content[owners.offset() as usize / 4..][..expected.len()], expected, "{lists} {room}");
                 built_levels[level as usize] += 1;
                 for part in [t.status, t.grid, t.p, t.po, t.co, t.flags, t.masks, *owners] {
                     assert!(
-                        content[end..part.offset as usize / 4].iter().all(|&word| word == 0x5555_5555),
+                        content[end..part.offset() as usize / 4].iter().all(|&word| word == 0x5555_5555),
                         "{lists} {room}: written before {part:?}"
                     );
-                    end = (part.offset + part.size).div_ceil(4) as usize;
+                    end = (part.offset() + part.size()).div_ceil(4) as usize;
                 }
             }
         }

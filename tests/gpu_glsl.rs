@@ -96,7 +96,7 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
         let handles = device.allocate_descriptor_sets(&info).unwrap();
         for (handle, set) in handles.iter().zip(&sets) {
             for (i, b) in set {
-                let info = [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size }];
+                let info = [vk::DescriptorBufferInfo { buffer: b.buffer(), offset: b.offset(), range: b.size() }];
                 let write = vk::WriteDescriptorSet::default().dst_set(*handle).dst_binding(*i).buffer_info(&info);
                 device.update_descriptor_sets(&[write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER)], &[]);
             }
@@ -109,7 +109,7 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
         let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module).name(c"main");
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         let pipeline = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).unwrap()[0];
-        let address = addresses.all().address;
+        let address = addresses.all().address();
         let push = [address as u32, (address >> 32) as u32, points.len() as u32];
         gpu.run("olbvh.test.host", |r| {
             let commands = r.commands();

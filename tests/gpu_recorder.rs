@@ -26,7 +26,7 @@ use olbvh::query::{
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
     for (i, part) in parts.iter().enumerate() {
-        let n = part.size.min(4);
+        let n = part.size().min(4);
         r.copy(part.part(0, n), sink.all().part(16 * i as u64, n));
     }
 }

@@ -184,7 +184,7 @@ fn descriptor_set(
 ) -> Result<vk::DescriptorSet> {
     let layouts = [layout];
     let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-    let range = |b: &BufferRef| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size }];
+    let range = |b: &BufferRef| [vk::DescriptorBufferInfo { buffer: b.buffer(), offset: b.offset(), range: b.size() }];
     let infos = buffers.each_ref().map(range);
     // SAFETY: the buffers outlive the set.
     unsafe {

@@ -216,7 +216,8 @@ impl HostBuffer {
 
     /// The buffer as olbvh takes it.
     pub fn part(&self) -> olbvh::gpu::BufferRef {
-        olbvh::gpu::BufferRef { buffer: self.handle, offset: 0, size: self.size, address: self.address }
+        // SAFETY: the whole buffer, made with the usage that olbvh asks for.
+        unsafe { olbvh::gpu::BufferRef::from_raw(self.handle, 0, self.size, self.address) }
     }
 }
 

@@ -19,24 +19,52 @@ pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
 /// Offsets of arrays within a buffer are multiples of this: enough for every device's storage-buffer offsets and 16-byte loads.
 pub const ALIGNMENT: u64 = 256;
 
-/// A part of a buffer, ours or the host's: what kernels get as an argument.
+/// A part of a buffer, ours or the host's: what kernels get as an argument. It does not keep the buffer: that must live until commands that were recorded
+/// with it have been executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferRef {
-    /// The buffer.
-    pub buffer: vk::Buffer,
-    /// Bytes from its start.
-    pub offset: u64,
-    /// Bytes.
-    pub size: u64,
-    /// Device address of the first byte; 0 where the device has no buffer addresses.
-    pub address: u64,
+    pub(crate) buffer: vk::Buffer,
+    pub(crate) offset: u64,
+    pub(crate) size: u64,
+    pub(crate) address: u64,
 }
 
 impl BufferRef {
-    /// The part from `offset`, `size` bytes long (both within this part).
+    /// A part of a buffer of the host's, `size` bytes from `offset` on. `address`: device address of the first byte, 0 where the device has no buffer addresses.
+    ///
+    /// # Safety
+    /// The buffer belongs to the device that the part is used on, has the usage of [`USAGE`] (with addresses, that for these as well), and so many bytes, at
+    /// that address.
+    pub unsafe fn from_raw(buffer: vk::Buffer, offset: u64, size: u64, address: u64) -> Self {
+        Self { buffer, offset, size, address }
+    }
+
+    /// The buffer.
+    pub fn buffer(self) -> vk::Buffer {
+        self.buffer
+    }
+
+    /// Bytes from the buffer's start.
+    pub fn offset(self) -> u64 {
+        self.offset
+    }
+
+    /// Bytes.
+    pub fn size(self) -> u64 {
+        self.size
+    }
+
+    /// Device address of the first byte; 0 where the device has no buffer addresses.
+    pub fn address(self) -> u64 {
+        self.address
+    }
+
+    /// The part from `offset`, `size` bytes long, both within this part; what is not is cut off.
     #[must_use]
     pub fn part(self, offset: u64, size: u64) -> Self {
         debug_assert!(offset + size <= self.size, "part {offset}+{size} of {}", self.size);
+        let offset = offset.min(self.size);
+        let size = size.min(self.size - offset);
         let address = if self.address == 0 { 0 } else { self.address + offset };
         Self { buffer: self.buffer, offset: self.offset + offset, size, address }
     }

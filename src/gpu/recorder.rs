@@ -68,7 +68,9 @@ impl<'a> Recorder<'a> {
     /// pools (see [`Recorder::with_pools`]).
     ///
     /// # Safety
-    /// `commands` is in the recording state, outside a render pass, of a family with compute, and belongs to `gpu`'s device.
+    /// `commands` is in the recording state, outside a render pass, of a family with compute, and belongs to `gpu`'s device. Until it has been executed live all
+    /// buffers whose parts are recorded; these are as large as the functions that take them say, and hold what they say: hints and orders that are
+    /// numbers of this mesh, a tree over this mesh.
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
         let (pools, room) = (Pools::Own(DescriptorPools::new(gpu)), DescriptorRoom::default());
         let (uses, stages, barriers) = (Vec::new(), Vec::new(), Vec::new());

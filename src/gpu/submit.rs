@@ -60,7 +60,7 @@ impl Drop for Submission<'_> {
 }
 
 impl Gpu {
-    /// Records work, submits it, and waits until it is done.
+    /// Records work, submits it, and waits until it is done. What [`Recorder::new`] asks of recorded buffers is asked here, too.
     ///
     /// # Errors
     /// Those of `record`, a missing barrier, or a failed Vulkan call.

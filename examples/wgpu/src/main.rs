@@ -40,7 +40,7 @@ fn share(device: &wgpu::Device, label: &str, buffer: &olbvh::gpu::Buffer) -> wgp
     let descriptor = wgpu::BufferDescriptor { label: Some(label), size: buffer.size(), usage, mapped_at_creation: false };
     // SAFETY: the buffer is one of this device, a storage buffer, and outlives its use by wgpu, which does not destroy it.
     unsafe {
-        let shared = wgpu::hal::vulkan::Buffer::from_raw_externally_owned(buffer.all().buffer, Box::new(|| ()));
+        let shared = wgpu::hal::vulkan::Buffer::from_raw_externally_owned(buffer.all().buffer(), Box::new(|| ()));
         device.create_buffer_from_hal::<Vulkan>(shared, &descriptor)
     }
 }
