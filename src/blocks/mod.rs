@@ -95,7 +95,8 @@ fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
     let why = why.map_or_else(String::new, |e| format!(" ({e})"));
     let limit = gpu.memory_limit();
     let enough = bytes.max(limit + limit / 2);
+    let finer = if tets > LEAST { ", or a finer tree, whose cells cut the mesh in smaller blocks" } else { "" };
     Error::TooLarge(format!(
-        "{limit} bytes of device memory are too few for a block of {tets} tetrahedra{why}; allow {enough} or more, or a finer tree (a smaller alpha)"
+        "{limit} bytes of device memory are too few for a block of {tets} tetrahedra{why}; allow {enough} or more{finer}"
     ))
 }

@@ -24,9 +24,10 @@ pub struct SliceSettings {
     pub layers: u32,
     /// Voxels per row and rows; 0: as many as make the voxels square.
     pub size: [u32; 2],
-    /// Size of a voxel along the normal. `None`: with one layer the size of a voxel in the plane, with more their share of the mesh.
+    /// Size of a voxel along the normal. `None`: the size of `spacing`; without one, the size of a voxel in the plane for one layer or with `at`, else the
+    /// layers' share of the mesh.
     pub thickness: Option<f64>,
-    /// Distance of two layers; `None`: their thickness.
+    /// Distance of two layers, below 0 downwards; `None`: their thickness.
     pub spacing: Option<f64>,
 }
 
@@ -103,7 +104,8 @@ impl SliceSettings {
         };
         let deep = (n1 - n0).max(largest * 1e-6);
         let share = deep / f64::from(self.layers);
-        let thickness = self.thickness.or(self.spacing).unwrap_or(if self.layers > 1 && self.at.is_none() { share } else { du.max(dv) });
+        let spaced = self.spacing.map(f64::abs).filter(|&s| s > 0.0);
+        let thickness = self.thickness.or(spaced).unwrap_or(if self.layers > 1 && self.at.is_none() { share } else { du.max(dv) });
         let spacing = self.spacing.unwrap_or(thickness);
         if !(thickness > 0.0 && thickness.is_finite() && spacing.is_finite()) {
             return invalid("the thickness of a layer must be above 0");
@@ -130,12 +132,13 @@ impl SliceSettings {
     }
 
     /// The same with cubes for voxels, as packages for printers want them: as thick and far apart as they are wide.
-    /// `fill`: as many layers as fill the mesh.
+    /// `fill`: as many layers as fill the mesh. Across the layers of axis y rows run along z, so that the package is no mirror image of the mesh.
     ///
     /// # Errors
     /// As [`SliceSettings::voxels`]; and [`Error::Invalid`] for settings that make no cubes.
     pub fn cubes(&self, lo: [f32; 3], hi: [f32; 3], origin: [f64; 3], fill: bool) -> Result<Self> {
-        let mut cubes = Self { size: [self.size[0], 0], ..*self };
+        let plane = if self.plane == Plane::Axis(1) { Plane::Normal([0.0, 1.0, 0.0]) } else { self.plane };
+        let mut cubes = Self { size: [self.size[0], 0], plane, ..*self };
         let flat = cubes.voxels(lo, hi, origin)?;
         let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
         let side = length(flat.across);

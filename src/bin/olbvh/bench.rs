@@ -101,7 +101,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 
 /// Compares two files; the result goes to a file as well, if one is named.
 fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outcome {
-    let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md])).transpose()?;
+    let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[])).transpose()?;
     let comparison = compare([a, b]).map_err(Failure::input)?;
     let json = serde_json::to_value(&comparison).map_err(|e| Failure::Failed(e.to_string()))?;
     if let (Some(path), Some(format)) = (out, format) {
@@ -114,7 +114,7 @@ fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outco
 /// Announces the result before long work.
 fn target(path: &Path) -> Outcome<Target> {
     if path.extension().is_some() {
-        return output::announce(path, &[OutputFormat::Json, OutputFormat::Md]).map(Target::File);
+        return output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[]).map(Target::File);
     }
     std::fs::create_dir_all(path).map_err(|source| Error::Io { path: path.into(), source })?;
     Ok(Target::Folder)

@@ -8,24 +8,24 @@ use std::process::ExitCode;
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub struct Common {
     /// Print one JSON object on standard output instead of text.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, help_heading = "Global options")]
     pub json: bool,
     /// Where to compute: part of a device's name or its number (see `olbvh devices`), or `cpu` for the reference implementation, which needs no
     /// Vulkan and is slower.
-    #[arg(long, global = true, value_name = "NAME|INDEX|cpu")]
+    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|INDEX|cpu")]
     pub device: Option<String>,
     /// Shapes of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh tune` saved. By default those of the
     /// device's own profile, or of its kind; results are the same with all.
-    #[arg(long, global = true, value_name = "NAME|FILE", env = "OLBVH_TARGET", hide_env_values = true)]
+    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|FILE", env = "OLBVH_TARGET", hide_env_values = true)]
     pub target: Option<String>,
     /// Do not look for a profile of the device that `olbvh tune` has saved.
-    #[arg(long, global = true, env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = clap::builder::FalseyValueParser::new())]
+    #[arg(long, global = true, help_heading = "Global options", env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = clap::builder::FalseyValueParser::new())]
     pub no_profile: bool,
     /// No progress and no remarks, errors only.
-    #[arg(long, short, global = true, conflicts_with = "verbose")]
+    #[arg(long, short, global = true, help_heading = "Global options", conflicts_with = "verbose")]
     pub quiet: bool,
     /// Tell what is being done.
-    #[arg(long, short, global = true)]
+    #[arg(long, short, global = true, help_heading = "Global options")]
     pub verbose: bool,
 }
 

@@ -141,5 +141,11 @@ pub fn shapes(common: &Common) -> Outcome<Shapes> {
 
 /// The engine that `--device` names: the best Vulkan device without one.
 pub fn open(common: &Common) -> Outcome<Box<dyn Engine>> {
-    if common.means_cpu() { Ok(Box::new(cpu::Cpu)) } else { Ok(Box::new(gpu::Device::open(common)?)) }
+    if !common.means_cpu() {
+        return Ok(Box::new(gpu::Device::open(common)?));
+    }
+    if common.target.is_some() && std::env::var_os("OLBVH_TARGET").is_none() {
+        return Err(Failure::Usage("--target shapes the kernels of Vulkan devices; --device cpu has none".into()));
+    }
+    Ok(Box::new(cpu::Cpu))
 }

@@ -7,6 +7,7 @@ use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
 use olbvh::mesh::{Mesh, On};
+use olbvh::options::Lists;
 use olbvh::reference::grid::MAX_LEVEL;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -80,7 +81,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
         "tree": {
-            "l": s.level, "l_wanted": s.wanted, "alpha": args.tree.alpha, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
+            "l": s.level, "l_wanted": s.wanted, "alpha": args.tree.level.is_none().then_some(args.tree.alpha), "level": args.tree.level, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
             "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
         },
@@ -144,7 +145,7 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
-    let hint = each >= LONG && s.wanted == s.level && finer <= MAX_LEVEL;
+    let hint = args.tree.lists == Lists::Boundary && each >= LONG && s.wanted == s.level && finer <= MAX_LEVEL;
     let hint = if hint { format!("; --level {finer} would be quicker to ask") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
     for (name, n) in s.memory.arrays() {

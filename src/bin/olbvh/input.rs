@@ -1,5 +1,6 @@
 //! Meshes, fields and tree options from the command line.
 
+use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
 use olbvh::formats::{LoadOptions, Loaded, load};
 use olbvh::mesh::{Field, Mesh, On};
@@ -11,7 +12,7 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct TreeArgs {
     /// Coarseness of the tree, 0 to 10: each whole number takes one level off. Coarser trees are smaller and quicker to build; answers are the same.
-    #[arg(long, default_value_t = 0.0, value_name = "A")]
+    #[arg(long, default_value_t = 0.0, value_name = "A", allow_hyphen_values = true)]
     pub alpha: f32,
     /// Level of the leaves, 0 to 10, instead of the one that alpha asks for; each has cells half as large. Where parts are thin, one level more makes pictures
     /// and slices quicker; `info` tells. Answers are the same.
@@ -19,11 +20,11 @@ pub struct TreeArgs {
     pub level: Option<u32>,
     /// Which octree cells list a tetrahedron: those its box meets, as in the paper; of those the ones that its face planes leave; or exactly those it touches,
     /// the shortest lists, which take longest to build. Answers are the same.
-    #[arg(long, default_value_t = BuildOptions::default().assign, value_name = "aabb|planes|exact")]
+    #[arg(long, default_value_t = BuildOptions::default().assign, value_parser = named::<Assign>, value_name = "aabb|planes|exact")]
     pub assign: Assign,
     /// Which tetrahedra a leaf lists: all where the surface is and elsewhere one, from which points are walked to; or all everywhere, as in the
     /// paper. Answers are the same.
-    #[arg(long, default_value_t = BuildOptions::default().lists, value_name = "all|boundary")]
+    #[arg(long, default_value_t = BuildOptions::default().lists, value_parser = named::<Lists>, value_name = "all|boundary")]
     pub lists: Lists,
     /// Most memory for the arrays of the tree, such as 64MiB (units B, KiB, MiB, GiB; kB, MB, GB): the tree gets coarser than --alpha asks for until
     /// it fits, by what `--lists all --assign aabb` could take at most. Answers are the same.

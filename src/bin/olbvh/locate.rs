@@ -4,7 +4,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::text::{grouped, in_blocks, milliseconds};
+use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "field")]
     all: bool,
     /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
-    #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T")]
+    #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
     /// Each point lies near the one before, as samples of a line or a scan do; without, no order is assumed.
     #[arg(long, conflicts_with = "all")]
@@ -66,7 +66,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         return Err(Failure::Usage(format!("a tolerance of {}; it lies between 0 and 1", args.tolerance)));
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
-    let format = output::announce(&args.output, formats)?;
+    let format = output::announce(&args.output, formats, &[&args.mesh, &args.points])?;
     let options = args.tree.options(false)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
@@ -103,14 +103,15 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "device": engine.name(),
     });
+    // Of few points most of the time goes by before the first.
+    let rate = if points.len() < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };
     let text = format!(
-        "{}: {} points, {} of them in the mesh; {} on {}, {} points a second{}\n",
+        "{}: {}, {} of them in the mesh; {} on {}{rate}{}\n",
         args.output.display(),
-        grouped(points.len() as u64),
+        counted(points.len() as u64, "point"),
         grouped(done.found as u64),
         milliseconds(seconds * 1e3),
         engine.name(),
-        grouped(per_second as u64),
         in_blocks(&took)
     );
     output::summary(common, &json, &text)

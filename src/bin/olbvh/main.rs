@@ -1,5 +1,6 @@
 //! The command line: one file per subcommand, [`engine`] between them and the devices.
 
+mod arguments;
 mod bench;
 mod common;
 mod conformance;

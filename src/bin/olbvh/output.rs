@@ -53,9 +53,16 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
-/// Announces a result, before long work: its ending must be one of `formats`, and its folder must exist.
-pub fn announce(path: &Path, formats: &[OutputFormat]) -> Outcome<OutputFormat> {
+/// Announces a result, before long work: its ending must be one of `formats`, its folder must exist, and it must not be one of the `inputs`.
+pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outcome<OutputFormat> {
+    if path == Path::new("-") || path.starts_with("/dev") {
+        return Err(Failure::Usage(format!("{}: results go to files, not to streams or devices", path.display())));
+    }
     let format = OutputFormat::of(path, formats)?;
+    let place = std::fs::canonicalize(path).ok();
+    if place.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == place) {
+        return Err(Failure::Usage(format!("{}: the result would replace what it is made of; choose another name", path.display())));
+    }
     if !folder(path).is_dir() {
         return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(path).display())));
     }

@@ -1,10 +1,10 @@
 //! `olbvh overlap`.
 
+use crate::arguments::vector;
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Question};
 use crate::input::{MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::slice::vector;
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
 use olbvh::error::Error;
@@ -21,7 +21,7 @@ Examples:
   olbvh overlap die.vtu box.vtu -o cells.json
   olbvh overlap a.vtu b.vtu -o cells.json --pairs              every pair of intersecting cells
   olbvh overlap a.vtu b.vtu -o cells.json --move-b 0,0,3.5 --rotate-b z,30
-  olbvh overlap a.vtu b.vtu -o a.vtu                           the cells of A that intersect B, as a mesh
+  olbvh overlap a.vtu b.vtu -o touched.vtu                     the cells of A that intersect B, as a mesh
 
 The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascending by a then b. Ids count the cells of a file from 0. Touching counts.
 B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not,
@@ -51,7 +51,7 @@ pub struct Args {
 
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu])?;
+    let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
     let mut options = args.tree.options(false)?;
     if args.pairs {
         (options.lists, options.assign) = (Lists::All, Assign::Aabb); // pairs are found by lists, by those of boxes only once
@@ -98,12 +98,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     });
     let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
     let text = format!(
-        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.1} % of the cells; {} trees {}, overlap {} on {}\n",
+        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.2} per cell; {} trees {}, overlap {} on {}\n",
         args.output.display(),
         grouped(ids_a.len() as u64),
         grouped(ids_b.len() as u64),
         grouped(narrow),
-        100.0 * share,
+        share,
         found.trees,
         milliseconds(found.build_seconds * 1e3),
         milliseconds(found.seconds * 1e3),

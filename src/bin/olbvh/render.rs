@@ -1,5 +1,6 @@
 //! `olbvh render`.
 
+use crate::arguments::{range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{self, Drawn};
 use crate::input::{self, MemoryArgs, TreeArgs};
@@ -22,7 +23,7 @@ Examples:
   olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
   olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900
   olbvh render bracket.vtu -o shell.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   only values around 70 % of the range
-  olbvh render bracket.vtu -o surfaces.png --iso 120,180,240 --opacity 0.5   three iso-surfaces, seen through one another
+  olbvh render bracket.vtu -o surfaces.png --iso 40,55,70 --opacity 0.5   three iso-surfaces, seen through one another
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
 The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the
@@ -78,7 +79,7 @@ pub struct Args {
     outline: f32,
     /// Direction to the light: right, up, towards the viewer.
     #[arg(long, value_name = "R,U,T", value_parser = vector, allow_hyphen_values = true)]
-    light: Option<[f32; 3]>,
+    light: Option<[f64; 3]>,
     /// A ray ends once it is this opaque.
     #[arg(long, default_value_t = 0.99, value_name = "A")]
     termination: f32,
@@ -98,13 +99,18 @@ struct Iso(Vec<f32>);
 
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    output::announce(&args.output, &[OutputFormat::Png])?;
+    output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
     let options = args.tree.options(false)?;
     let settings = args.settings()?;
     settings.check()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let field = args.field(&loaded.mesh, common)?;
+    if let (false, Some([lo, hi])) = (settings.iso.is_empty(), field.range())
+        && !settings.iso.iter().any(|iso| (lo..=hi).contains(iso))
+    {
+        common.remark(format_args!("no surface to be seen: {} goes from {lo} to {hi}", field.name));
+    }
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
@@ -161,7 +167,7 @@ impl Args {
             termination: self.termination,
             shading: !self.no_shading,
             outline: self.outline,
-            light: self.light.unwrap_or(defaults.light),
+            light: self.light.map_or(defaults.light, |light| light.map(|x| x as f32)),
         })
     }
 
@@ -188,21 +194,6 @@ fn size(text: &str) -> Result<[u32; 2], String> {
 fn iso(text: &str) -> Result<Iso, String> {
     let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     values.map(Iso).map_err(|_| "values of surfaces are numbers separated by commas, such as 120,180".into())
-}
-
-/// `LO:HI`.
-fn range(text: &str) -> Result<[f32; 2], String> {
-    let numbers = text.split_once(':').map(|(lo, hi)| (lo.trim().parse::<f32>(), hi.trim().parse::<f32>()));
-    match numbers {
-        Some((Ok(lo), Ok(hi))) if lo <= hi && lo.is_finite() && hi.is_finite() => Ok([lo, hi]),
-        _ => Err("a range is LO:HI, such as 20:350".into()),
-    }
-}
-
-/// Three numbers.
-fn vector(text: &str) -> Result<[f32; 3], String> {
-    let numbers: Vec<f32> = text.split(',').map_while(|part| part.trim().parse().ok()).collect();
-    numbers.try_into().map_err(|_| "a direction is three numbers, such as -0.5,0.7,1".to_owned())
 }
 
 /// Examples, colour maps, the form of a transfer function in a file.

@@ -1,14 +1,15 @@
 //! `olbvh slice`.
 
+use crate::arguments::{range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::slice_output::{Layers, Look};
-use crate::text::{grouped, in_blocks, milliseconds};
+use crate::slice_output::{Layers, Look, materials};
+use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
-use olbvh::mesh::{Mesh, On};
+use olbvh::mesh::{Field, Mesh, On};
 use olbvh::reference::boundary::valid_grid;
 use olbvh::render::{TransferFunction, transfer};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
@@ -51,10 +52,10 @@ pub struct Args {
     /// Voxels per row and rows over the bounds of the mesh; one number: that many per row, square ones.
     #[arg(long, default_value = "512", value_name = "WxH|W", value_parser = size)]
     size: [u32; 2],
-    /// Height of a voxel perpendicular to the layers; by default what fills the mesh, with one layer the width of a voxel.
-    #[arg(long, value_name = "T")]
+    /// Height of a voxel perpendicular to the layers; by default the --spacing, or what fills the mesh; with one layer or --at the width of a voxel.
+    #[arg(long, value_name = "T", allow_hyphen_values = true)]
     thickness: Option<f64>,
-    /// Distance of the layers' centres; by default the thickness.
+    /// Distance of the layers' centres, below 0 downwards; by default the thickness.
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     spacing: Option<f64>,
     /// Field to slice, per point or per cell; by default the first field of points.
@@ -73,7 +74,7 @@ pub struct Args {
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
     /// Metres per unit of the mesh, for .svx.
-    #[arg(long, default_value_t = 0.001, value_name = "M")]
+    #[arg(long, default_value_t = 0.001, value_name = "M", value_parser = unit)]
     unit: f64,
     #[command(flatten)]
     tree: TreeArgs,
@@ -81,14 +82,17 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
+/// Terabytes.
+const MOST_VOXELS: u64 = 1 << 40;
+
 const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, OutputFormat::Png, OutputFormat::Svx];
 
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let format = output::announce(&args.output, &FORMATS)?;
+    let format = output::announce(&args.output, &FORMATS, &[&args.mesh])?;
     if format == OutputFormat::Npy {
         for beside in ["kind.npy", "owner.npy"] {
-            output::announce(&args.output.with_extension(beside), &FORMATS)?;
+            output::announce(&args.output.with_extension(beside), &FORMATS, &[&args.mesh])?;
         }
     }
     if args.owners && !matches!(format, OutputFormat::Npy | OutputFormat::Vti) {
@@ -110,11 +114,24 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         spacing: args.spacing,
     };
     if format == OutputFormat::Svx {
-        settings = settings.cubes(lo, hi, mesh.origin, args.layers.is_none())?;
+        let whole = settings.cubes(lo, hi, mesh.origin, true)?;
+        settings = if args.layers.is_none() { whole } else { settings.cubes(lo, hi, mesh.origin, false)? };
+        if settings.layers < whole.layers {
+            common
+                .remark(format_args!("{} of the {} layers that fill the mesh; leave --layers out for all", settings.layers, whole.layers));
+        }
     }
     let voxels = settings.voxels(lo, hi, mesh.origin)?;
-    let range = args.range.or_else(|| field.and_then(olbvh::mesh::Field::range)).unwrap_or([0.0, 1.0]);
-    let look = Look { colors, range, unit: args.unit, field: field.map(|f| (f.name.clone(), f.on)) };
+    if voxels.voxels() > MOST_VOXELS {
+        let all = grouped(voxels.voxels());
+        return Err(Failure::Usage(format!("{all} voxels are more than fit a file; at most 2^40: fewer --layers, or a smaller --size")));
+    }
+    let range = args.range.or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
+    let materials = field.and_then(materials);
+    if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
+        common.remark(format_args!("{name} does not number materials from 1 to 255; the package has its values over {range:?}"));
+    }
+    let look = Look { colors, range, unit: args.unit, field: field.map(|f| f.name.clone()), materials };
     let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let mut tally = Tally::default();
@@ -127,6 +144,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
+    if tally.inside + tally.touched == 0 {
+        common.remark(format_args!("all voxels are empty: the mesh lies between {lo:?} and {hi:?} beside {:?}", mesh.origin));
+    }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
     let json = json!({
@@ -136,9 +156,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         "peak_bytes": took.peak, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} layers of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
+        "{}: {} of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
         args.output.display(),
-        voxels.layers,
+        counted(voxels.layers.into(), "layer"),
         voxels.size[0],
         voxels.size[1],
         grouped(tally.inside),
@@ -179,17 +199,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-/// Three numbers.
-pub fn vector(text: &str) -> Result<[f64; 3], String> {
-    let numbers: Vec<f64> = text.split(',').map_while(|n| n.trim().parse().ok()).filter(|n: &f64| n.is_finite()).collect();
-    numbers.try_into().map_err(|_| "three numbers, such as 1,0,0.5".into())
-}
-
-/// `LO:HI`.
-fn range(text: &str) -> Result<[f32; 2], String> {
-    let numbers = text.split_once(':').map(|(lo, hi)| (lo.trim().parse::<f32>(), hi.trim().parse::<f32>()));
-    match numbers {
-        Some((Ok(lo), Ok(hi))) if lo <= hi && lo.is_finite() && hi.is_finite() => Ok([lo, hi]),
-        _ => Err("a range is LO:HI, such as 20:350".into()),
-    }
+/// A length.
+fn unit(text: &str) -> Result<f64, String> {
+    text.parse().ok().filter(|&m: &f64| m > 0.0 && m.is_finite()).ok_or_else(|| "metres, above 0, such as 0.001 for millimetres".into())
 }

@@ -2,7 +2,7 @@
 
 use olbvh::error::{Error, Result};
 use olbvh::formats::{Channel, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, write_png};
-use olbvh::mesh::{Mesh, On};
+use olbvh::mesh::{Field, Mesh, On};
 use olbvh::render::TransferFunction;
 use olbvh::slicing::{Band, EMPTY, VoxelGrid};
 use std::path::{Path, PathBuf};
@@ -16,7 +16,16 @@ pub struct Look {
     /// Metres per unit.
     pub unit: f64,
     /// The field, if there is one.
-    pub field: Option<(String, On)>,
+    pub field: Option<String>,
+    /// The materials that it numbers, if it does, for packages.
+    pub materials: Option<Vec<u8>>,
+}
+
+/// The materials that a field numbers: a whole number from 1 to 255 in each cell.
+pub fn materials(field: &Field) -> Option<Vec<u8>> {
+    let number = |&v: &f32| (v.fract() == 0.0 && (1.0..=255.0).contains(&v)).then_some(v as u8);
+    let all: Option<std::collections::BTreeSet<u8>> = field.values.iter().map(number).collect();
+    all.filter(|_| field.on == On::Cells).map(|all| all.into_iter().collect())
 }
 
 impl Look {
@@ -62,14 +71,11 @@ impl<'a> Layers<'a> {
             OutputFormat::Svx => {
                 let along = |axis: [f64; 3]| (0..3).map(|c| axis[c] * origin[c]).sum::<f64>();
                 let corner = [0, 1, 2].map(|i| (along(axes[i]) - spacing[0] * 0.5) * look.unit);
-                let channel = look
-                    .field
-                    .as_ref()
-                    .map(|(_, on)| if *on == On::Cells { Channel::Material((1..=255).collect()) } else { Channel::Custom });
+                let channel = look.field.as_ref().map(|_| look.materials.clone().map_or(Channel::Custom, Channel::Material));
                 let mut metadata = vec![("creator".into(), concat!("olbvh ", env!("CARGO_PKG_VERSION")).into())];
-                if let Some((name, on)) = &look.field {
+                if let Some(name) = &look.field {
                     metadata.push(("field".into(), name.clone()));
-                    if *on == On::Points {
+                    if look.materials.is_none() {
                         metadata.push(("range".into(), format!("{} {}", look.range[0], look.range[1])));
                     }
                 }
@@ -134,10 +140,10 @@ impl<'a> Layers<'a> {
             Target::Package(writer) => {
                 let density: Vec<u8> = kinds.iter().map(|&k| if k == EMPTY { 0 } else { 255 }).collect();
                 let look = &self.look;
-                let second = look.field.as_ref().map(|(_, on)| -> Vec<u8> {
-                    let byte = |(&k, &v): (&u8, &f32)| match (k, on) {
-                        (EMPTY, _) => 0,
-                        (_, On::Cells) => v.round().clamp(0.0, 255.0) as u8,
+                let second = look.field.as_ref().map(|_| -> Vec<u8> {
+                    let byte = |(&k, &v): (&u8, &f32)| match k {
+                        EMPTY => 0,
+                        _ if look.materials.is_some() => v as u8,
                         _ => (look.place(v) * 255.0).round() as u8,
                     };
                     kinds.iter().zip(values).map(byte).collect()
@@ -166,4 +172,19 @@ impl<'a> Layers<'a> {
 fn numbered(path: &Path, i: u32) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-{i:04}.png"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn whole_numbers_of_cells_are_materials() {
+        let of = |on, values: &[f32]| materials(&Field { name: String::new(), on, values: values.to_vec() });
+        assert_eq!(of(On::Cells, &[3.0, 255.0, 1.0, 3.0]), Some(vec![1, 3, 255]));
+        assert_eq!(of(On::Points, &[3.0]), None);
+        for wrong in [0.0, -1.0, 256.0, 1.5, f32::NAN, f32::INFINITY] {
+            assert_eq!(of(On::Cells, &[3.0, wrong]), None, "{wrong}");
+        }
+    }
 }

@@ -48,6 +48,11 @@ pub fn grouped(n: impl Into<u64>) -> String {
     text
 }
 
+/// `1 point`, `2 points`.
+pub fn counted(n: u64, what: &str) -> String {
+    format!("{} {what}{}", grouped(n), if n == 1 { "" } else { "s" })
+}
+
 /// Bytes in the largest binary unit below.
 pub fn bytes(n: u64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
@@ -106,6 +111,7 @@ mod tests {
     #[test]
     fn numbers_read_well() {
         assert_eq!([grouped(0u32), grouped(999u32), grouped(1000u32), grouped(12_290_298u32)], ["0", "999", "1,000", "12,290,298"]);
+        assert_eq!([counted(0, "point"), counted(1, "point"), counted(1200, "point")], ["0 points", "1 point", "1,200 points"]);
         assert_eq!([bytes(12), bytes(1536), bytes(3 << 30)], ["12 B", "1.50 KiB", "3.00 GiB"]);
         assert_eq!([milliseconds(1.26), milliseconds(2345.0), milliseconds(90_000.0)], ["1.3 ms", "2.35 s", "1.5 min"]);
     }

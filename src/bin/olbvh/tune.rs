@@ -43,7 +43,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         return Err(Failure::Usage(format!("--seconds {}; it is a time, up to a million seconds", args.seconds)));
     }
     if let Some(path) = &args.output {
-        output::announce(path, &[OutputFormat::Json])?;
+        output::announce(path, &[OutputFormat::Json], &[])?;
     }
     let gpu = engine::device(common)?;
     let file = args.output.clone().or_else(|| Some(folder()?.join(Profile::file_name(gpu.report()))));
