@@ -6,7 +6,7 @@ mod formats_small;
 
 use formats_small::{POINTS, TETS, all, shared};
 use olbvh::Error;
-use olbvh::formats::{Fate, LoadOptions, Loaded, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::On;
 
 fn open(path: impl AsRef<std::path::Path>) -> Loaded {
@@ -167,4 +167,46 @@ fn content_decides_before_the_name() {
         assert!(matches!(&error, Error::File { .. }) && error.to_string().contains(word), "{name}: {error}");
     }
     assert!(matches!(load(folder.path().join("none.vtu"), &LoadOptions::default()), Err(Error::Io { .. })));
+}
+
+/// Of three pieces, `a` is in the first and the last, there twice with as many components; `b` is in the second.
+#[test]
+fn arrays_of_some_pieces() {
+    let values = |name: &str, values: [i32; 4]| {
+        let text = values.map(|v| v.to_string()).join(" ");
+        format!("<DataArray type=\"Int32\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
+    };
+    let points = "0 0 0 1 0 0 0 1 0 0 0 1";
+    let piece = |arrays: [String; 2]| {
+        format!(
+            "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData>{}</PointData>
+            <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">{points}</DataArray></Points>
+            <Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray>
+            <DataArray type=\"UInt8\" Name=\"types\">10</DataArray></Cells></Piece>",
+            arrays.concat()
+        )
+    };
+    let pieces = [
+        piece([values("a", [0, 1, 2, 3]), values("a", [4, 5, 6, 7])]),
+        piece([values("b", [1, 1, 1, 1]), String::new()]),
+        piece([values("a", [8, 9, 8, 9]), values("a", [7, 6, 7, 6])]),
+    ];
+    let file = format!("<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>", pieces.concat());
+    let apart = LoadOptions { merge_pieces: false, ..LoadOptions::default() };
+    let mesh = load_bytes("three.vtu", file.into_bytes(), &apart).unwrap().mesh;
+    let found: Vec<_> =
+        mesh.fields.iter().map(|f| (f.name.as_str(), f.values.iter().map(|&v| v as i32 - i32::from(v.is_nan())).collect())).collect();
+    let wanted: [(&str, Vec<i32>); 3] = [
+        ("a", vec![0, 1, 2, 3, -1, -1, -1, -1, 8, 9, 8, 9]),
+        ("a (again)", vec![4, 5, 6, 7, -1, -1, -1, -1, 7, 6, 7, 6]),
+        ("b", vec![-1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, -1]),
+    ];
+    assert_eq!(found, wanted);
+}
+
+#[test]
+fn any_expansion_is_an_option() {
+    let (name, bytes) = all().swap_remove(0);
+    let options = LoadOptions { expansion: u64::MAX, ..LoadOptions::default() };
+    assert_eq!(load_bytes(name, bytes, &options).unwrap().mesh.fields.len(), 2);
 }

@@ -1,6 +1,10 @@
 //! Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and element data.
 
+use std::collections::{HashMap, HashSet};
+
+use super::LoadOptions;
 use super::assemble::{Array, Assembly};
+use super::budget::Budget;
 use super::gmsh_data::View;
 use super::gmsh_elements::Elements;
 use super::scalar::Scalar;
@@ -30,12 +34,12 @@ struct Content {
     points: Vec<[f64; 3]>,
     elements: Elements,
     /// First physical group of each volume.
-    groups: Vec<(i64, i64)>,
+    groups: HashMap<i64, i64>,
     views: Vec<View>,
     has: [bool; 2],
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let tokens = Tokens::new(source, 0..source.bytes.len(), None);
     let mut reader = Reader { source, tokens, binary: false, big_endian: false };
     let mut version = None;
@@ -83,6 +87,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         Version::V41 => "4.1",
     };
     let mut assembly = Assembly::new(source, format!("Gmsh {name}, {}", if reader.binary { "binary" } else { "text" }));
+    assembly.padding = Budget::new(source.bytes.len(), options);
     content.assemble(source, &mut assembly)?;
     Ok(assembly)
 }
@@ -119,12 +124,12 @@ impl Content {
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
+        let mut seen = HashSet::new();
         for view in std::mem::take(&mut self.views) {
             let (tags, count) = if view.on == On::Points { (&points, assembly.points.len()) } else { (&cells, self.elements.kinds.len()) };
-            let taken = assembly.arrays.iter().any(|a| a.on == view.on && a.name == view.name);
-            match view.array(tags, count) {
+            match view.array(tags, count, &mut assembly.padding) {
                 Ok(mut array) => {
-                    if taken {
+                    if !seen.insert((view.on, view.name)) {
                         array.name = format!("{} (step {})", array.name, view.step);
                     }
                     assembly.arrays.push(array);
@@ -140,7 +145,7 @@ impl Content {
         let physical: Vec<i64> = if self.groups.is_empty() {
             self.elements.physical.clone()
         } else {
-            let group = |e: &i64| self.groups.iter().find(|(entity, _)| entity == e).map_or(0, |g| g.1);
+            let group = |entity: &i64| self.groups.get(entity).copied().unwrap_or(0);
             self.elements.entities.iter().map(group).collect()
         };
         for (name, marks) in [("gmsh:physical", &physical), ("gmsh:geometrical", &self.elements.entities)] {
@@ -320,7 +325,7 @@ impl Reader<'_> {
     }
 
     /// The first physical group of each volume (4.1).
-    fn entities(&mut self, groups: &mut Vec<(i64, i64)>) -> Result<()> {
+    fn entities(&mut self, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();
         }
@@ -339,7 +344,7 @@ impl Reader<'_> {
                 for i in 0..self.bounded(n, 4, "physical groups")? {
                     let group = self.int("a physical group")?;
                     if i == 0 && dimension == 3 {
-                        groups.push((tag, group));
+                        groups.entry(tag).or_insert(group);
                     }
                 }
                 if dimension > 0 {
