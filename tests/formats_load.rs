@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::{POINTS, TETS, all, shared};
+use formats_small::{POINTS, TETS, all, replace, shared};
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::On;
@@ -167,6 +167,35 @@ fn content_decides_before_the_name() {
         assert!(matches!(&error, Error::File { .. }) && error.to_string().contains(word), "{name}: {error}");
     }
     assert!(matches!(load(folder.path().join("none.vtu"), &LoadOptions::default()), Err(Error::Io { .. })));
+}
+
+fn open_bytes(name: &str, bytes: Vec<u8>) -> Loaded {
+    load_bytes(name, bytes, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The cell field `c` is 0 to 5, here as marks of ghosts.
+#[test]
+fn ghost_cells_are_left_out() {
+    for (name, old, new) in [
+        ("ascii.vtk", "SCALARS c int", "SCALARS GHOST int"),
+        ("binary.vtk", "SCALARS c short", "SCALARS GHOST short"),
+        ("v51.vtk", "SCALARS c int", "SCALARS GHOST int"),
+        ("ascii.vtu", "Name=\"c\"", "Name=\"GHOST\""),
+        ("raw.vtu", "Name=\"c\"", "Name=\"GHOST\""),
+    ] {
+        for (ghost, wanted) in [("vtkGhostType", &[0, 2, 4][..]), ("vtkGhostLevels", &[0])] {
+            let Loaded { mesh, report } = open_bytes(name, replace(name, old.as_bytes(), new.replace("GHOST", ghost).as_bytes()));
+            assert_eq!(mesh.cell_ids.as_deref(), Some(wanted), "{name}: {ghost}");
+            assert_eq!((mesh.source_cells, report.count(Fate::Ghost)), (6, 6 - wanted.len() as u64), "{name}: {ghost}");
+            assert_eq!(mesh.field(ghost).unwrap().values, wanted.iter().map(|&v| v as f32).collect::<Vec<_>>());
+        }
+    }
+}
+
+#[test]
+fn parametric_volumes_are_missed() {
+    let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10", b"CELL_TYPES 6\n55")).report;
+    assert_eq!((report.count(Fate::Unsupported), report.count(Fate::Boundary)), (1, 0), "{report}");
 }
 
 /// Of three pieces, `a` is in the first and the last, there twice with as many components; `b` is in the second.

@@ -350,8 +350,8 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
         let message = format!("the last cell of piece {index} ends at {previous}, but `connectivity` has {} values", connectivity.len());
         return Err(source.error_in("array `offsets`", message));
     }
-    let ghosts = piece.cell_data.iter().find(|a| a.name == "vtkGhostType" && a.components == 1);
-    let mut ghosts = ghosts.map(|a| codec.integers(source, a, Some(piece.cells))).transpose()?;
+    let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
+    let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
@@ -366,7 +366,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
-        if ghosts.as_mut().is_some_and(|g| g.at(cell) & 1 != 0) {
+        if ghosts.as_mut().is_some_and(|(values, marks)| marks(values.at(cell))) {
             assembly.skip("ghost cell", Fate::Ghost);
         } else if let Some((_, kind)) = kind {
             assembly.push(kind, nodes, offset)?;

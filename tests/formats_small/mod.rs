@@ -46,6 +46,14 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
+/// One of the small files with other bytes in the place of some.
+pub fn replace(name: &str, old: &[u8], new: &[u8]) -> Vec<u8> {
+    let mut bytes = all().into_iter().find(|f| f.0 == name).unwrap().1;
+    let at = bytes.windows(old.len()).position(|w| w == old).unwrap();
+    bytes.splice(at..at + old.len(), new.iter().copied());
+    bytes
+}
+
 fn vtu_ascii() -> Vec<u8> {
     let array = |kind: &str, name: &str, n: usize, text: String| {
         format!("<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfComponents=\"{n}\" format=\"ascii\">{text}</DataArray>\n")
