@@ -239,3 +239,24 @@ fn any_expansion_is_an_option() {
     let options = LoadOptions { expansion: u64::MAX, ..LoadOptions::default() };
     assert_eq!(load_bytes(name, bytes, &options).unwrap().mesh.fields.len(), 2);
 }
+
+#[test]
+fn gmsh_names_what_it_does_not_read() {
+    let known = "$Periodic\n0\n$EndPeriodic\n$Comments\n$EndComments\n$PhysicalNames\n0\n$EndPhysicalNames\n";
+    let unknown = "$ElementNodeData\n$EndElementNodeData\n$Odd\n$EndOdd\n$ElementNodeData\n$EndElementNodeData\n";
+    let warnings =
+        |more: &str| open_bytes("more.msh", replace("v22.msh", b"$NodeData", format!("{more}$NodeData").as_bytes())).report.warnings;
+    assert!(warnings(known).is_empty());
+    assert_eq!(warnings(&[known, unknown].concat()), ["sections that are not read: $ElementNodeData, $Odd"]);
+    let empty = "$NodeData\n1\n\"none\"\n0\n3\n0\n9\n0\n$EndNodeData\n";
+    assert_eq!(warnings(empty), ["array `none` is left out: it has no values"]);
+}
+
+#[test]
+fn gmsh_physical_groups_of_4_0() {
+    let (name, bytes) = all().into_iter().find(|f| f.0 == "v40.msh").unwrap();
+    assert_eq!(open_bytes(name, bytes).mesh.field("gmsh:physical").unwrap().values, [11.0; 6]);
+    let Some(folder) = shared("formats") else { return };
+    let mesh = open(folder.join("bracket_5k_40_ascii.msh")).mesh;
+    assert!(mesh.field("gmsh:physical").unwrap().values.iter().all(|&v| v == 11.0));
+}

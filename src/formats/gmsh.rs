@@ -37,6 +37,8 @@ struct Content {
     groups: HashMap<i64, i64>,
     views: Vec<View>,
     has: [bool; 2],
+    /// Sections that are not read, but may matter.
+    skipped: Vec<String>,
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
@@ -66,13 +68,20 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
                 }
                 reader.end(b"$EndElements")?;
             }
-            (b"Entities", Some(Version::V41)) => {
-                reader.entities(&mut content.groups)?;
+            (b"Entities", Some(version @ (Version::V40 | Version::V41))) => {
+                reader.entities(version, &mut content.groups)?;
                 reader.end(b"$EndEntities")?;
             }
             (b"NodeData", Some(_)) => content.views.push(reader.view(On::Points, b"$EndNodeData")?),
             (b"ElementData", Some(_)) => content.views.push(reader.view(On::Cells, b"$EndElementData")?),
-            _ => reader.skip(name, at)?,
+            _ => {
+                let shown = format!("${}", printable(name));
+                let known: [&[u8]; 3] = [b"PhysicalNames", b"Periodic", b"Comments"];
+                if !known.contains(&name) && content.skipped.len() < 12 && !content.skipped.contains(&shown) {
+                    content.skipped.push(shown);
+                }
+                reader.skip(name, at)?;
+            }
         }
     }
     let Some(version) = version else { return Err(source.error("no section $MeshFormat")) };
@@ -88,6 +97,9 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     };
     let mut assembly = Assembly::new(source, format!("Gmsh {name}, {}", if reader.binary { "binary" } else { "text" }));
     assembly.padding = Budget::new(source.bytes.len(), options);
+    if !content.skipped.is_empty() {
+        assembly.warnings.push(format!("sections that are not read: {}", content.skipped.join(", ")));
+    }
     content.assemble(source, &mut assembly)?;
     Ok(assembly)
 }
@@ -324,8 +336,8 @@ impl Reader<'_> {
         Ok([self.real("a coordinate")?, self.real("a coordinate")?, self.real("a coordinate")?])
     }
 
-    /// The first physical group of each volume (4.1).
-    fn entities(&mut self, groups: &mut HashMap<i64, i64>) -> Result<()> {
+    /// The first physical group of each volume.
+    fn entities(&mut self, version: Version, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();
         }
@@ -337,7 +349,8 @@ impl Reader<'_> {
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = self.int("the number of an entity")?;
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                // A point has a box as well in 4.0.
+                for _ in 0..if dimension == 0 && version == Version::V41 { 3 } else { 6 } {
                     self.real("the bounds of an entity")?;
                 }
                 let n = self.long("the number of physical groups")?;
