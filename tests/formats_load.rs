@@ -260,3 +260,23 @@ fn gmsh_physical_groups_of_4_0() {
     let mesh = open(folder.join("bracket_5k_40_ascii.msh")).mesh;
     assert!(mesh.field("gmsh:physical").unwrap().values.iter().all(|&v| v == 11.0));
 }
+
+#[test]
+fn two_sections_of_vertices_are_refused() {
+    let text = replace("text.mesh", b"Tetrahedra", b"Vertices\n1\n0 0 0 0\nTetrahedra");
+    let mut binary = all().into_iter().find(|f| f.0 == "binary.meshb").unwrap().1;
+    // The section of vertices once more, each with the byte where it ends.
+    let (start, end) = (20, 256);
+    let section = binary[start..end].to_vec();
+    let longer = |word: &mut [u8]| {
+        let end = i32::from_le_bytes([word[0], word[1], word[2], word[3]]) + section.len() as i32;
+        word.copy_from_slice(&end.to_le_bytes());
+    };
+    longer(&mut binary[end + 4..end + 8]);
+    longer(&mut binary[start + 4..start + 8]);
+    binary.splice(start..start, section);
+    for (name, bytes) in [("twice.mesh", text), ("twice.meshb", binary)] {
+        let error = load_bytes(name, bytes, &LoadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("a second section Vertices"), "{error}");
+    }
+}
