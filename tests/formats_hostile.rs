@@ -1,7 +1,7 @@
 //! Hostile files: refused or read as `expect.json` says, quickly and without large allocations. One test alone in its process,
 //! because it watches the allocator.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used)] // In helpers of tests as well.
+#![allow(clippy::unwrap_used, clippy::format_push_string, clippy::format_collect)] // In helpers of tests as well; plain is better than fast here.
 #![allow(unsafe_code)] // A global allocator that counts cannot be written otherwise.
 
 mod formats_small;
@@ -12,7 +12,7 @@ use std::time::Instant;
 
 use formats_small::shared;
 use olbvh::Error;
-use olbvh::formats::{Fate, LoadOptions, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
 
 static NOW: AtomicUsize = AtomicUsize::new(0);
 static PEAK: AtomicUsize = AtomicUsize::new(0);
@@ -38,26 +38,126 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
+/// What a file becomes; complaints if that takes long, or more than `times` the memory that a reader may ask for.
+fn watched(
+    name: &str,
+    size: usize,
+    times: usize,
+    broken: &mut Vec<String>,
+    load: impl FnOnce() -> Result<Loaded, Error>,
+) -> Result<Loaded, Error> {
+    PEAK.store(NOW.load(Relaxed), Relaxed);
+    let (before, start) = (NOW.load(Relaxed), Instant::now());
+    let result = load();
+    let (seconds, peak) = (start.elapsed().as_secs_f64(), PEAK.load(Relaxed) - before);
+    if seconds > 5.0 {
+        broken.push(format!("{name}: {seconds:.1} s"));
+    }
+    if peak > times * ((64 << 20) + 100 * size) {
+        broken.push(format!("{name}: {} MiB for {size} bytes", peak >> 20));
+    }
+    result
+}
+
 #[test]
 fn hostile_files() {
+    let mut broken = Vec::new();
+    made_files(&mut broken);
+    shared_files(&mut broken);
+    assert!(broken.is_empty(), "{}", broken.join("\n"));
+}
+
+const ONE: &str = "0 0 0 1 0 0 0 1 0 0 0 1";
+
+/// A `.vtu` of one tetrahedron per piece of four points or more; pieces with fewer have no cells.
+fn vtu(pieces: &[(usize, String, String)]) -> Vec<u8> {
+    let mut text = "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>".to_owned();
+    for (points, point_data, cell_data) in pieces {
+        let positions = if *points < 4 { "0 0 0".repeat(*points) } else { ONE.to_owned() + &" 0 0 0".repeat(points - 4) };
+        text += &format!(
+            "<Piece NumberOfPoints=\"{points}\" NumberOfCells=\"{}\"><PointData>{point_data}</PointData><CellData>{cell_data}</CellData>\
+             <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">{positions}</DataArray></Points>\
+             <Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray>\
+             <DataArray type=\"UInt8\" Name=\"types\">10</DataArray></Cells></Piece>",
+            u8::from(*points >= 4)
+        );
+    }
+    (text + "</UnstructuredGrid></VTKFile>").into_bytes()
+}
+
+/// A Gmsh file with views of nodes: their values, and how many components these have.
+fn msh(points: usize, views: impl Iterator<Item = (String, usize, &'static str)>) -> Vec<u8> {
+    let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{points}\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n");
+    text.extend((5..=points).map(|i| format!("{i} 0 0 0\n")));
+    text += "$EndNodes\n$Elements\n1\n1 4 0 1 2 3 4\n$EndElements\n";
+    for (name, components, values) in views {
+        text += &format!("$NodeData\n1\n\"{name}\"\n0\n3\n0\n{components}\n{}\n{values}\n$EndNodeData\n", values.lines().count());
+    }
+    text.into_bytes()
+}
+
+/// A Gmsh file of so many tetrahedra, each a volume of its own and with a physical group of its own.
+fn volumes(n: usize) -> Vec<u8> {
+    let mut text = format!("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 {n}\n");
+    text.extend((1..=n).map(|i| format!("{i} 0 0 0 1 1 1 1 {} 0\n", 2 * i)));
+    text += &format!("$EndEntities\n$Nodes\n1 4 1 4\n3 1 0 4\n1\n2\n3\n4\n{ONE}\n$EndNodes\n$Elements\n{n} {n} 1 {n}\n");
+    text.extend((1..=n).map(|i| format!("3 {i} 4 1\n{i} 1 2 3 4\n")));
+    (text + "$EndElements\n").into_bytes()
+}
+
+/// A legacy VTK file of one tetrahedron and cell arrays of these names.
+fn vtk(names: impl Iterator<Item = String>) -> Vec<u8> {
+    let arrays: Vec<String> = names.map(|name| format!("{name} 1 1 int 7\n")).collect();
+    let head = format!(
+        "# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 int\n{ONE}\nCELLS 1 5\n4 0 1 2 3\nCELL_TYPES 1\n10\n"
+    );
+    format!("{head}CELL_DATA 1\nFIELD F {}\n{}", arrays.len(), arrays.concat()).into_bytes()
+}
+
+/// Files that once took time or memory with the square of their size. Arrays that need more NaN than the file allows are left out.
+fn made_files(broken: &mut Vec<String>) {
+    let array = |i: usize, components: usize| {
+        let values = "7 ".repeat(components);
+        format!("<DataArray type=\"Int32\" Name=\"a{i:06}\" NumberOfComponents=\"{components}\">{values}</DataArray>")
+    };
+    let first = (50_000, String::new(), String::new());
+    let pieces: Vec<_> = std::iter::once(first).chain((0..500).map(|i| (1, array(i, 9), String::new()))).collect();
+    let arrays: String = (0..100_000).map(|i| array(i, 1)).collect();
+    let view = |i: usize| format!("v{i:06}");
+    let many = 100_000;
+    let files = [
+        ("pieces.vtu", vtu(&pieces), None),
+        ("arrays.vtu", vtu(&[(4, String::new(), arrays)]), Some(many)),
+        ("empty_views.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, ""))), Some(0)),
+        ("views_of_one.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, "1 1 2 3 4 5 6 7 8 9"))), None),
+        ("views.msh", msh(4, (0..many).map(|i| (view(i), 1, "1 1"))), Some(many)),
+        ("volumes.msh", volumes(200_000), Some(2)),
+        ("names.vtk", vtk((0..many).map(view)), Some(many)),
+        ("name.vtk", vtk((0..many).map(|_| "a".into())), Some(many)),
+    ];
+    for (name, bytes, wanted) in files {
+        let loaded = watched(name, bytes.len(), 3, broken, || load_bytes(name, bytes, &LoadOptions::default()));
+        let Loaded { mesh, report } = loaded.unwrap_or_else(|e| panic!("{e}"));
+        let fields = mesh.fields.len();
+        match wanted {
+            Some(wanted) if fields != wanted => broken.push(format!("{name}: {fields} fields, not {wanted}")),
+            None if fields == 0 || !report.warnings.iter().any(|w| w.contains("times the size of the file")) => {
+                broken.push(format!("{name}: {fields} fields, and no word of the others"));
+            }
+            _ => {}
+        }
+    }
+}
+
+fn shared_files(broken: &mut Vec<String>) {
     let Some(root) = shared("hostile") else { return };
     let expected: serde_json::Value = serde_json::from_slice(&std::fs::read(root.join("expect.json")).unwrap()).unwrap();
     let expected = expected.as_object().unwrap();
-    let mut broken = Vec::new();
     for (name, expect) in expected {
         let path = root.join(name);
         let size = std::fs::metadata(&path).unwrap().len() as usize;
-        PEAK.store(NOW.load(Relaxed), Relaxed);
-        let (before, start) = (NOW.load(Relaxed), Instant::now());
-        let result = load(&path, &LoadOptions::default());
-        let (seconds, peak) = (start.elapsed().as_secs_f64(), PEAK.load(Relaxed) - before);
+        let result = watched(name, size, 1, broken, || load(&path, &LoadOptions::default()));
         let mut complain = |what: String| broken.push(format!("{name}: {what}"));
-        if seconds > 5.0 {
-            complain(format!("{seconds:.1} s"));
-        }
-        if peak > (64 << 20) + 100 * size {
-            complain(format!("{} MiB for {size} bytes", peak >> 20));
-        }
         let want = expect["expect"].as_str().unwrap();
         match result {
             Ok(_) if want == "error" => complain("accepted".into()),
@@ -87,5 +187,4 @@ fn hostile_files() {
             }
         }
     }
-    assert!(broken.is_empty(), "{} of {}:\n{}", broken.len(), expected.len(), broken.join("\n"));
 }

@@ -4,9 +4,9 @@
 
 mod formats_small;
 
-use formats_small::{POINTS, TETS, all, shared};
+use formats_small::{POINTS, TETS, all, replace, shared};
 use olbvh::Error;
-use olbvh::formats::{Fate, LoadOptions, Loaded, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::On;
 
 fn open(path: impl AsRef<std::path::Path>) -> Loaded {
@@ -167,4 +167,116 @@ fn content_decides_before_the_name() {
         assert!(matches!(&error, Error::File { .. }) && error.to_string().contains(word), "{name}: {error}");
     }
     assert!(matches!(load(folder.path().join("none.vtu"), &LoadOptions::default()), Err(Error::Io { .. })));
+}
+
+fn open_bytes(name: &str, bytes: Vec<u8>) -> Loaded {
+    load_bytes(name, bytes, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+/// The cell field `c` is 0 to 5, here as marks of ghosts.
+#[test]
+fn ghost_cells_are_left_out() {
+    for (name, old, new) in [
+        ("ascii.vtk", "SCALARS c int", "SCALARS GHOST int"),
+        ("binary.vtk", "SCALARS c short", "SCALARS GHOST short"),
+        ("v51.vtk", "SCALARS c int", "SCALARS GHOST int"),
+        ("ascii.vtu", "Name=\"c\"", "Name=\"GHOST\""),
+        ("raw.vtu", "Name=\"c\"", "Name=\"GHOST\""),
+    ] {
+        for (ghost, wanted) in [("vtkGhostType", &[0, 2, 4][..]), ("vtkGhostLevels", &[0])] {
+            let Loaded { mesh, report } = open_bytes(name, replace(name, old.as_bytes(), new.replace("GHOST", ghost).as_bytes()));
+            assert_eq!(mesh.cell_ids.as_deref(), Some(wanted), "{name}: {ghost}");
+            assert_eq!((mesh.source_cells, report.count(Fate::Ghost)), (6, 6 - wanted.len() as u64), "{name}: {ghost}");
+            assert_eq!(mesh.field(ghost).unwrap().values, wanted.iter().map(|&v| v as f32).collect::<Vec<_>>());
+        }
+    }
+}
+
+#[test]
+fn parametric_volumes_are_missed() {
+    let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10", b"CELL_TYPES 6\n55")).report;
+    assert_eq!((report.count(Fate::Unsupported), report.count(Fate::Boundary)), (1, 0), "{report}");
+}
+
+/// Of three pieces, `a` is in the first and the last, there twice with as many components; `b` is in the second.
+#[test]
+fn arrays_of_some_pieces() {
+    let values = |name: &str, values: [i32; 4]| {
+        let text = values.map(|v| v.to_string()).join(" ");
+        format!("<DataArray type=\"Int32\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
+    };
+    let points = "0 0 0 1 0 0 0 1 0 0 0 1";
+    let piece = |arrays: [String; 2]| {
+        format!(
+            "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData>{}</PointData>
+            <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">{points}</DataArray></Points>
+            <Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray>
+            <DataArray type=\"UInt8\" Name=\"types\">10</DataArray></Cells></Piece>",
+            arrays.concat()
+        )
+    };
+    let pieces = [
+        piece([values("a", [0, 1, 2, 3]), values("a", [4, 5, 6, 7])]),
+        piece([values("b", [1, 1, 1, 1]), String::new()]),
+        piece([values("a", [8, 9, 8, 9]), values("a", [7, 6, 7, 6])]),
+    ];
+    let file = format!("<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>", pieces.concat());
+    let apart = LoadOptions { merge_pieces: false, ..LoadOptions::default() };
+    let mesh = load_bytes("three.vtu", file.into_bytes(), &apart).unwrap().mesh;
+    let found: Vec<_> =
+        mesh.fields.iter().map(|f| (f.name.as_str(), f.values.iter().map(|&v| v as i32 - i32::from(v.is_nan())).collect())).collect();
+    let wanted: [(&str, Vec<i32>); 3] = [
+        ("a", vec![0, 1, 2, 3, -1, -1, -1, -1, 8, 9, 8, 9]),
+        ("a (again)", vec![4, 5, 6, 7, -1, -1, -1, -1, 7, 6, 7, 6]),
+        ("b", vec![-1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, -1]),
+    ];
+    assert_eq!(found, wanted);
+}
+
+#[test]
+fn any_expansion_is_an_option() {
+    let (name, bytes) = all().swap_remove(0);
+    let options = LoadOptions { expansion: u64::MAX, ..LoadOptions::default() };
+    assert_eq!(load_bytes(name, bytes, &options).unwrap().mesh.fields.len(), 2);
+}
+
+#[test]
+fn gmsh_names_what_it_does_not_read() {
+    let known = "$Periodic\n0\n$EndPeriodic\n$Comments\n$EndComments\n$PhysicalNames\n0\n$EndPhysicalNames\n";
+    let unknown = "$ElementNodeData\n$EndElementNodeData\n$Odd\n$EndOdd\n$ElementNodeData\n$EndElementNodeData\n";
+    let warnings =
+        |more: &str| open_bytes("more.msh", replace("v22.msh", b"$NodeData", format!("{more}$NodeData").as_bytes())).report.warnings;
+    assert!(warnings(known).is_empty());
+    assert_eq!(warnings(&[known, unknown].concat()), ["sections that are not read: $ElementNodeData, $Odd"]);
+    let empty = "$NodeData\n1\n\"none\"\n0\n3\n0\n9\n0\n$EndNodeData\n";
+    assert_eq!(warnings(empty), ["array `none` is left out: it has no values"]);
+}
+
+#[test]
+fn gmsh_physical_groups_of_4_0() {
+    let (name, bytes) = all().into_iter().find(|f| f.0 == "v40.msh").unwrap();
+    assert_eq!(open_bytes(name, bytes).mesh.field("gmsh:physical").unwrap().values, [11.0; 6]);
+    let Some(folder) = shared("formats") else { return };
+    let mesh = open(folder.join("bracket_5k_40_ascii.msh")).mesh;
+    assert!(mesh.field("gmsh:physical").unwrap().values.iter().all(|&v| v == 11.0));
+}
+
+#[test]
+fn two_sections_of_vertices_are_refused() {
+    let text = replace("text.mesh", b"Tetrahedra", b"Vertices\n1\n0 0 0 0\nTetrahedra");
+    let mut binary = all().into_iter().find(|f| f.0 == "binary.meshb").unwrap().1;
+    // The section of vertices once more, each with the byte where it ends.
+    let (start, end) = (20, 256);
+    let section = binary[start..end].to_vec();
+    let longer = |word: &mut [u8]| {
+        let end = i32::from_le_bytes([word[0], word[1], word[2], word[3]]) + section.len() as i32;
+        word.copy_from_slice(&end.to_le_bytes());
+    };
+    longer(&mut binary[end + 4..end + 8]);
+    longer(&mut binary[start + 4..start + 8]);
+    binary.splice(start..start, section);
+    for (name, bytes) in [("twice.mesh", text), ("twice.meshb", binary)] {
+        let error = load_bytes(name, bytes, &LoadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("a second section Vertices"), "{error}");
+    }
 }

@@ -88,6 +88,7 @@ fn tables_of_points() {
         "\u{feff}x;y;z\n1;2,5;-3\n4;5;6e3\n",
         "id,\"Z\",\"X\",\"Y\"\n7,-3,1,2.5\n8,6e3,4,5\n",
         "Points:0,Points:1,Points:2,v\n1,2.5,-3,0\n4,5,6e3,0\n",
+        "v,Points_0,Points_1,Points_2\n0,1,2.5,-3\n0,4,5,6e3\n",
     ] {
         std::fs::write(&path, text).unwrap();
         assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");

@@ -1,7 +1,8 @@
 //! From the points, cells and arrays of a file to a [`Mesh`] and its [`Report`]: what all formats share.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
+use super::budget::Budget;
 use super::cells::{CellType, Shape, split};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, printable};
@@ -17,6 +18,52 @@ pub(crate) struct Array {
     pub values: Vec<f32>,
 }
 
+impl Array {
+    /// Fills it up to `tuples` with NaN where it is shorter; an error that tells the limit where the budget does not allow that.
+    pub fn fill(&mut self, tuples: usize, budget: &mut Budget) -> Result<(), String> {
+        let wanted = tuples * self.components;
+        let missing = wanted.saturating_sub(self.values.len());
+        budget.spend((missing * size_of::<f32>()) as u64)?;
+        if missing > 0 {
+            self.values.resize(wanted, f32::NAN);
+        }
+        Ok(())
+    }
+
+    /// What the names of its fields have behind its own.
+    fn suffixes(&self) -> &'static [&'static str] {
+        match self.components {
+            1 => &[""],
+            3 => &["", ".x", ".y", ".z"],
+            n => &[".0", ".1", ".2", ".3", ".4", ".5", ".6", ".7", ".8"][..n],
+        }
+    }
+}
+
+/// The names that fields have so far.
+#[derive(Default)]
+struct Names {
+    taken: HashSet<String>,
+    /// How many names were tried in place of one, so that many arrays of one name do not try the same ones.
+    tried: HashMap<(String, On), usize>,
+}
+
+impl Names {
+    /// A name for an array: its own, unless a field has that of one of its fields.
+    fn free(&mut self, array: &Array) -> String {
+        let fields = |name: &str| array.suffixes().iter().map(|suffix| format!("{name}{suffix}")).collect::<Vec<_>>();
+        let mut name = array.name.clone();
+        while fields(&name).iter().any(|field| self.taken.contains(field)) {
+            let word = if array.on == On::Cells { "cells" } else { "again" };
+            let tried = self.tried.entry((array.name.clone(), array.on)).or_default();
+            *tried += 1;
+            name = if *tried == 1 { format!("{} ({word})", array.name) } else { format!("{} ({word} {tried})", array.name) };
+        }
+        self.taken.extend(fields(&name));
+        name
+    }
+}
+
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, [`finish`](Assembly::finish).
 pub(crate) struct Assembly<'a> {
     source: &'a Source,
@@ -28,6 +75,8 @@ pub(crate) struct Assembly<'a> {
     pub first_point: i64,
     pub arrays: Vec<Array>,
     pub warnings: Vec<String>,
+    /// For the NaN of arrays that do not cover the mesh.
+    pub padding: Budget,
     tets: Vec<[u32; 4]>,
     /// Cell of each tetrahedron.
     ids: Vec<u32>,
@@ -49,6 +98,7 @@ impl<'a> Assembly<'a> {
             first_point: 0,
             arrays: Vec::new(),
             warnings: Vec::new(),
+            padding: Budget::default(),
             tets: Vec::new(),
             ids: Vec::new(),
             n_cells: 0,
@@ -243,11 +293,17 @@ impl<'a> Assembly<'a> {
     /// Arrays become scalar fields; those of cells get one value per tetrahedron.
     fn fields(&mut self) -> Vec<Field> {
         let mut fields = Vec::new();
+        let mut names = Names::default();
         for mut array in std::mem::take(&mut self.arrays) {
             let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
             let shown = printable(array.name.as_bytes());
-            if array.components == 0 || array.components > 9 || array.values.len() != count * array.components {
+            if array.components == 0 || array.components > 9 {
                 self.warnings.push(format!("array `{shown}` is left out: {} components", array.components));
+                continue;
+            }
+            let wanted = count * array.components;
+            if array.values.len() != wanted {
+                self.warnings.push(format!("array `{shown}` is left out: {} values instead of {wanted}", array.values.len()));
                 continue;
             }
             let odd = array.values.iter().filter(|v| !v.is_finite()).count();
@@ -255,30 +311,22 @@ impl<'a> Assembly<'a> {
                 array.values.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = f32::NAN);
                 self.warnings.push(format!("array `{shown}`: {odd} of {} values are not finite in single precision", array.values.len()));
             }
-            if fields.iter().any(|f: &Field| f.name == array.name) {
-                let taken = array.name.clone();
-                array.name.push_str(if array.on == On::Cells { " (cells)" } else { " (again)" });
-                self.warnings.push(format!(
-                    "a second array `{}` is called `{}`",
-                    printable(taken.as_bytes()),
-                    printable(array.name.as_bytes())
-                ));
+            let name = names.free(&array);
+            if name != array.name {
+                self.warnings.push(format!("another array `{shown}` is called `{}`", printable(name.as_bytes())));
             }
             let ids = self.ids.iter().map(|&id| id as usize);
             let spread = |values: Vec<f32>| if array.on == On::Cells { ids.clone().map(|id| values[id]).collect() } else { values };
             if array.components == 1 {
-                fields.push(Field { name: array.name, on: array.on, values: spread(array.values) });
+                fields.push(Field { name, on: array.on, values: spread(array.values) });
                 continue;
             }
             let tuples = || array.values.chunks_exact(array.components);
-            if array.components == 3 {
-                let length = |v: &[f32]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt() as f32;
-                fields.push(Field { name: array.name.clone(), on: array.on, values: spread(tuples().map(length).collect()) });
-            }
-            for c in 0..array.components {
-                let suffix = if array.components == 3 { ["x", "y", "z"][c].to_owned() } else { c.to_string() };
-                let values = spread(tuples().map(|v| v[c]).collect());
-                fields.push(Field { name: format!("{}.{suffix}", array.name), on: array.on, values });
+            let length = |v: &[f32]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt() as f32;
+            let lengths = (array.components == 3).then(|| tuples().map(length).collect());
+            let parts = (0..array.components).map(|c| tuples().map(|v| v[c]).collect());
+            for (suffix, values) in array.suffixes().iter().zip(lengths.into_iter().chain(parts)) {
+                fields.push(Field { name: format!("{name}{suffix}"), on: array.on, values: spread(values) });
             }
         }
         fields
@@ -296,12 +344,17 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
 
 /// Meshes of several pieces.
 impl Assembly<'_> {
-    /// Arrays that the piece read last does not have get NaN there.
+    /// Arrays get NaN for the pieces that do not have them; those that would take too much of it are left out.
     pub fn complete_arrays(&mut self) {
-        for array in &mut self.arrays {
+        self.arrays.retain_mut(|array| {
             let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
-            array.values.resize(count * array.components, f32::NAN);
-        }
+            let filled = array.fill(count, &mut self.padding);
+            if let Err(limit) = &filled {
+                let name = printable(array.name.as_bytes());
+                self.warnings.push(format!("array `{name}` is left out: few pieces have it, and NaN for the others would take {limit}"));
+            }
+            filled.is_ok()
+        });
     }
 
     /// Lets the cells of later pieces use the points of earlier ones where coordinates are equal, so that the seam between pieces
@@ -345,5 +398,51 @@ impl Assembly<'_> {
         }
         self.tets.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
         self.warnings.push(format!("{} pieces; {merged} points they share are joined", starts.len()));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Arrays of a mesh of one tetrahedron: the fields they become, and the warnings.
+    fn finish(arrays: &[(&str, On, usize, usize)]) -> (Vec<String>, Vec<String>) {
+        let source = Source::new("one".as_ref(), Vec::new());
+        let mut assembly = Assembly::new(&source, "one tetrahedron".into());
+        assembly.points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assembly.push(super::super::cells::vtk(10).unwrap(), &[0, 1, 2, 3], 0).unwrap();
+        for &(name, on, components, values) in arrays {
+            assembly.arrays.push(Array { name: name.into(), on, components, values: vec![0.0; values] });
+        }
+        let (mesh, report) = assembly.finish().unwrap();
+        (mesh.fields.into_iter().map(|f| f.name).collect(), report.warnings)
+    }
+
+    #[test]
+    fn no_two_fields_have_one_name() {
+        let (points, cells) = (On::Points, On::Cells);
+        let arrays = [
+            ("a", points, 1, 4),
+            ("a", points, 1, 4),
+            ("a", cells, 1, 1),
+            ("a", points, 1, 4),
+            ("a", cells, 1, 1),
+            ("a (again)", points, 1, 4),
+        ];
+        let (names, warnings) = finish(&arrays);
+        assert_eq!(names, ["a", "a (again)", "a (cells)", "a (again 2)", "a (cells 2)", "a (again) (again)"]);
+        assert_eq!((warnings.len(), warnings[2].as_str()), (5, "another array `a` is called `a (again 2)`"));
+        let (names, _) = finish(&[("v.y", points, 1, 4), ("v", points, 3, 12), ("v", cells, 2, 2), ("v", cells, 2, 2)]);
+        let others = ["v (again)", "v (again).x", "v (again).y", "v (again).z", "v.0", "v.1", "v (cells).0", "v (cells).1"];
+        assert_eq!(names, [&["v.y"][..], &others].concat());
+    }
+
+    #[test]
+    fn arrays_left_out_say_why() {
+        let (names, warnings) = finish(&[("short", On::Points, 3, 11), ("wide", On::Cells, 10, 10), ("none", On::Cells, 0, 0)]);
+        let wanted =
+            ["`short` is left out: 11 values instead of 12", "`wide` is left out: 10 components", "`none` is left out: 0 components"];
+        assert!(names.is_empty());
+        assert_eq!(warnings, wanted.map(|w| format!("array {w}")));
     }
 }

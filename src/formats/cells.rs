@@ -155,14 +155,23 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
         37 => cell("triquadratic pyramid", Pyramid, 19),
         41 => cell("convex point set", Other, 0),
         42 => cell("polyhedron", Other, 0),
-        51..=55 | 60..=63 | 68..=70 | 75..=77 => cell("higher-order line or surface", Flat, 0),
-        56..=59 => cell("parametric volume", Other, 0),
+        51..=54 | 60..=63 | 68..=70 | 75..=77 => cell("higher-order line or surface", Flat, 0),
+        55..=59 => cell("parametric volume", Other, 0),
         64 | 71 | 78 => cell("higher-order tetrahedron", Tetrahedron, 0),
         65 | 73 | 80 => cell("higher-order wedge", Wedge, 0),
         66 | 74 | 81 => cell("higher-order pyramid", Pyramid, 0),
         67 | 72 | 79 => cell("higher-order hexahedron", Hexahedron, 0),
         _ => return None,
     })
+}
+
+/// What values of a cell array of that name mark ghosts: copies of cells of a neighbouring piece. Older VTK counted levels of them.
+pub(crate) fn ghost(array: &str) -> Option<fn(i64) -> bool> {
+    match array {
+        "vtkGhostType" => Some(|bits| bits & 1 != 0),
+        "vtkGhostLevels" => Some(|level| level > 0),
+        _ => None,
+    }
 }
 
 /// The cell type of a Gmsh element number.

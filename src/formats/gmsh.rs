@@ -1,6 +1,10 @@
 //! Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and element data.
 
+use std::collections::{HashMap, HashSet};
+
+use super::LoadOptions;
 use super::assemble::{Array, Assembly};
+use super::budget::Budget;
 use super::gmsh_data::View;
 use super::gmsh_elements::Elements;
 use super::scalar::Scalar;
@@ -30,12 +34,14 @@ struct Content {
     points: Vec<[f64; 3]>,
     elements: Elements,
     /// First physical group of each volume.
-    groups: Vec<(i64, i64)>,
+    groups: HashMap<i64, i64>,
     views: Vec<View>,
     has: [bool; 2],
+    /// Sections that are not read, but may matter.
+    skipped: Vec<String>,
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let tokens = Tokens::new(source, 0..source.bytes.len(), None);
     let mut reader = Reader { source, tokens, binary: false, big_endian: false };
     let mut version = None;
@@ -62,13 +68,20 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
                 }
                 reader.end(b"$EndElements")?;
             }
-            (b"Entities", Some(Version::V41)) => {
-                reader.entities(&mut content.groups)?;
+            (b"Entities", Some(version @ (Version::V40 | Version::V41))) => {
+                reader.entities(version, &mut content.groups)?;
                 reader.end(b"$EndEntities")?;
             }
             (b"NodeData", Some(_)) => content.views.push(reader.view(On::Points, b"$EndNodeData")?),
             (b"ElementData", Some(_)) => content.views.push(reader.view(On::Cells, b"$EndElementData")?),
-            _ => reader.skip(name, at)?,
+            _ => {
+                let shown = format!("${}", printable(name));
+                let known: [&[u8]; 3] = [b"PhysicalNames", b"Periodic", b"Comments"];
+                if !known.contains(&name) && content.skipped.len() < 12 && !content.skipped.contains(&shown) {
+                    content.skipped.push(shown);
+                }
+                reader.skip(name, at)?;
+            }
         }
     }
     let Some(version) = version else { return Err(source.error("no section $MeshFormat")) };
@@ -83,6 +96,10 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         Version::V41 => "4.1",
     };
     let mut assembly = Assembly::new(source, format!("Gmsh {name}, {}", if reader.binary { "binary" } else { "text" }));
+    assembly.padding = Budget::new(source.bytes.len(), options);
+    if !content.skipped.is_empty() {
+        assembly.warnings.push(format!("sections that are not read: {}", content.skipped.join(", ")));
+    }
     content.assemble(source, &mut assembly)?;
     Ok(assembly)
 }
@@ -119,12 +136,12 @@ impl Content {
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
+        let mut seen = HashSet::new();
         for view in std::mem::take(&mut self.views) {
             let (tags, count) = if view.on == On::Points { (&points, assembly.points.len()) } else { (&cells, self.elements.kinds.len()) };
-            let taken = assembly.arrays.iter().any(|a| a.on == view.on && a.name == view.name);
-            match view.array(tags, count) {
+            match view.array(tags, count, &mut assembly.padding) {
                 Ok(mut array) => {
-                    if taken {
+                    if !seen.insert((view.on, view.name)) {
                         array.name = format!("{} (step {})", array.name, view.step);
                     }
                     assembly.arrays.push(array);
@@ -140,7 +157,7 @@ impl Content {
         let physical: Vec<i64> = if self.groups.is_empty() {
             self.elements.physical.clone()
         } else {
-            let group = |e: &i64| self.groups.iter().find(|(entity, _)| entity == e).map_or(0, |g| g.1);
+            let group = |entity: &i64| self.groups.get(entity).copied().unwrap_or(0);
             self.elements.entities.iter().map(group).collect()
         };
         for (name, marks) in [("gmsh:physical", &physical), ("gmsh:geometrical", &self.elements.entities)] {
@@ -319,8 +336,8 @@ impl Reader<'_> {
         Ok([self.real("a coordinate")?, self.real("a coordinate")?, self.real("a coordinate")?])
     }
 
-    /// The first physical group of each volume (4.1).
-    fn entities(&mut self, groups: &mut Vec<(i64, i64)>) -> Result<()> {
+    /// The first physical group of each volume.
+    fn entities(&mut self, version: Version, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();
         }
@@ -332,14 +349,15 @@ impl Reader<'_> {
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = self.int("the number of an entity")?;
-                for _ in 0..if dimension == 0 { 3 } else { 6 } {
+                // A point has a box as well in 4.0.
+                for _ in 0..if dimension == 0 && version == Version::V41 { 3 } else { 6 } {
                     self.real("the bounds of an entity")?;
                 }
                 let n = self.long("the number of physical groups")?;
                 for i in 0..self.bounded(n, 4, "physical groups")? {
                     let group = self.int("a physical group")?;
                     if i == 0 && dimension == 3 {
-                        groups.push((tag, group));
+                        groups.entry(tag).or_insert(group);
                     }
                 }
                 if dimension > 0 {

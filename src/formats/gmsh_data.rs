@@ -1,6 +1,7 @@
 //! `$NodeData` and `$ElementData` of Gmsh files.
 
 use super::assemble::Array;
+use super::budget::Budget;
 use super::gmsh::Reader;
 use super::source::printable;
 use super::tags::Tags;
@@ -20,17 +21,21 @@ pub(crate) struct View {
 
 impl View {
     /// One value per point or cell; NaN where the file gives none. `Err` is a warning: values for something that does not exist
-    /// (renumbered meshes have them) are no reason to refuse the mesh.
-    pub fn array(&self, tags: &Tags, count: usize) -> Result<Array, String> {
+    /// (renumbered meshes have them) are no reason to refuse the mesh. `padding`: for the NaN.
+    pub fn array(&self, tags: &Tags, count: usize, padding: &mut Budget) -> Result<Array, String> {
+        let left_out = |why: String| format!("array `{}` is left out: {why}", printable(self.name.as_bytes()));
+        if self.tags.is_empty() {
+            return Err(left_out("it has no values".into()));
+        }
+        let what = if self.on == On::Points { "node" } else { "element" };
         let n = self.components;
+        let missing = (n * count).saturating_sub(self.values.len());
+        let refused = |limit: String| left_out(format!("few {what}s have a value, and NaN for the others would take {limit}"));
+        padding.spend((missing * size_of::<f32>()) as u64).map_err(refused)?;
         let mut values = vec![f32::NAN; n * count];
         for (&tag, tuple) in self.tags.iter().zip(self.values.chunks_exact(n.max(1))) {
             let found = tags.get(tag).and_then(|i| values.get_mut(i as usize * n..(i as usize + 1) * n));
-            let what = if self.on == On::Points { "node" } else { "element" };
-            let slot = found.ok_or_else(|| {
-                let name = printable(self.name.as_bytes());
-                format!("array `{name}` is left out: it has a value for {what} {tag}, which does not exist")
-            })?;
+            let slot = found.ok_or_else(|| left_out(format!("it has a value for {what} {tag}, which does not exist")))?;
             slot.copy_from_slice(tuple);
         }
         Ok(Array { name: self.name.clone(), on: self.on, components: n, values })

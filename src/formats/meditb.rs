@@ -40,6 +40,9 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
                 return Err(source.error_byte(start, format!("a mesh of dimension {n}, not 3")));
             }
         } else if keyword == VERTICES {
+            if content.points.is_some() {
+                return Err(source.error_byte(start, "a second section Vertices"));
+            }
             let (float, int) = (if reader.version == 1 { Scalar::F32 } else { Scalar::F64 }, reader.int());
             let n = reader.count(3 * float.size() + int.size())?;
             let mut points = Vec::with_capacity(n);

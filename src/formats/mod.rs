@@ -11,6 +11,7 @@
 //! the file before they allocate.
 
 mod assemble;
+mod budget;
 mod cells;
 mod detect;
 mod gmsh;
@@ -52,7 +53,8 @@ pub use write::{
 pub struct LoadOptions {
     /// Points of different pieces of one file with equal coordinates become one (default), so that the seams are no boundary.
     pub merge_pieces: bool,
-    /// Compressed arrays may unpack to this many times the size of the file (and 64 MiB); more is refused. Default 100.
+    /// Compressed arrays may unpack to this many times the size of the file (and 64 MiB); more is refused. Arrays that do not cover the mesh
+    /// may be filled up with as much NaN; those that need more are left out. Default 100.
     pub expansion: u64,
 }
 
@@ -100,7 +102,7 @@ fn read(source: &Source, options: &LoadOptions, start: Instant) -> Result<Loaded
     let assembly = match detect::detect(source)? {
         Format::VtkXml => vtu::read(source, options)?,
         Format::VtkLegacy => vtk::read(source)?,
-        Format::Gmsh => gmsh::read(source)?,
+        Format::Gmsh => gmsh::read(source, options)?,
         Format::Medit => medit::read(source)?,
         Format::MeditBinary => meditb::read(source)?,
         Format::TetGen => {

@@ -89,7 +89,9 @@ fn choose(fields: &[&[u8]], numbers: bool) -> Option<[usize; 3]> {
         });
         Some([at[0]?, at[1]?, at[2]?])
     };
-    let named = if numbers { None } else { find(["x", "y", "z"]).or_else(|| find(["Points:0", "Points:1", "Points:2"])) };
+    // The latter two are ParaView's, of different versions.
+    let names = [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]];
+    let named = if numbers { None } else { names.into_iter().find_map(find) };
     named.or_else(|| (fields.len() == 3).then_some([0, 1, 2]))
 }
 

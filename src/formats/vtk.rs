@@ -3,6 +3,7 @@
 use super::assemble::{Array, Assembly};
 use super::cells;
 use super::integers::Integers;
+use super::report::Fate;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
 use crate::error::Result;
@@ -70,14 +71,21 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
     if types.len() != cells.count {
         return Err(source.error(format!("CELL_TYPES has {} entries, CELLS has {}", types.len(), cells.count)));
     }
+    let marks = |a: &Array| cells::ghost(&a.name).filter(|_| a.on == On::Cells && a.components == 1);
+    let ghosts = assembly.arrays.iter().find_map(|a| Some((a, marks(a)?)));
+    let ghosts: Vec<bool> = ghosts.map_or_else(Vec::new, |(a, marks)| a.values.iter().map(|&v| marks(v as i64)).collect());
     assembly.reserve(types.len());
     let mut end = 0;
     for cell in 0..cells.count {
         let number = types.at(cell);
         let kind = cells::vtk(number);
         let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
-        // A polyhedron's entry lists its faces, not its points.
         let nodes = cells.nodes(cell, &mut end);
+        if ghosts.get(cell) == Some(&true) {
+            assembly.skip("ghost cell", Fate::Ghost);
+            continue;
+        }
+        // A polyhedron's entry lists its faces, not its points.
         assembly.push(kind, if number == 42 { &[] } else { nodes }, 0)?;
     }
     for array in &assembly.arrays {
@@ -120,7 +128,7 @@ impl<'a> Reader<'a> {
         Ok(format!("VTK legacy unstructured grid {version}, {}", if self.binary { "binary" } else { "text" }))
     }
 
-    /// A number type, and whether it is the 1-bit one.
+    /// A number type; `None`: bits.
     fn scalar(&mut self) -> Result<Option<Scalar>> {
         let (word, at) = self.tokens.word("a number type")?;
         let name = String::from_utf8_lossy(word).to_ascii_lowercase();

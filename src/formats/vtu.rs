@@ -1,6 +1,7 @@
 //! VTK XML unstructured grids (`.vtu`), version 0.1 to 2.x: the XML skeleton. The arrays themselves: `vtu_data`.
 
 use std::borrow::Cow;
+use std::collections::HashMap;
 use std::ops::Range;
 
 use quick_xml::Reader;
@@ -8,6 +9,7 @@ use quick_xml::events::{BytesStart, Event};
 
 use super::LoadOptions;
 use super::assemble::{Array, Assembly};
+use super::budget::Budget;
 use super::cells::{self, CellType};
 use super::report::Fate;
 use super::scalar::Scalar;
@@ -40,14 +42,17 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let text = head(source);
     let skeleton = Parser { source, reader: Reader::from_str(&text), stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
     let mut codec = skeleton.codec;
-    codec.set_budget(source.bytes.len(), options.expansion);
+    codec.budget = Budget::new(source.bytes.len(), options);
     let mut assembly = Assembly::new(source, skeleton.format);
+    assembly.padding = Budget::new(source.bytes.len(), options);
+    let mut places = Places::new();
     let n_pieces = skeleton.pieces.len();
     let mut starts = Vec::with_capacity(n_pieces);
     for (i, piece) in skeleton.pieces.iter().enumerate() {
         starts.push(assembly.points.len());
-        read_piece(source, &mut codec, &mut assembly, piece, i)?;
+        read_piece(source, &mut codec, &mut assembly, &mut places, piece, i)?;
     }
+    assembly.complete_arrays();
     if n_pieces > 1 && options.merge_pieces {
         assembly.merge_pieces(&starts);
     }
@@ -259,7 +264,20 @@ fn get<'s>(attributes: &'s [(String, String)], name: &str) -> Option<&'s str> {
     attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
 }
 
-fn read_piece(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize) -> Result<()> {
+/// What an array of a piece has in common with the arrays of other pieces that it continues, or that continue it.
+type Key<'p> = (On, &'p str, u64);
+
+/// Where in the assembly each array is; of several alike in a piece, each continues that of its own turn.
+type Places<'p> = HashMap<(Key<'p>, usize), usize>;
+
+fn read_piece<'p>(
+    source: &Source,
+    codec: &mut Codec,
+    assembly: &mut Assembly<'_>,
+    places: &mut Places<'p>,
+    piece: &'p Piece,
+    index: usize,
+) -> Result<()> {
     let fail = |message: &str| source.error_line(piece.at, format!("piece {index}: {message}"));
     let n_points = piece.points;
     let offset = assembly.points.len();
@@ -273,6 +291,7 @@ fn read_piece(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
     }
     let first_cell = assembly.cells();
     read_cells(source, codec, assembly, piece, index, offset)?;
+    let mut turns: HashMap<Key<'p>, usize> = HashMap::new();
     let tuples = [(On::Points, &piece.point_data, n_points), (On::Cells, &piece.cell_data, piece.cells)];
     for (on, arrays, count) in tuples {
         let before = if on == On::Points { offset } else { first_cell };
@@ -284,25 +303,26 @@ fn read_piece(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
                 assembly.warnings.push(message);
             } else {
                 let values: Vec<f32> = codec.floats(source, array, count)?;
-                append(assembly, array, on, before, &values);
+                // An empty piece is no reason to fill an array up.
+                if values.is_empty() {
+                    continue;
+                }
+                let key = (on, array.name.as_str(), array.components);
+                let turn = *turns.entry(key).and_modify(|turn| *turn += 1).or_default();
+                let place = *places.entry((key, turn)).or_insert_with(|| {
+                    let components = array.components as usize;
+                    assembly.arrays.push(Array { name: array.name.clone(), on, components, values: Vec::new() });
+                    assembly.arrays.len() - 1
+                });
+                // One that the budget does not allow to be filled up stays too short, and is left out in the end.
+                let array = &mut assembly.arrays[place];
+                if array.fill(before, &mut assembly.padding).is_ok() {
+                    array.values.extend_from_slice(&values);
+                }
             }
         }
     }
-    assembly.complete_arrays();
     Ok(())
-}
-
-/// Appends one piece's values to the array of that name; `before` values per component belong to earlier pieces.
-fn append(assembly: &mut Assembly<'_>, stored: &StoredArray, on: On, before: usize, values: &[f32]) {
-    let components = stored.components as usize;
-    let same = |a: &&mut Array| a.on == on && a.name == stored.name && a.components == components && a.values.len() == before * components;
-    if let Some(array) = assembly.arrays.iter_mut().find(same) {
-        array.values.extend_from_slice(values);
-    } else {
-        let mut all = vec![f32::NAN; before * components];
-        all.extend_from_slice(values);
-        assembly.arrays.push(Array { name: stored.name.clone(), on, components, values: all });
-    }
 }
 
 fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize, offset: usize) -> Result<()> {
@@ -330,8 +350,8 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
         let message = format!("the last cell of piece {index} ends at {previous}, but `connectivity` has {} values", connectivity.len());
         return Err(source.error_in("array `offsets`", message));
     }
-    let ghosts = piece.cell_data.iter().find(|a| a.name == "vtkGhostType" && a.components == 1);
-    let mut ghosts = ghosts.map(|a| codec.integers(source, a, Some(piece.cells))).transpose()?;
+    let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
+    let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
@@ -346,7 +366,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
-        if ghosts.as_mut().is_some_and(|g| g.at(cell) & 1 != 0) {
+        if ghosts.as_mut().is_some_and(|(values, marks)| marks(values.at(cell))) {
             assembly.skip("ghost cell", Fate::Ghost);
         } else if let Some((_, kind)) = kind {
             assembly.push(kind, nodes, offset)?;

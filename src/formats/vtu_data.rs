@@ -10,6 +10,7 @@ use base64::Engine as _;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
 
+use super::budget::Budget;
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
@@ -50,9 +51,8 @@ pub(crate) struct Codec {
     word: usize,
     compressor: Option<Compressor>,
     pub appended: Option<Appended>,
-    /// Bytes that may still be unpacked.
-    budget: u64,
-    expansion: u64,
+    /// For what is unpacked.
+    pub budget: Budget,
 }
 
 /// The encoded bytes of an array.
@@ -82,13 +82,7 @@ impl Codec {
             Some("vtkLZMADataCompressor") => Some(Compressor::Xz),
             Some(other) => return Err(format!("unknown compressor `{}`; save the file with zlib or uncompressed", quote(other))),
         };
-        Ok(Self { big_endian, word, compressor, appended: None, budget: 0, expansion: 0 })
-    }
-
-    /// Limits what may be unpacked from a file of `bytes` bytes.
-    pub fn set_budget(&mut self, bytes: usize, expansion: u64) {
-        self.expansion = expansion;
-        self.budget = (64 << 20) + expansion.saturating_mul(bytes as u64);
+        Ok(Self { big_endian, word, compressor, appended: None, budget: Budget::default() })
     }
 
     /// Byte order and compressor in words.
@@ -197,8 +191,8 @@ impl Codec {
         let final_block = if last == 0 { block } else { last };
         let size = (blocks - 1).checked_mul(block).and_then(|n| n.checked_add(final_block)).ok_or("its size overflows")?;
         check_size(size, scalar, count)?;
-        let limit = format!("more than {} times the size of the file; save it without compression", self.expansion);
-        self.budget = self.budget.checked_sub(size).ok_or_else(|| format!("it would unpack to {size} bytes, {limit}"))?;
+        let refused = |limit: String| format!("it would unpack to {size} bytes, {limit}; save it without compression");
+        self.budget.spend(size).map_err(refused)?;
         let header = blocks.checked_add(3).and_then(|n| n.checked_mul(word)).ok_or("its number of blocks overflows")?;
         let sizes = stream.prefix(header)?;
         let mut end = header;

@@ -29,7 +29,7 @@ pub struct Mesh {
 }
 
 /// What a field's values belong to.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum On {
     /// One value per point, interpolated linearly in a cell.
     Points,

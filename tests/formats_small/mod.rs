@@ -35,6 +35,7 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("v51.vtk", vtk_51()),
         ("v22.msh", msh_22()),
         ("v22b.msh", msh_22_binary()),
+        ("v40.msh", msh_40()),
         ("v41.msh", msh_41()),
         ("v41b.msh", msh_41_binary()),
         ("text.mesh", medit()),
@@ -44,6 +45,14 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("zero.ele", tetgen(0).1),
         ("zero.node", tetgen(0).0),
     ]
+}
+
+/// One of the small files with other bytes in the place of some.
+pub fn replace(name: &str, old: &[u8], new: &[u8]) -> Vec<u8> {
+    let mut bytes = all().into_iter().find(|f| f.0 == name).unwrap().1;
+    let at = bytes.windows(old.len()).position(|w| w == old).unwrap();
+    bytes.splice(at..at + old.len(), new.iter().copied());
+    bytes
 }
 
 fn vtu_ascii() -> Vec<u8> {
@@ -192,6 +201,19 @@ fn msh_22_binary() -> Vec<u8> {
         out.extend(format!("\n$End{section}\n").bytes());
     }
     out
+}
+
+/// With a volume of the physical groups 11 and 12, which is the entity of all elements; points have a box in this version.
+fn msh_40() -> Vec<u8> {
+    let nodes: String = POINTS.iter().enumerate().map(|(i, p)| format!("{} {}\n", 10 * (i + 1), join(p))).collect();
+    let cells: String = TETS.iter().enumerate().map(|(i, t)| format!("{} {}\n", 10 * (i + 1), join(t.map(|v| 10 * (v + 1))))).collect();
+    let volume = "7 0 0 0 1 1 1.25";
+    format!(
+        "$MeshFormat\n4 0 8\n$EndMeshFormat\n$Entities\n1 0 0 2\n1 0 0 0 0 0 0 1 5\n{volume} 2 11 12 0\n{volume} 1 13 0\n$EndEntities\n$Nodes\n1 8\n7 3 0 8\n{nodes}$EndNodes\n$Elements\n1 6\n7 3 4 6\n{cells}$EndElements\n{}{}",
+        data_22("NodeData", "s", 8),
+        data_22("ElementData", "c", 6)
+    )
+    .into_bytes()
 }
 
 fn msh_41() -> Vec<u8> {

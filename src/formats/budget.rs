@@ -1,0 +1,24 @@
+//! How much memory a file may ask for beyond its own size.
+
+use super::LoadOptions;
+
+/// Bytes that may still be made of a file.
+#[derive(Default)]
+pub(crate) struct Budget {
+    left: u64,
+    expansion: u64,
+}
+
+impl Budget {
+    /// For a file of `bytes` bytes.
+    pub fn new(bytes: usize, options: &LoadOptions) -> Self {
+        let left = options.expansion.saturating_mul(bytes as u64).saturating_add(64 << 20);
+        Self { left, expansion: options.expansion }
+    }
+
+    /// Spends `bytes`; an error that says what the limit is if less are left.
+    pub fn spend(&mut self, bytes: u64) -> Result<(), String> {
+        self.left = self.left.checked_sub(bytes).ok_or_else(|| format!("more than {} times the size of the file", self.expansion))?;
+        Ok(())
+    }
+}
