@@ -54,11 +54,52 @@ fn slices_become_files() {
         &["slice", "kuhn:4,3,2", "-o", "x.svx", "--thickness", "0.1"],
         &["slice", "kuhn:4,3,2", "-o", "x.npy", "--size", "0x4"],
         &["slice", "kuhn:4,3,2", "-o", "x.npy", "--memory", "1GiB"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--normal", "1,0,0,foo"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--size", "100000x100000", "--layers", "1000"],
+        &["slice", "kuhn:4,3,2", "-o", "x.npy", "--target", "nvidia"],
+        &["slice", "kuhn:4,3,2", "-o", "x.svx", "--unit", "0"],
+        &["slice", "kuhn:4,3,2", "-o", "-"],
     ] {
         let (code, _, text) = olbvh(folder, wrong);
         assert!(code == 2 && !text.is_empty(), "{wrong:?}: {code} {text}");
     }
     assert_eq!(files(folder), made, "a refused slice leaves nothing");
+}
+
+/// What is asked for by mistake is done, and told.
+#[test]
+fn remarks() {
+    let folder = tempfile::tempdir().unwrap();
+    for (arguments, wanted) in [
+        (&["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "8", "--at", "90"][..], "all voxels are empty"),
+        (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8", "--layers", "2"], "2 of the 4 layers"),
+        (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "7,9"], "no surface to be seen"),
+        (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.5,9"], ""),
+        (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8"], ""),
+    ] {
+        let (code, _, text) = olbvh(folder.path(), arguments);
+        assert!(code == 0 && text.contains(wanted) && text.is_empty() == wanted.is_empty(), "{arguments:?}: {text}");
+    }
+}
+
+#[test]
+fn inputs_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bracket_50k.vtu");
+    std::fs::copy(mesh, folder.join("m.vtu")).unwrap();
+    std::fs::write(folder.join("p.csv"), "1,2,3\n").unwrap();
+    let inputs = ["m.vtu", "p.csv"].map(|name| std::fs::read(folder.join(name)).unwrap());
+    for wrong in [
+        &["overlap", "m.vtu", "kuhn:1,1,1", "-o", "m.vtu"][..],
+        &["overlap", "kuhn:1,1,1", "m.vtu", "-o", "./m.vtu"],
+        &["locate", "m.vtu", "p.csv", "-o", "m.vtu"],
+        &["locate", "m.vtu", "p.csv", "-o", "p.csv"],
+    ] {
+        let (code, _, text) = olbvh(folder, wrong);
+        assert!(code == 2 && text.contains("would replace"), "{wrong:?}: {code} {text}");
+    }
+    assert_eq!(["m.vtu", "p.csv"].map(|name| std::fs::read(folder.join(name)).unwrap()), inputs);
 }
 
 #[test]

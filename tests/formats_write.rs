@@ -97,6 +97,7 @@ fn tables_of_points() {
         ("1,2,3\n4,5\n", "line 2"),
         ("x,y,z\n1,2,3\n4,five,6\n", "line 3"),
         ("1,2,3,4\n", "line 1"),
+        ("1.o,2,3\n4,4,4\n", "line 1: `1.o` is not a number"),
         ("a,b,c,d\n1,2,3,4\n", "line 1"),
         ("", "no points"),
         ("1,2\0,3", "byte 3"),

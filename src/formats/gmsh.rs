@@ -76,7 +76,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
             (b"ElementData", Some(_)) => content.views.push(reader.view(On::Cells, b"$EndElementData")?),
             _ => {
                 let shown = format!("${}", printable(name));
-                let known: [&[u8]; 3] = [b"PhysicalNames", b"Periodic", b"Comments"];
+                let known: [&[u8]; 4] = [b"PhysicalNames", b"Periodic", b"Comments", b"InterpolationScheme"];
                 if !known.contains(&name) && content.skipped.len() < 12 && !content.skipped.contains(&shown) {
                     content.skipped.push(shown);
                 }

@@ -39,13 +39,16 @@ fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
         let fields = split(line);
         let Some(columns) = columns else {
             width = fields.len();
-            let numbers = fields.iter().all(|f| number(f, line).is_some());
-            columns = Some(choose(&fields, numbers).ok_or_else(|| {
+            let numbers = fields.iter().filter(|f| number(f, line).is_some()).count();
+            let named = if numbers == width { None } else { named(&fields) };
+            let chosen = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
                 let message = format!("{width} columns; there must be three, or a first line that names x, y and z among them");
                 source.error_line(at, message)
-            })?);
-            if numbers {
-                points.push(point(source, at, line, &fields, columns.unwrap_or_default())?);
+            })?;
+            columns = Some(chosen);
+            // Names of other columns have no numbers among them: a point with a slip is no headline.
+            if named.is_none() && numbers > 0 {
+                points.push(point(source, at, line, &fields, chosen)?);
             }
             continue;
         };
@@ -78,8 +81,8 @@ fn number(field: &[u8], line: &[u8]) -> Option<f64> {
     parse_float(field)
 }
 
-/// Which columns hold x, y and z.
-fn choose(fields: &[&[u8]], numbers: bool) -> Option<[usize; 3]> {
+/// Which columns hold x, y and z by their names.
+fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
     let find = |names: [&str; 3]| {
         let at = names.map(|name| {
             fields.iter().position(|f| {
@@ -90,9 +93,7 @@ fn choose(fields: &[&[u8]], numbers: bool) -> Option<[usize; 3]> {
         Some([at[0]?, at[1]?, at[2]?])
     };
     // The latter two are ParaView's, of different versions.
-    let names = [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]];
-    let named = if numbers { None } else { names.into_iter().find_map(find) };
-    named.or_else(|| (fields.len() == 3).then_some([0, 1, 2]))
+    [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]].into_iter().find_map(find)
 }
 
 fn point(source: &Source, at: usize, line: &[u8], fields: &[&[u8]], columns: [usize; 3]) -> Result<[f64; 3]> {

@@ -157,3 +157,36 @@ impl SliceSettings {
         Ok(cubes)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const BOX: ([f32; 3], [f32; 3], [f64; 3]) = ([0.0; 3], [4.0, 2.0, 8.0], [0.0; 3]);
+
+    fn voxels(settings: SliceSettings) -> Result<VoxelGrid> {
+        settings.voxels(BOX.0, BOX.1, BOX.2)
+    }
+
+    /// A package has no directions of its own: a left-handed one is the mirror image of the mesh.
+    #[test]
+    fn packages_are_no_mirror_images() {
+        let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
+        for plane in [Plane::Axis(0), Plane::Axis(1), Plane::Axis(2), Plane::Normal([1.0, -2.0, 0.5]), Plane::Normal([0.0, -1.0, 0.0])] {
+            let cubes = SliceSettings { plane, size: [16, 0], ..SliceSettings::default() }.cubes(BOX.0, BOX.1, BOX.2, true).unwrap();
+            let grid = voxels(cubes).unwrap();
+            let [across, down, up] = [grid.across, grid.down, grid.up].map(wide);
+            assert!(across.cross(down).dot(up) > 0.99 * across.length().powi(3), "{plane:?}");
+        }
+    }
+
+    #[test]
+    fn layers_may_go_downwards() {
+        let settings = SliceSettings { layers: 3, at: Some(1.0), spacing: Some(-0.5), ..SliceSettings::default() };
+        let grid = voxels(settings).unwrap();
+        assert_eq!((grid.up, grid.half[2]), ([0.0, 0.0, -0.5], [0.0, 0.0, 0.25]));
+        // One layer over another, each as thick as a voxel is wide.
+        let grid = voxels(SliceSettings { spacing: Some(0.0), size: [8, 0], ..settings }).unwrap();
+        assert_eq!((grid.up[2], grid.half[2]), (0.0, [0.0, 0.0, 0.25]));
+    }
+}

@@ -20,12 +20,12 @@ Examples:
   olbvh bench graded:40 shell:200 --suite paper --repeat 9 --seconds 1 --json
   olbvh bench --compare before.json after.json -o changes.md   which times differ by more than their spread
 
-Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different size), shell:N (thin walls), slivers:N (flat cells). The suite gives
-the sizes of points, picture and slice; MESH... stands in place of its meshes. Answers are verified before anything is timed; a wrong one ends the
-run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios. Stages of the construction are
+Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different size), shell:N (thin walls), slivers:N (flat cells). The suite gives \
+the sizes of points, picture and slice; MESH... stands in place of its meshes. Answers are verified before anything is timed; a wrong one ends the \
+run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios. Stages of the construction are \
 related to the rate at which the device copies, by the bytes that they must read and write at least.
 
---compare runs nothing. It tells every ratio of times that both files have, the range that the repetitions allow, what only one of them has, and
+--compare runs nothing. It tells every ratio of times that both files have, the range that the repetitions allow, what only one of them has, and \
 whatever differs in device, driver, target, program and settings.")]
 pub struct Args {
     /// Meshes instead of those of the suite.

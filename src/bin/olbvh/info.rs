@@ -25,7 +25,7 @@ Examples:
   olbvh info bracket.vtu --level 6            a level finer than alpha 0
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
-Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no
+Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no \
 volume, or overlap a neighbour. Negative cells have their vertices in the other order, which does no harm.")]
 pub struct Args {
     /// Mesh file, or kuhn:NX,NY,NZ.

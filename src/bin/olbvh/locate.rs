@@ -22,11 +22,11 @@ Examples:
   olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
   olbvh locate bracket.vtu points.csv -o cells.csv --all      every cell, for points on faces, edges and vertices
 
-Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder the first along
-the curve); ids count the cells of the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order.
-A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json.
-Where there is a point to every two cells or more, each is looked for near the one before, along a Z curve; --coherent takes them as they come, which
-saves the sorting. The answers are the same, and stand in the order of the points in any case.
+Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder the first along \
+the curve); ids count the cells of the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order. \
+A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json. \
+Where there is a point to every two cells or more, each is looked for near the one before, along a Z curve; --coherent takes them as they come, which \
+saves the sorting. The answers are the same, and stand in the order of the points in any case. \
 With --all the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
 pub struct Args {
     /// Mesh file, or kuhn:NX,NY,NZ.

@@ -22,7 +22,7 @@ use common::{Common, Failure};
 use std::process::ExitCode;
 
 const AFTER_HELP: &str = "\
-MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh (Medit), .node or .ele (TetGen); or kuhn:NX,NY,NZ, a procedural grid of
+MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh (Medit), .node or .ele (TetGen); or kuhn:NX,NY,NZ, a procedural grid of \
 NX×NY×NZ unit cubes, six tetrahedra each, with a scalar field (others: see `olbvh bench --help`). Lengths are in the units of the mesh.
 
 Examples:

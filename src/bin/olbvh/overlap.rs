@@ -23,8 +23,8 @@ Examples:
   olbvh overlap a.vtu b.vtu -o cells.json --move-b 0,0,3.5 --rotate-b z,30
   olbvh overlap a.vtu b.vtu -o touched.vtu                     the cells of A that intersect B, as a mesh
 
-The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascending by a then b. Ids count the cells of a file from 0. Touching counts.
-B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not,
+The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascending by a then b. Ids count the cells of a file from 0. Touching counts. \
+B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not, \
 but the same on every device.")]
 pub struct Args {
     /// Mesh A: a file, or kuhn:NX,NY,NZ.

@@ -26,8 +26,8 @@ Examples:
   olbvh render bracket.vtu -o surfaces.png --iso 40,55,70 --opacity 0.5   three iso-surfaces, seen through one another
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
-The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the
-mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step.
+The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the \
+mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step. \
 Where the opacity is 0 nothing is looked at: octree nodes with no other values are skipped, so pictures of few values are quick.";
 
 /// Draw a field of a mesh as a volume, into a PNG file.

@@ -22,14 +22,14 @@ use std::time::Instant;
 #[command(after_help = "\
 Examples:
   olbvh slice bracket.vtu -o middle.png                       one slice through the middle
-  olbvh slice bracket.vtu -o bracket.npy --layers 200         the whole mesh: bracket.npy (values) and bracket.kind.npy
+  olbvh slice bracket.vtu -o bracket.npy --layers 200         the whole mesh; kinds in bracket.kind.npy
   olbvh slice bracket.vtu -o layer.png --axis x --at 12.5 --layers 10 --thickness 0.2
   olbvh slice bracket.vtu -o cut.vti --normal 1,1,0.5 --size 800
-  olbvh slice bracket.vtu -o print.svx --size 400             voxel package for printers, cubes all over
+  olbvh slice bracket.vtu -o print.svx --size 400             voxel package for printers
 
-A voxel's kind is 2 where its centre lies in the mesh, 1 where only its box touches the mesh, else 0. A touched voxel gets the value at the closest point
-of the mesh's closest boundary cell (or, with --extrapolate linear, that cell's field continued to the centre). Empty voxels are NaN, in pictures
-transparent. Rows and layers run upwards; pictures show the highest row on top. More than one layer makes pictures NAME-0000.png, NAME-0001.png, …
+A voxel's kind is 2 where its centre lies in the mesh, 1 where only its box touches the mesh, else 0. A touched voxel gets the value at the closest point \
+of the mesh's closest boundary cell (or, with --extrapolate linear, that cell's field continued to the centre). Empty voxels are NaN, in pictures \
+transparent. Rows and layers run upwards; pictures show the highest row on top. More than one layer makes pictures NAME-0000.png, NAME-0001.png, … \
 An .svx package has its origin and voxels in metres (see --unit); its x and y are those of the layers.")]
 pub struct Args {
     /// Mesh file, or kuhn:NX,NY,NZ.

@@ -21,9 +21,9 @@ Examples:
   olbvh tune --no-profile -o mine.json   from the table's values, into a file:
   olbvh render m.vtu -o m.png --target mine.json
 
-Every candidate must give the same trees, owners, pictures and voxels, byte for byte, before it is timed; then it runs in turns with the best so far,
-and is kept only if it is faster by more than the times vary. What was gained is measured again at the end. The profile lies in the user's
-configuration folder (olbvh/DEVICE.DRIVER.json in $XDG_CONFIG_HOME or ~/.config); `olbvh devices -v` names it, --no-profile (or OLBVH_NO_PROFILE=1)
+Every candidate must give the same trees, owners, pictures and voxels, byte for byte, before it is timed; then it runs in turns with the best so far, \
+and is kept only if it is faster by more than the times vary. What was gained is measured again at the end. The profile lies in the user's \
+configuration folder (olbvh/DEVICE.DRIVER.json in $XDG_CONFIG_HOME or ~/.config); `olbvh devices -v` names it, --no-profile (or OLBVH_NO_PROFILE=1) \
 passes it over, and removing the file undoes it. A profile that is broken or was made for something else is passed over with a remark.")]
 pub struct Args {
     /// Mesh to tune with: a file or a procedural mesh.
