@@ -8,7 +8,8 @@
  * in it the answers will be; parts of buffers begin at multiples of olbvh_plan_sizes.alignment, and all buffers have its usage flags. They are the host's and
  * stay as long as commands that use them are executed. Where nothing else is said, a command reads what it is given in compute shaders, uses its memory in
  * compute shaders and transfers, writes its answers in compute shaders, and no barrier stands before or behind it: the host records olbvh_cmd_barrier, or a
- * barrier of its own, from compute shader and transfer writes to whatever reads the answers or uses the memory next.
+ * barrier of its own that it tells of by olbvh_recording_host_barrier, from compute shader and transfer writes to whatever reads the answers or uses the
+ * memory next.
  *
  * Generated from src/capi by cbindgen; scripts/c_api --write writes it anew. */
 
@@ -852,6 +853,11 @@ enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
 enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
 
 /*
+/*
+ Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+ */
+enum olbvh_status olbvh_recording_host_barrier(struct olbvh_recording *recording);
+
  Tells what memory a plan wants.
  */
 enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,

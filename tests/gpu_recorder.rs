@@ -1,9 +1,10 @@
 //! The recorder's own hazard check: whichever barrier is left out, it objects. So no barrier is missing where the check looks, and none is superfluous.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
 
+use ash::vk;
 use host::Frame;
 use host::baseline::Baseline;
 use host::queries::Queries;
@@ -163,6 +164,32 @@ fn location() {
         cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })
     });
     assert!(matches!(unordered, Err(Error::Invalid(_))));
+}
+
+/// Barriers of the host's between commands of ours count once it has told of them.
+#[test]
+fn barriers_of_a_host() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let words = |n: u64| gpu.buffer("olbvh.test.words", 4 * n).unwrap();
+    let (a, b, sink) = (words(64), words(64), words(64));
+    let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+    let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+    let all = [vk::MemoryBarrier::default().src_access_mask(writes).dst_access_mask(writes | vk::AccessFlags::TRANSFER_READ)];
+    // SAFETY: the commands are being recorded.
+    let own = |r: &Recorder<'_>| unsafe {
+        gpu.device().cmd_pipeline_barrier(r.commands(), stages, stages, vk::DependencyFlags::empty(), &all, &[], &[]);
+    };
+    let barriers = every_barrier_counts(&gpu, "a host's barriers", |r| {
+        r.fill(a.all(), 1);
+        own(r);
+        r.host_barrier("host.fill → host.copy");
+        r.copy(a.all(), b.all());
+        own(r);
+        r.host_barrier("host.copy → caller");
+        read(r, &[b.all()], &sink);
+        Ok(())
+    });
+    assert_eq!(barriers, 2);
 }
 
 #[test]

@@ -210,6 +210,15 @@ pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStat
     })
 }
 
+/// Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_recording_host_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
+    recorded(recording, |r| {
+        r.host_barrier("host → host");
+        Ok(())
+    })
+}
+
 fn not_begun() -> Error {
     Error::Invalid("the recording has not begun".into())
 }

@@ -74,19 +74,34 @@ fn frames(gpu: *mut OlbvhGpu) {
         owners: owners_of,
         barycentrics: weights,
     };
-    let record = |commands: u64, queries: vk::QueryPool, barrier: bool| {
+    // The host's own barrier, which it may tell of or not.
+    let own_barrier = |commands: u64, told: bool| {
+        let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+        let barrier = [vk::MemoryBarrier::default().src_access_mask(writes).dst_access_mask(writes | vk::AccessFlags::SHADER_READ)];
+        if commands != 0 {
+            let commands = vk::CommandBuffer::from_raw(commands);
+            // SAFETY: the commands are in the recording state.
+            unsafe { device.device().cmd_pipeline_barrier(commands, stages, stages, vk::DependencyFlags::empty(), &barrier, &[], &[]) };
+        }
+        if told {
+            ok(olbvh_recording_host_barrier(recording));
+        }
+    };
+    let record = |commands: u64, queries: vk::QueryPool, told: bool| {
         ok(olbvh_recording_begin(recording, commands, queries.as_raw(), QUERIES));
         ok(olbvh_cmd_build(recording, scene));
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
-        if barrier {
-            ok(olbvh_cmd_barrier(recording));
-        }
+        ok(olbvh_cmd_barrier(recording));
+        ok(olbvh_cmd_locate(recording, scene, &raw const location));
+        own_barrier(commands, told);
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
         olbvh_recording_end(recording)
     };
     assert_eq!(record(0, vk::QueryPool::null(), false), OlbvhStatus::Invalid);
     assert!(message().contains("no barrier between them"), "{}", message());
     assert_eq!(olbvh_cmd_barrier(recording), OlbvhStatus::Invalid, "it has ended");
+    assert_eq!(olbvh_recording_host_barrier(recording), OlbvhStatus::Invalid, "it has ended");
     ok(record(0, vk::QueryPool::null(), true));
 
     let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
