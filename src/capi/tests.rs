@@ -60,6 +60,12 @@ fn frames(gpu: *mut OlbvhGpu) {
     assert_eq!(place(&plan, memory.all(), &raw mut none), OlbvhStatus::Invalid);
     assert!(none.is_null() && message().contains("positions"), "{}", message());
     plan.points -= 1;
+    let moved = |b: BufferRef, by: u64| BufferRef { offset: b.offset + by, ..b };
+    assert_eq!(place(&plan, moved(memory.all(), 128), &raw mut none), OlbvhStatus::Invalid);
+    assert!(none.is_null() && message().contains("at a multiple of 256"), "{}", message());
+    let odd = [moved(positions.all(), 64), cells.all(), memory.all(), scratch.all()].map(part);
+    assert_eq!(olbvh_scene_place(gpu, &raw const plan, odd[0], odd[1], odd[2], odd[3], &raw mut none), OlbvhStatus::Invalid);
+    assert!(none.is_null() && message().contains("positions at byte 64"), "{}", message());
     let scene: *mut OlbvhScene = made(|out| place(&plan, memory.all(), out));
     let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
     let (owners_of, weights) = (part(owners.all()), part(barycentrics.all()));

@@ -3,7 +3,7 @@
 use super::context::{Binding, Gpu};
 use super::memory::BufferRef;
 use super::{debug, failed};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 
 /// How a kernel uses a buffer, from its declaration.
@@ -18,6 +18,8 @@ pub(crate) enum Access {
 pub(crate) struct BufferInfo {
     pub name: &'static str,
     pub access: Access,
+    /// What its address must be a multiple of.
+    pub alignment: u64,
 }
 
 /// A kernel as `build.rs` reflected it.
@@ -76,16 +78,26 @@ impl KernelInfo {
     }
 }
 
-/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars.
-pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Vec<u8> {
+/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars. A host may have forgotten an address; a device that
+/// is given none follows it all the same.
+pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Result<Vec<u8>> {
     let mut push = vec![0u8; K::INFO.push_bytes(binding)];
     arguments.scalars(K::INFO.scalar_base(binding), &mut push);
     if binding == Binding::Address {
-        for (place, buffer) in push.chunks_exact_mut(8).zip(arguments.buffers()) {
+        for ((place, buffer), info) in push.chunks_exact_mut(8).zip(arguments.buffers()).zip(K::INFO.buffers) {
+            // Nothing is looked for in a buffer of no bytes.
+            if buffer.size > 0 && (buffer.address == 0 || !buffer.address.is_multiple_of(info.alignment)) {
+                let fault = if buffer.address == 0 {
+                    "has no device address".into()
+                } else {
+                    format!("is not at a multiple of {} bytes", info.alignment)
+                };
+                return Err(Error::Invalid(format!("{} is given `{}`, which {fault}", K::INFO.name, info.name)));
+            }
             place.copy_from_slice(&buffer.address.to_le_bytes());
         }
     }
-    push
+    Ok(push)
 }
 
 /// The ranges that a kernel uses, and whether it writes them.

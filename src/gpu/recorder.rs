@@ -147,7 +147,7 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         let device = self.gpu.device();
-        let push = push_constants(arguments, self.gpu.binding());
+        let push = push_constants(arguments, self.gpu.binding())?;
         // SAFETY: pipeline, layouts and sets belong to this device; push constants fit the layout made from the same numbers; the
         // caller of `new` vouches for the command buffer.
         unsafe {

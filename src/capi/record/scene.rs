@@ -136,10 +136,11 @@ pub extern "C" fn olbvh_scene_place(
                 format!("{} bytes of positions and {} of cells; the plan has {} and {}", positions.size, cells.size, needed.0, needed.1);
             return Err(Error::Invalid(text));
         }
+        let (positions, cells) = (positions.aligned("positions")?, cells.aligned("cells")?);
         let planned = plan.read()?;
         let (arrays, tree) = plan.memory(&mut Arena::new(memory.part()), &planned)?;
         let (mesh_scratch, build_scratch) = plan.scratch(gpu, &mut Arena::new(scratch.part()), &planned)?;
-        let input = MeshInput { positions: positions.part(), stride, points, cells: cells.part(), tets };
+        let input = MeshInput { positions, stride, points, cells, tets };
         let longest_leaf = if plan.longest_leaf == 0 { tets } else { plan.longest_leaf };
         let scene = Scene { mesh: MeshView { input, arrays }, tree, longest_leaf };
         give(out, OlbvhScene { gpu: gpu.clone(), scene, planned, mesh_scratch, build_scratch })
