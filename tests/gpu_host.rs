@@ -8,6 +8,7 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use host::baseline::Baseline;
 use host::counted::{ARMED, CALLS, counting};
+use host::live::{live, watching};
 use host::queries::Queries;
 use host::{Frame, Host};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -15,7 +16,7 @@ use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOpti
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, locate};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Barrier, Mutex};
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
@@ -80,14 +81,23 @@ fn what_is_not_enabled_is_not_used() {
 fn one_device_serves_many_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<Gpu>();
-    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn_jittered([5; 3], 0.3, 1).unwrap();
-    let expected = owners(&gpu, &mesh);
+    let expected = owners(&Gpu::new(&GpuOptions::default()).unwrap(), &mesh);
+    let host = Host::new();
+    let lent = HostDevice { device: watching(&host.device), ..host.lend() };
+    // SAFETY: as above. No self-test, which would compile kernels before the threads do.
+    let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions { trust: true, ..GpuOptions::default() }) }.unwrap();
+    let start = Barrier::new(4);
     std::thread::scope(|scope| {
         for _ in 0..4 {
-            scope.spawn(|| assert_eq!(owners(&gpu, &mesh), expected));
+            scope.spawn(|| {
+                start.wait();
+                assert_eq!(owners(&gpu, &mesh), expected);
+            });
         }
     });
+    drop(gpu);
+    assert_eq!(live(&host.device), 0, "of a kernel that two threads compile at a time one pipeline is left");
 }
 
 fn nothing_is_made(binding: Binding) {

@@ -11,8 +11,9 @@ use crate::kernels::{Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 /// How kernels get their buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -191,14 +192,18 @@ impl Gpu {
     /// The pipeline of a kernel with these constants, compiled at first use.
     pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
         let key = (K::INFO.name, spec.values());
-        if let Some(found) = self.inner.pipelines.read().ok().and_then(|p| p.get(&key).copied()) {
-            return Ok(found);
+        if let Some(found) = self.inner.pipelines.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
+            return Ok(*found);
         }
         let made = create_pipeline(self, K::INFO, &key.1)?;
-        if let Ok(mut pipelines) = self.inner.pipelines.write() {
-            pipelines.insert(key, made);
+        match self.inner.pipelines.write().unwrap_or_else(PoisonError::into_inner).entry(key) {
+            Entry::Vacant(place) => Ok(*place.insert(made)),
+            Entry::Occupied(first) => {
+                // SAFETY: another thread was first, and nobody has got this one.
+                unsafe { made.destroy(self.device()) };
+                Ok(*first.get())
+            }
         }
-        Ok(made)
     }
 
     /// What the device is.
@@ -385,9 +390,7 @@ impl Drop for Inner {
                 let _ = device.device_wait_idle();
             }
             for p in self.pipelines.get_mut().map(std::mem::take).unwrap_or_default().into_values() {
-                device.destroy_pipeline(p.handle, None);
-                device.destroy_pipeline_layout(p.layout, None);
-                device.destroy_descriptor_set_layout(p.set_layout, None);
+                p.destroy(device);
             }
             if pipeline_cache.is_none() {
                 device.destroy_pipeline_cache(self.cache, None);

@@ -49,11 +49,26 @@ pub(crate) trait Kernel {
 }
 
 /// A pipeline with its layouts.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Pipeline {
     pub handle: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set_layout: vk::DescriptorSetLayout,
+}
+
+impl Pipeline {
+    /// Destroys what there is of it.
+    ///
+    /// # Safety
+    /// It is of this device, and nothing uses it any more.
+    pub(super) unsafe fn destroy(self, device: &ash::Device) {
+        // SAFETY: as the caller vouches; null handles are passed over.
+        unsafe {
+            device.destroy_pipeline(self.handle, None);
+            device.destroy_pipeline_layout(self.layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
 }
 
 impl KernelInfo {
@@ -107,6 +122,17 @@ pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
 
 /// Compiles a kernel for a device.
 pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
+    let mut made = Pipeline::default();
+    let compiled = compile(gpu, info, constants, &mut made);
+    if compiled.is_err() {
+        // SAFETY: nobody has got it.
+        unsafe { made.destroy(gpu.device()) };
+    }
+    compiled.map(|()| made)
+}
+
+/// Makes one part of a pipeline after the other.
+fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pipeline) -> Result<()> {
     let device = gpu.device();
     let binding = gpu.binding();
     let words = info.words(binding, gpu.reads_wide());
@@ -125,21 +151,18 @@ pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u
         .collect();
     let values: Vec<u8> = constants.iter().flat_map(|(_, v)| v.to_le_bytes()).collect();
     let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
-    // SAFETY: all structs outlive the calls; objects belong to this device; a partial failure leaks at most one layout, which the
-    // device frees.
+    // SAFETY: all structs outlive the calls; objects belong to this device; the caller destroys what was made before a failure.
     unsafe {
-        let set_layout = if binding == Binding::Descriptors {
+        if binding == Binding::Descriptors {
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-            device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?
-        } else {
-            vk::DescriptorSetLayout::null()
-        };
-        let sets = [set_layout];
+            made.set_layout = device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?;
+        }
+        let sets = [made.set_layout];
         let mut layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
         if binding == Binding::Descriptors {
             layout_info = layout_info.set_layouts(&sets);
         }
-        let layout = device.create_pipeline_layout(&layout_info, None).map_err(failed("vkCreatePipelineLayout"))?;
+        made.layout = device.create_pipeline_layout(&layout_info, None).map_err(failed("vkCreatePipelineLayout"))?;
         let module = device
             .create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None)
             .map_err(failed("vkCreateShaderModule"))?;
@@ -153,12 +176,12 @@ pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u
             // Where the driver may choose, `gl_SubgroupSize` and the lanes that run can differ: nail both down.
             stage = stage.push_next(&mut required).flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
-        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-        let made = device.create_compute_pipelines(gpu.pipeline_cache(), &infos, None);
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(made.layout)];
+        let pipelines = device.create_compute_pipelines(gpu.pipeline_cache(), &infos, None);
         device.destroy_shader_module(module, None);
-        let pipeline = made.map_err(|(_, e)| failed("vkCreateComputePipelines")(e))?[0];
-        debug::name(gpu.debug_device(), pipeline, info.name);
-        debug::name(gpu.debug_device(), layout, info.name);
-        Ok(Pipeline { handle: pipeline, layout, set_layout })
+        made.handle = pipelines.map_err(|(_, e)| failed("vkCreateComputePipelines")(e))?[0];
     }
+    debug::name(gpu.debug_device(), made.handle, info.name);
+    debug::name(gpu.debug_device(), made.layout, info.name);
+    Ok(())
 }
