@@ -8,11 +8,12 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use host::baseline::Baseline;
 use host::counted::{ARMED, CALLS, counting};
-use host::live::{live, watching};
+use host::live::{FAILING, FALLIBLE, live, watching};
 use host::queries::Queries;
 use host::{Frame, Host};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
+use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, locate};
@@ -98,6 +99,32 @@ fn one_device_serves_many_threads() {
     });
     drop(gpu);
     assert_eq!(live(&host.device), 0, "of a kernel that two threads compile at a time one pipeline is left");
+}
+
+/// Whatever fails in opening: what had been made on the host's device is gone.
+#[test]
+fn a_failed_opening_leaves_nothing() {
+    let host = Host::new();
+    // SAFETY: as above; the watched functions do what the device's own do, or fail.
+    let open = |options: &GpuOptions| unsafe { Gpu::from_raw(HostDevice { device: watching(&host.device), ..host.lend() }, options) };
+    let gpu = open(&GpuOptions::default()).unwrap();
+    let target = Some(Target { each: gpu.subgroup_size() + 1, ..gpu.target().clone() });
+    drop(gpu);
+    assert!(open(&GpuOptions { target, ..GpuOptions::default() }).is_err());
+    assert_eq!(live(&host.device), 0, "a target that does not fit");
+    let bindings = [Binding::Address, Binding::Descriptors];
+    for binding in &bindings[usize::from(!host.addresses)..] {
+        let options = GpuOptions { binding: Some(*binding), ..GpuOptions::default() };
+        for (name, before) in FALLIBLE.iter().flat_map(|name| [0, 1, 4].map(|before| (*name, before))) {
+            FAILING.set((name, before));
+            let opened = open(&options);
+            // Some are not needed so often, or not at all.
+            let failed = FAILING.replace(("", 0)) == (name, 0) && opened.is_err();
+            assert!(failed || before > 0 || name.contains("descriptor") || name.contains("query"), "{name} did not fail");
+            drop(opened);
+            assert_eq!(live(&host.device), 0, "{binding:?}: {name} failed after {before}");
+        }
+    }
 }
 
 fn nothing_is_made(binding: Binding) {
