@@ -361,7 +361,7 @@ typedef struct olbvh_plan_sizes {
    */
   uint64_t alignment;
   /*
-   `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
+   `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
    */
   uint32_t usage;
 } olbvh_plan_sizes;

@@ -7,7 +7,7 @@ mod queries;
 use super::host::{OlbvhHostDevice, olbvh_gpu_from_host};
 use super::record::*;
 use super::*;
-use crate::gpu::{BufferRef, HostDevice, Recorder, USAGE};
+use crate::gpu::{Binding, BufferRef, HostDevice, Recorder, USAGE};
 use crate::mesh::kuhn_jittered;
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
@@ -46,7 +46,9 @@ fn frames(gpu: *mut OlbvhGpu) {
     let (positions, cells) = (positions.unwrap(), cells.unwrap());
     let mut plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build: olbvh_default_build_options() };
     let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
-    assert_eq!((sizes.alignment, sizes.usage), (256, USAGE.as_raw()));
+    let address =
+        if device.binding() == Binding::Address { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+    assert_eq!((sizes.alignment, sizes.usage), (256, (USAGE | address).as_raw()));
     let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
     let (memory, scratch) = (buffer(sizes.memory), buffer(sizes.scratch));
     let (owners, barycentrics) = (buffer(4 * u64::from(points)), buffer(16 * u64::from(points)));
@@ -189,7 +191,7 @@ fn a_c_host_records_by_address_and_asks() {
 #[test]
 fn a_c_host_records_by_descriptors_and_makes_nothing() {
     let host = Host::new();
-    let options = GpuOptions { binding: Some(crate::gpu::Binding::Descriptors), ..GpuOptions::default() };
+    let options = GpuOptions { binding: Some(Binding::Descriptors), ..GpuOptions::default() };
     // SAFETY: the host's handles belong together and outlive the frames; the counted functions do what the device's own do.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let gpu = Box::into_raw(Box::new(OlbvhGpu(gpu)));

@@ -205,6 +205,13 @@ impl Gpu {
         self.inner.binding
     }
 
+    /// Usage of every buffer that a host hands to kernels: [`super::USAGE`], and the flag for addresses where buffers go by them.
+    pub fn usage(&self) -> vk::BufferUsageFlags {
+        let addresses =
+            if self.binding() == Binding::Address { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+        super::USAGE | addresses
+    }
+
     /// Shapes of the kernels.
     pub fn target(&self) -> &Target {
         &self.target

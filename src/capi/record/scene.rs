@@ -5,7 +5,7 @@ use crate::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, M
 use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle, put, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, Gpu, USAGE};
+use crate::gpu::{ALIGNMENT, Gpu};
 use crate::options::{BuildOptions, Lists};
 use crate::primitives::Arena;
 use crate::query::Scene;
@@ -43,7 +43,7 @@ pub struct OlbvhPlanSizes {
     pub scratch: u64,
     /// Offsets of parts are multiples of this.
     pub alignment: u64,
-    /// `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
+    /// `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
     pub usage: u32,
 }
 
@@ -109,7 +109,7 @@ pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPla
             memory: Arena::measure(|a| plan.memory(a, &planned))?,
             scratch: Arena::measure(|a| plan.scratch(gpu, a, &planned))?,
             alignment: ALIGNMENT,
-            usage: USAGE.as_raw(),
+            usage: gpu.usage().as_raw(),
         };
         put(out, sizes)
     })
