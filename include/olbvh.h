@@ -186,7 +186,8 @@ typedef struct olbvh_host_device {
    */
   uint32_t shader_int64;
   /*
-   Not 0: `VK_EXT_subgroup_size_control` is enabled with `subgroupSizeControl` and `computeFullSubgroups`.
+   Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
+   vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks.
    */
   uint32_t subgroup_size_control;
   /*
@@ -853,11 +854,11 @@ enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
 enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
 
 /*
-/*
  Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
  */
 enum olbvh_status olbvh_recording_host_barrier(struct olbvh_recording *recording);
 
+/*
  Tells what memory a plan wants.
  */
 enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,

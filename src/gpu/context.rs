@@ -144,6 +144,13 @@ impl Gpu {
             None if requirements.buffer_addresses => Binding::Address,
             None => Binding::Descriptors,
         };
+        if requirements.sizes_vary() && !requirements.subgroup_size_control {
+            let [least, usual, most] = requirements.subgroup_sizes;
+            let name = &report.name;
+            log::warn!(
+                "{name}: subgroups of {least} to {most}, no size control enabled; the driver is trusted to run kernels with {usual}"
+            );
+        }
         let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
         target.check(&report.room)?;
         let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(&foundation), Ok)?;
@@ -298,8 +305,8 @@ impl Gpu {
     }
 
     pub(crate) fn requires_subgroup_size(&self) -> bool {
-        let [least, _, most] = self.inner.foundation.report.requirements.subgroup_sizes;
-        self.inner.foundation.report.requirements.subgroup_size_control && least != most
+        let requirements = &self.report().requirements;
+        requirements.subgroup_size_control && requirements.sizes_vary()
     }
 
     pub(crate) fn has_addresses(&self) -> bool {

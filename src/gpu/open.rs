@@ -38,7 +38,8 @@ fn open_instance() -> Result<Session> {
         wanted.push(ash::khr::portability_enumeration::NAME.as_ptr());
         flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     }
-    let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_2);
+    // What is used of 1.3 is asked for first; 1.2 does.
+    let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_3);
     let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&wanted).flags(flags);
     // SAFETY: all structs outlive the call.
     let instance = unsafe { entry.create_instance(&info, None) }.map_err(|e| match e {
