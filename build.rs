@@ -185,7 +185,7 @@ fn kernels_source(interfaces: &[Interface]) -> String {
             } else {
                 "Write"
             };
-            let _ = writeln!(s, "            BufferInfo {{ name: \"{}\", access: Access::{access} }},", b.name);
+            let _ = writeln!(s, "            BufferInfo {{ name: \"{}\", access: Access::{access}, alignment: {} }},", b.name, b.alignment);
         }
         let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n    }};", k.scalar_bytes);
         let _ = writeln!(

@@ -43,20 +43,23 @@ fn declared(line: &str) -> Option<&str> {
     (!name.is_empty()).then_some(name)
 }
 
-/// The text with every declared name behind the prefix `olbvh_`, wherever the word occurs outside of comments.
+/// The text with every declared name behind the prefix `olbvh_`, wherever the word occurs outside of comments and means no member of a struct.
 fn prefix(text: &str) -> String {
     let names: BTreeSet<&str> = text.lines().filter_map(declared).filter(|n| !n.to_lowercase().starts_with("olbvh_")).collect();
     let is_ours = |word: &str| names.contains(word) || word.strip_suffix("Block").is_some_and(|w| names.contains(w));
     let mut out = String::with_capacity(text.len() * 5 / 4);
+    let mut in_struct = false;
     for line in text.lines() {
         let (code, comment) = line.find("//").map_or((line, ""), |at| line.split_at(at));
         let mut rest = code;
         while !rest.is_empty() {
             let word = &rest[..rest.find(|c| !is_word(c)).unwrap_or(rest.len())];
-            if is_ours(word) {
+            let member = out.ends_with('.') || in_struct && rest[word.len()..].starts_with([';', '[', ',']);
+            if is_ours(word) && !member {
                 out.push_str("olbvh_");
             }
             let end = if word.is_empty() { rest.chars().next().map_or(0, char::len_utf8) } else { word.len() };
+            in_struct = (in_struct || word == "struct") && !rest.starts_with('}');
             out.push_str(&rest[..end]);
             rest = &rest[end..];
         }

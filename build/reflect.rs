@@ -19,6 +19,8 @@ pub struct Buffer {
     pub name: String,
     pub reads: bool,
     pub writes: bool,
+    /// What its address must be a multiple of.
+    pub alignment: u32,
 }
 
 #[derive(Clone)]
@@ -173,7 +175,10 @@ pub fn interface(words: &[u32], stem: &str) -> Result<Interface, String> {
         let binding = r.decoration(variable, Decoration::Binding).ok_or("buffer without binding")?;
         let flag = |d| r.member_decoration(block, 0, d).is_some() || r.decoration(variable, d).is_some();
         let name = r.names.get(&variable).cloned().unwrap_or_default();
-        buffers.push((binding, Buffer { name, reads: !flag(Decoration::NonReadable), writes: !flag(Decoration::NonWritable) }));
+        let block_name = r.names.get(&block).map_or("", String::as_str);
+        let alignment = block_name.rsplit("Block").next().and_then(|a| a.parse().ok()).ok_or(format!("buffer {name} has no alignment"))?;
+        let (reads, writes) = (!flag(Decoration::NonReadable), !flag(Decoration::NonWritable));
+        buffers.push((binding, Buffer { name, reads, writes, alignment }));
     }
     buffers.sort_by_key(|(binding, _)| *binding);
     if buffers.iter().enumerate().any(|(i, (binding, _))| *binding != i as u32) {

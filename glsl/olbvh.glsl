@@ -37,7 +37,9 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint NONE = OLBVH_NONE;
-#include "shared/records.glsl"
+// Records of four words are read as they are; the kernels of the library have another way as well.
+uvec4 words(uvec4 record) { return record; }
+vec4 floats(vec4 record) { return record; }
 #include "shared/layout.glsl"
 
 OLBVH_BUFFER(0, 8, SceneAddresses, scene)

@@ -37,20 +37,9 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint olbvh_NONE = OLBVH_NONE;
-// Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
-// many fetches (OLBVH_WIDE).
-#ifdef OLBVH_WIDE
-#extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
-#define olbvh_FLOATS u64vec2
-#define olbvh_RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
-uvec4 olbvh_words(u64vec2 record) { return uvec4(unpack32(record.x), unpack32(record.y)); }
-vec4 olbvh_floats(u64vec2 record) { return uintBitsToFloat(olbvh_words(record)); }
-#else
-#define olbvh_FLOATS vec4
-#define olbvh_RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
+// Records of four words are read as they are; the kernels of the library have another way as well.
 uvec4 olbvh_words(uvec4 record) { return record; }
 vec4 olbvh_floats(vec4 record) { return record; }
-#endif
 // Every struct that host and device share; build.rs reflects this file into src/layout.rs, comments included.
 
 // The grid of a mesh (SPEC 2.1).
@@ -133,7 +122,7 @@ struct olbvh_RayState {
     uint hint;      // Cell of the last sample found, or all ones.
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
     uint best;      // Best candidate among them, or all ones.
-    float olbvh_smallest; // Its smallest barycentric coordinate.
+    float smallest; // Its smallest barycentric coordinate.
     uint last;      // Bits of the value at the last sample, for iso-surfaces; all ones where it has none.
     uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits, which no sample needs, tell of the best candidate.
 };
@@ -196,7 +185,7 @@ struct olbvh_RunState {
     uint cursor;    // Candidates of the current leaf already tested.
     uint best;      // Best candidate so far, or all ones.
     uint in_box;    // Whether the best one's box holds the centre.
-    float olbvh_smallest; // Its smallest barycentric coordinate.
+    float smallest; // Its smallest barycentric coordinate.
     uint inside;    // Voxels with their centre in a cell.
     uint waiting;   // Voxels whose boxes must be looked at and have not been listed.
 };
@@ -248,16 +237,16 @@ struct olbvh_SearchState {
 
 // Where a mesh and its tree lie, for the shaders of other programs: device addresses, low word first. See src/glsl.rs.
 struct olbvh_SceneAddresses {
-    uvec2 olbvh_grid;       // Grid with the level of the leaves.
-    uvec2 olbvh_masks;      // Child masks.
-    uvec2 olbvh_co;         // Child offsets.
-    uvec2 olbvh_po;         // Primitive offsets of the leaves.
-    uvec2 olbvh_p;          // Primitive ids.
-    uvec2 olbvh_flags;      // Boundary flags.
-    uvec2 olbvh_cells;      // Vertex indices.
-    uvec2 olbvh_vertices;   // Normalised coordinates.
-    uvec2 olbvh_neighbours; // Neighbour table.
-    uvec2 olbvh_field;      // One float per point, or anything where no field is asked for.
+    uvec2 grid;       // Grid with the level of the leaves.
+    uvec2 masks;      // Child masks.
+    uvec2 co;         // Child offsets.
+    uvec2 po;         // Primitive offsets of the leaves.
+    uvec2 p;          // Primitive ids.
+    uvec2 flags;      // Boundary flags.
+    uvec2 cells;      // Vertex indices.
+    uvec2 vertices;   // Normalised coordinates.
+    uvec2 neighbours; // Neighbour table.
+    uvec2 field;      // One float per point, or anything where no field is asked for.
     uint lists;       // 1: leaves within the mesh have a seed instead of a list.
     uint has_field;   // Not 0: `field` is one.
 };
@@ -481,7 +470,7 @@ struct olbvh_Sides {
     vec4 w;     // as in Weights, opposite to the vertices in their order here
     float sum;  // of them
     bool clear; // as in Weights
-    bool olbvh_near;  // no face says outside by more than the margin
+    bool near;  // no face says outside by more than the margin
 };
 
 olbvh_Sides olbvh_sides_of(vec3 v[4], olbvh_Bounds box, vec3 olbvh_p) {
@@ -493,7 +482,7 @@ olbvh_Sides olbvh_sides_of(vec3 v[4], olbvh_Bounds box, vec3 olbvh_p) {
     r.w = sum < 0.0 ? -w : w;
     r.sum = abs(sum);
     r.clear = olbvh_holds(box, olbvh_p) && all(greaterThan(r.w, vec4(box.margin)));
-    r.olbvh_near = all(greaterThanEqual(r.w, vec4(-box.margin)));
+    r.near = all(greaterThanEqual(r.w, vec4(-box.margin)));
     return r;
 }
 
@@ -667,7 +656,7 @@ struct olbvh_Best {
     uint owner; // NONE: none yet
     bool inside;
     bool in_box;
-    float olbvh_smallest;
+    float smallest;
 };
 
 olbvh_Best olbvh_no_best() { return olbvh_Best(olbvh_NONE, false, false, olbvh_SMALLEST_FLOAT); }
@@ -681,7 +670,7 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     }
     if (best.inside) return;
     float s = olbvh_smallest(w);
-    bool closer = s > best.olbvh_smallest || (s == best.olbvh_smallest && t < best.owner);
+    bool closer = s > best.smallest || (s == best.smallest && t < best.owner);
     bool better = best.owner == olbvh_NONE || (w.in_box && !best.in_box) || (w.in_box == best.in_box && closer);
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
@@ -721,7 +710,7 @@ bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (
 // The owner after the whole list has been searched.
 uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
     if (best.owner == olbvh_NONE || best.inside) return best.owner;
-    return !olbvh_is_boundary_node(leaf) || best.olbvh_smallest >= -tolerance ? best.owner : olbvh_NONE;
+    return !olbvh_is_boundary_node(leaf) || best.smallest >= -tolerance ? best.owner : olbvh_NONE;
 }
 // Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and neighbours.
 
@@ -852,7 +841,7 @@ uint olbvh_owner_at_face(olbvh_Stand s, vec3 x) {
 }
 
 // The owner of x where a stride ends: in a tetrahedron that holds it clearly, or at its face; else NONE.
-uint olbvh_owner_of(olbvh_Stand s, olbvh_Sides at, vec3 x) { return at.clear ? s.t : at.olbvh_near ? olbvh_owner_at_face(s, x) : olbvh_NONE; }
+uint olbvh_owner_of(olbvh_Stand s, olbvh_Sides at, vec3 x) { return at.clear ? s.t : at.near ? olbvh_owner_at_face(s, x) : olbvh_NONE; }
 
 // Goes from `t` towards x, and to its owner if that is not far, and if x does not lie near an edge; false, and anywhere, if not.
 bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
@@ -862,7 +851,7 @@ bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     for (uint k = 0u; k < most; ++k) {
         olbvh_Sides at = olbvh_sides_of(s, x);
         owner = olbvh_owner_of(s, at, x);
-        if (owner != olbvh_NONE || at.olbvh_near || !olbvh_step_on(s, at)) break;
+        if (owner != olbvh_NONE || at.near || !olbvh_step_on(s, at)) break;
     }
     t = owner;
     return owner != olbvh_NONE;
@@ -908,7 +897,7 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
     }
 }
 
-bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.olbvh_smallest >= olbvh_GAP); }
+bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.smallest >= olbvh_GAP); }
 
 // Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
 bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout olbvh_Best best) {
@@ -1016,16 +1005,16 @@ void olbvh_open(uvec2 tree) {
 #ifndef OLBVH_DESCRIPTORS
     olbvh_scene = olbvh_sceneBlock(tree);
     olbvh_SceneAddresses a = olbvh_scene.at[0];
-    olbvh_grid = olbvh_gridBlock(a.olbvh_grid);
-    olbvh_masks = olbvh_masksBlock(a.olbvh_masks);
-    olbvh_co = olbvh_coBlock(a.olbvh_co);
-    olbvh_po = olbvh_poBlock(a.olbvh_po);
-    olbvh_p = olbvh_pBlock(a.olbvh_p);
-    olbvh_flags = olbvh_flagsBlock(a.olbvh_flags);
-    olbvh_cells = olbvh_cellsBlock(a.olbvh_cells);
-    olbvh_vertices = olbvh_verticesBlock(a.olbvh_vertices);
-    olbvh_neighbours = olbvh_neighboursBlock(a.olbvh_neighbours);
-    olbvh_field = olbvh_fieldBlock(a.olbvh_field);
+    olbvh_grid = olbvh_gridBlock(a.grid);
+    olbvh_masks = olbvh_masksBlock(a.masks);
+    olbvh_co = olbvh_coBlock(a.co);
+    olbvh_po = olbvh_poBlock(a.po);
+    olbvh_p = olbvh_pBlock(a.p);
+    olbvh_flags = olbvh_flagsBlock(a.flags);
+    olbvh_cells = olbvh_cellsBlock(a.cells);
+    olbvh_vertices = olbvh_verticesBlock(a.vertices);
+    olbvh_neighbours = olbvh_neighboursBlock(a.neighbours);
+    olbvh_field = olbvh_fieldBlock(a.field);
 #endif
     olbvh_LISTS = olbvh_scene.at[0].lists;
 }

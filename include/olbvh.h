@@ -8,7 +8,8 @@
  * in it the answers will be; parts of buffers begin at multiples of olbvh_plan_sizes.alignment, and all buffers have its usage flags. They are the host's and
  * stay as long as commands that use them are executed. Where nothing else is said, a command reads what it is given in compute shaders, uses its memory in
  * compute shaders and transfers, writes its answers in compute shaders, and no barrier stands before or behind it: the host records olbvh_cmd_barrier, or a
- * barrier of its own, from compute shader and transfer writes to whatever reads the answers or uses the memory next.
+ * barrier of its own that it tells of by olbvh_recording_host_barrier, from compute shader and transfer writes to whatever reads the answers or uses the
+ * memory next.
  *
  * Generated from src/capi by cbindgen; scripts/c_api --write writes it anew. */
 
@@ -190,7 +191,8 @@ typedef struct olbvh_host_device {
    */
   uint32_t shader_int64;
   /*
-   Not 0: `VK_EXT_subgroup_size_control` is enabled with `subgroupSizeControl` and `computeFullSubgroups`.
+   Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
+   vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks.
    */
   uint32_t subgroup_size_control;
   /*
@@ -365,7 +367,7 @@ typedef struct olbvh_plan_sizes {
    */
   uint64_t alignment;
   /*
-   `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
+   `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
    */
   uint32_t usage;
 } olbvh_plan_sizes;
@@ -855,6 +857,11 @@ enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
  Records a barrier: what was written so far is visible to the compute shaders, transfers and indirect commands that follow.
  */
 enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
+
+/*
+ Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+ */
+enum olbvh_status olbvh_recording_host_barrier(struct olbvh_recording *recording);
 
 /*
  Tells what memory a plan wants.

@@ -183,6 +183,17 @@ fn by_descriptors() {
     check(Binding::Descriptors);
 }
 
+/// Nothing of our own kernels is left in it, and members of structs are called what they are called on the host.
+#[test]
+fn other_programs_see_what_is_theirs() {
+    for ours in ["OLBVH_WIDE", "u64vec2", "BUFFER16", "RECORDS", ".olbvh_"] {
+        assert!(!OLBVH.contains(ours), "{ours}");
+    }
+    for member in ["    uvec2 grid; ", "    float smallest; "] {
+        assert!(OLBVH.contains(member), "{member}");
+    }
+}
+
 #[test]
 fn the_file_in_the_repository_is_the_exported_one() {
     let file = concat!(env!("CARGO_MANIFEST_DIR"), "/include/olbvh.glsl");

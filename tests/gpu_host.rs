@@ -8,14 +8,17 @@ use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use host::baseline::Baseline;
 use host::counted::{ARMED, CALLS, counting};
+use host::live::{FAILING, FALLIBLE, live, watching};
 use host::queries::Queries;
 use host::{Frame, Host};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder};
+use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder, Requirements};
+use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, locate};
-use std::sync::{Arc, Mutex};
+use std::ffi::c_char;
+use std::sync::{Arc, Barrier, Mutex, OnceLock};
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
@@ -76,18 +79,126 @@ fn what_is_not_enabled_is_not_used() {
     assert!(odd.unwrap_err().to_string().contains("queue family 99"));
 }
 
+/// What was logged.
+struct Log(Mutex<Vec<String>>);
+
+static LOG: Log = Log(Mutex::new(Vec::new()));
+
+impl log::Log for Log {
+    fn enabled(&self, metadata: &log::Metadata<'_>) -> bool {
+        metadata.level() <= log::Level::Warn
+    }
+
+    fn log(&self, record: &log::Record<'_>) {
+        self.0.lock().unwrap().push(record.args().to_string());
+    }
+
+    fn flush(&self) {}
+}
+
+unsafe extern "system" fn list_nothing(
+    _: vk::PhysicalDevice,
+    _: *const c_char,
+    count: *mut u32,
+    _: *mut vk::ExtensionProperties,
+) -> vk::Result {
+    // SAFETY: the caller's place for the count.
+    unsafe { *count = 0 };
+    vk::Result::SUCCESS
+}
+
+static PROPERTIES: OnceLock<vk::PFN_vkGetPhysicalDeviceProperties2> = OnceLock::new();
+
+/// The driver's own properties, and subgroups of up to 128 lanes.
+unsafe extern "system" fn vary_subgroups(physical: vk::PhysicalDevice, properties: *mut vk::PhysicalDeviceProperties2<'_>) {
+    // SAFETY: a chain of the caller's structs, each of which begins like this one.
+    unsafe {
+        PROPERTIES.get().unwrap()(physical, properties);
+        let mut next = (*properties).p_next.cast::<vk::BaseOutStructure<'_>>();
+        while let Some(found) = next.as_mut() {
+            if found.s_type == vk::StructureType::PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_PROPERTIES {
+                (*next.cast::<vk::PhysicalDeviceSubgroupSizeControlProperties<'_>>()).max_subgroup_size = 128;
+            }
+            next = found.p_next;
+        }
+    }
+}
+
+/// Size control is a part of Vulkan 1.3, listed or not; where sizes vary and it is not enabled, a warning says so.
+#[test]
+fn subgroup_size_control_is_found_and_missed() {
+    let host = Host::new();
+    let (functions, mut one) = (&host.instance, host.instance.fp_v1_1().clone());
+    let mut zero = functions.fp_v1_0().clone();
+    zero.enumerate_device_extension_properties = list_nothing;
+    let bare = ash::Instance::from_parts_1_3(functions.handle(), zero, one.clone(), functions.fp_v1_3().clone());
+    let (listed, unlisted) = (Requirements::check(functions, host.physical), Requirements::check(&bare, host.physical));
+    // SAFETY: the handle is one of this instance.
+    let version = unsafe { functions.get_physical_device_properties(host.physical) }.api_version;
+    assert!(unlisted.extensions.is_empty());
+    assert_eq!(unlisted.subgroup_size_control, listed.subgroup_size_control && version >= vk::API_VERSION_1_3);
+
+    let _ = log::set_logger(&LOG);
+    log::set_max_level(log::LevelFilter::Warn);
+    PROPERTIES.get_or_init(|| one.get_physical_device_properties2);
+    one.get_physical_device_properties2 = vary_subgroups;
+    let varying = ash::Instance::from_parts_1_3(functions.handle(), functions.fp_v1_0().clone(), one, functions.fp_v1_3().clone());
+    let warned = || LOG.0.lock().unwrap().iter().filter(|text| text.contains("no size control enabled")).count();
+    for (instance, warnings) in [(functions, 0), (&varying, 1)] {
+        let enabled = Enabled { subgroup_size_control: false, ..host.enabled() };
+        // SAFETY: as above; what is not enabled is not used.
+        drop(unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), enabled, ..host.lend() }, &GpuOptions::default()) }.unwrap());
+        assert_eq!(warned(), if listed.subgroup_size_control { warnings } else { 0 });
+    }
+}
+
 #[test]
 fn one_device_serves_many_threads() {
     fn shared<T: Send + Sync>() {}
     shared::<Gpu>();
-    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn_jittered([5; 3], 0.3, 1).unwrap();
-    let expected = owners(&gpu, &mesh);
+    let expected = owners(&Gpu::new(&GpuOptions::default()).unwrap(), &mesh);
+    let host = Host::new();
+    let lent = HostDevice { device: watching(&host.device), ..host.lend() };
+    // SAFETY: as above. No self-test, which would compile kernels before the threads do.
+    let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions { trust: true, ..GpuOptions::default() }) }.unwrap();
+    let start = Barrier::new(4);
     std::thread::scope(|scope| {
         for _ in 0..4 {
-            scope.spawn(|| assert_eq!(owners(&gpu, &mesh), expected));
+            scope.spawn(|| {
+                start.wait();
+                assert_eq!(owners(&gpu, &mesh), expected);
+            });
         }
     });
+    drop(gpu);
+    assert_eq!(live(&host.device), 0, "of a kernel that two threads compile at a time one pipeline is left");
+}
+
+/// Whatever fails in opening: what had been made on the host's device is gone.
+#[test]
+fn a_failed_opening_leaves_nothing() {
+    let host = Host::new();
+    // SAFETY: as above; the watched functions do what the device's own do, or fail.
+    let open = |options: &GpuOptions| unsafe { Gpu::from_raw(HostDevice { device: watching(&host.device), ..host.lend() }, options) };
+    let gpu = open(&GpuOptions::default()).unwrap();
+    let target = Some(Target { each: gpu.subgroup_size() + 1, ..gpu.target().clone() });
+    drop(gpu);
+    assert!(open(&GpuOptions { target, ..GpuOptions::default() }).is_err());
+    assert_eq!(live(&host.device), 0, "a target that does not fit");
+    let bindings = [Binding::Address, Binding::Descriptors];
+    for binding in &bindings[usize::from(!host.addresses)..] {
+        let options = GpuOptions { binding: Some(*binding), ..GpuOptions::default() };
+        for (name, before) in FALLIBLE.iter().flat_map(|name| [0, 1, 4].map(|before| (*name, before))) {
+            FAILING.set((name, before));
+            let opened = open(&options);
+            // Some are not needed so often, or not at all.
+            let failed = FAILING.replace(("", 0)) == (name, 0) && opened.is_err();
+            assert!(failed || before > 0 || name.contains("descriptor") || name.contains("query"), "{name} did not fail");
+            drop(opened);
+            assert_eq!(live(&host.device), 0, "{binding:?}: {name} failed after {before}");
+        }
+    }
 }
 
 fn nothing_is_made(binding: Binding) {

@@ -1,9 +1,10 @@
 //! The recorder's own hazard check: whichever barrier is left out, it objects. So no barrier is missing where the check looks, and none is superfluous.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
 
+use ash::vk;
 use host::Frame;
 use host::baseline::Baseline;
 use host::queries::Queries;
@@ -12,7 +13,7 @@ use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
     cmd_ranges, range_bytes,
 };
-use olbvh::gpu::{Buffer, BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::gpu::{Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::{Row, SortTarget, Target};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
@@ -20,7 +21,8 @@ use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
 use olbvh::query::{
-    LocateOptions, Path, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible, visible_bytes,
+    LocateOptions, LocateOutput, Path, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible,
+    visible_bytes,
 };
 
 /// Copies each part, as a caller would use it next.
@@ -163,6 +165,55 @@ fn location() {
         cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })
     });
     assert!(matches!(unordered, Err(Error::Invalid(_))));
+}
+
+/// Barriers of the host's between commands of ours count once it has told of them.
+#[test]
+fn barriers_of_a_host() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let words = |n: u64| gpu.buffer("olbvh.test.words", 4 * n).unwrap();
+    let (a, b, sink) = (words(64), words(64), words(64));
+    let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+    let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+    let all = [vk::MemoryBarrier::default().src_access_mask(writes).dst_access_mask(writes | vk::AccessFlags::TRANSFER_READ)];
+    // SAFETY: the commands are being recorded.
+    let own = |r: &Recorder<'_>| unsafe {
+        gpu.device().cmd_pipeline_barrier(r.commands(), stages, stages, vk::DependencyFlags::empty(), &all, &[], &[]);
+    };
+    let barriers = every_barrier_counts(&gpu, "a host's barriers", |r| {
+        r.fill(a.all(), 1);
+        own(r);
+        r.host_barrier("host.fill → host.copy");
+        r.copy(a.all(), b.all());
+        own(r);
+        r.host_barrier("host.copy → caller");
+        read(r, &[b.all()], &sink);
+        Ok(())
+    });
+    assert_eq!(barriers, 2);
+}
+
+/// An address that a host forgot, or that a kernel cannot load from, is refused before a device follows it; a rehearsal needs none.
+#[test]
+fn addresses_of_a_host() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    if gpu.binding() == Binding::Descriptors {
+        println!("NOT RUN: the device has no buffer addresses");
+        return;
+    }
+    let frame = Frame::new(&gpu, &kuhn_jittered([3; 3], 0.3, 1).unwrap());
+    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
+    let refused = |address: u64| {
+        let barycentrics = BufferRef { address, ..frame.output.barycentrics };
+        let output = LocateOutput { barycentrics, owners: frame.output.owners };
+        let record = |r: &mut Recorder<'_>| cmd_locate(r, &scene, &frame.points, &output, &LocateOptions::default());
+        record(&mut Recorder::rehearse(&gpu)).unwrap();
+        gpu.run("olbvh.test.address", record).unwrap_err().to_string()
+    };
+    let (none, odd) = (refused(0), refused(frame.output.barycentrics.address + 8));
+    assert!(none.contains("olbvh.query.locate is given `barycentrics`, which has no device address"), "{none}");
+    assert!(odd.contains("`barycentrics`, which is not at a multiple of 16 bytes"), "{odd}");
 }
 
 #[test]

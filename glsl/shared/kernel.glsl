@@ -20,7 +20,9 @@
 #define END_ARGUMENTS };
 #ifdef OLBVH_DESCRIPTORS
 #define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments {
-#define ALIGNED_BUFFER(alignment, slot, access, T, name) layout(set = 0, binding = slot, std430) access buffer name##Block { T at[]; } name;
+// The name of the block tells build.rs the alignment.
+#define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \
+    layout(set = 0, binding = slot, std430) access buffer name##Block##alignment { T at[]; } name;
 #else
 #define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments { uvec2 address[buffers];
 #define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \

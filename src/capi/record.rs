@@ -12,7 +12,7 @@ pub(super) use {locate::*, overlap::*, render::*, scene::*, slice::*};
 
 use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, DescriptorPools, Gpu, Recorder};
+use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, Gpu, Recorder};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Scene};
@@ -37,6 +37,17 @@ impl OlbvhBuffer {
     fn part(&self) -> BufferRef {
         let Self { offset, size, address, .. } = *self;
         BufferRef { buffer: vk::Buffer::from_raw(self.buffer), offset, size, address }
+    }
+
+    /// The part, which must begin where parts of buffers may.
+    fn aligned(&self, what: &str) -> Result<BufferRef> {
+        if !self.offset.is_multiple_of(ALIGNMENT) {
+            return Err(Error::Invalid(format!(
+                "{what} at byte {} of their buffer; they must begin at a multiple of {ALIGNMENT}",
+                self.offset
+            )));
+        }
+        Ok(self.part())
     }
 
     /// The part, which must have so many bytes.
@@ -206,6 +217,15 @@ pub extern "C" fn olbvh_recording_stage(recording: *const OlbvhRecording, index:
 pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
     recorded(recording, |r| {
         r.barrier("host → host");
+        Ok(())
+    })
+}
+
+/// Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_recording_host_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
+    recorded(recording, |r| {
+        r.host_barrier("host → host");
         Ok(())
     })
 }

@@ -7,7 +7,7 @@ mod queries;
 use super::host::{OlbvhHostDevice, olbvh_gpu_from_host};
 use super::record::*;
 use super::*;
-use crate::gpu::{BufferRef, HostDevice, Recorder, USAGE};
+use crate::gpu::{Binding, BufferRef, HostDevice, Recorder, USAGE};
 use crate::mesh::kuhn_jittered;
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
@@ -46,7 +46,9 @@ fn frames(gpu: *mut OlbvhGpu) {
     let (positions, cells) = (positions.unwrap(), cells.unwrap());
     let mut plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build: olbvh_default_build_options() };
     let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
-    assert_eq!((sizes.alignment, sizes.usage), (256, USAGE.as_raw()));
+    let address =
+        if device.binding() == Binding::Address { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+    assert_eq!((sizes.alignment, sizes.usage), (256, (USAGE | address).as_raw()));
     let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
     let (memory, scratch) = (buffer(sizes.memory), buffer(sizes.scratch));
     let (owners, barycentrics) = (buffer(4 * u64::from(points)), buffer(16 * u64::from(points)));
@@ -60,6 +62,12 @@ fn frames(gpu: *mut OlbvhGpu) {
     assert_eq!(place(&plan, memory.all(), &raw mut none), OlbvhStatus::Invalid);
     assert!(none.is_null() && message().contains("positions"), "{}", message());
     plan.points -= 1;
+    let moved = |b: BufferRef, by: u64| BufferRef { offset: b.offset + by, ..b };
+    assert_eq!(place(&plan, moved(memory.all(), 128), &raw mut none), OlbvhStatus::Invalid);
+    assert!(none.is_null() && message().contains("at a multiple of 256"), "{}", message());
+    let odd = [moved(positions.all(), 64), cells.all(), memory.all(), scratch.all()].map(part);
+    assert_eq!(olbvh_scene_place(gpu, &raw const plan, odd[0], odd[1], odd[2], odd[3], &raw mut none), OlbvhStatus::Invalid);
+    assert!(none.is_null() && message().contains("positions at byte 64"), "{}", message());
     let scene: *mut OlbvhScene = made(|out| place(&plan, memory.all(), out));
     let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
     let (owners_of, weights) = (part(owners.all()), part(barycentrics.all()));
@@ -74,19 +82,34 @@ fn frames(gpu: *mut OlbvhGpu) {
         owners: owners_of,
         barycentrics: weights,
     };
-    let record = |commands: u64, queries: vk::QueryPool, barrier: bool| {
+    // The host's own barrier, which it may tell of or not.
+    let own_barrier = |commands: u64, told: bool| {
+        let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
+        let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
+        let barrier = [vk::MemoryBarrier::default().src_access_mask(writes).dst_access_mask(writes | vk::AccessFlags::SHADER_READ)];
+        if commands != 0 {
+            let commands = vk::CommandBuffer::from_raw(commands);
+            // SAFETY: the commands are in the recording state.
+            unsafe { device.device().cmd_pipeline_barrier(commands, stages, stages, vk::DependencyFlags::empty(), &barrier, &[], &[]) };
+        }
+        if told {
+            ok(olbvh_recording_host_barrier(recording));
+        }
+    };
+    let record = |commands: u64, queries: vk::QueryPool, told: bool| {
         ok(olbvh_recording_begin(recording, commands, queries.as_raw(), QUERIES));
         ok(olbvh_cmd_build(recording, scene));
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
-        if barrier {
-            ok(olbvh_cmd_barrier(recording));
-        }
+        ok(olbvh_cmd_barrier(recording));
+        ok(olbvh_cmd_locate(recording, scene, &raw const location));
+        own_barrier(commands, told);
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
         olbvh_recording_end(recording)
     };
     assert_eq!(record(0, vk::QueryPool::null(), false), OlbvhStatus::Invalid);
     assert!(message().contains("no barrier between them"), "{}", message());
     assert_eq!(olbvh_cmd_barrier(recording), OlbvhStatus::Invalid, "it has ended");
+    assert_eq!(olbvh_recording_host_barrier(recording), OlbvhStatus::Invalid, "it has ended");
     ok(record(0, vk::QueryPool::null(), true));
 
     let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
@@ -168,7 +191,7 @@ fn a_c_host_records_by_address_and_asks() {
 #[test]
 fn a_c_host_records_by_descriptors_and_makes_nothing() {
     let host = Host::new();
-    let options = GpuOptions { binding: Some(crate::gpu::Binding::Descriptors), ..GpuOptions::default() };
+    let options = GpuOptions { binding: Some(Binding::Descriptors), ..GpuOptions::default() };
     // SAFETY: the host's handles belong together and outlive the frames; the counted functions do what the device's own do.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let gpu = Box::into_raw(Box::new(OlbvhGpu(gpu)));

@@ -11,8 +11,9 @@ use crate::kernels::{Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::HashMap;
+use std::collections::hash_map::Entry;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, OnceLock, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
 
 /// How kernels get their buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -49,7 +50,7 @@ pub struct Gpu {
     ledger: Option<Arc<Ledger>>,
 }
 
-/// What a [`Gpu`] stands on.
+/// What a [`Gpu`] stands on. Dropping it destroys device and instance, unless they are the host's.
 pub(super) struct Foundation {
     pub instance: ash::Instance,
     pub physical: vk::PhysicalDevice,
@@ -65,7 +66,7 @@ pub(super) struct Foundation {
     pub pipeline_cache: Option<vk::PipelineCache>,
     /// The instance has debug-utils enabled.
     pub debug_utils: bool,
-    /// What is destroyed at the end, unless the device is the host's.
+    /// `None`: the device is the host's.
     pub ours: Option<Ours>,
 }
 
@@ -73,6 +74,20 @@ pub(super) struct Foundation {
 pub(super) struct Ours {
     pub debug: Option<DebugUtils>,
     pub _entry: ash::Entry,
+}
+
+impl Drop for Foundation {
+    fn drop(&mut self) {
+        let Some(ours) = &self.ours else { return };
+        // SAFETY: what was made from the device is gone; children go before parents.
+        unsafe {
+            self.device.destroy_device(None);
+            if let Some(debug) = &ours.debug {
+                debug.instance.destroy_debug_utils_messenger(debug.messenger, None);
+            }
+            self.instance.destroy_instance(None);
+        }
+    }
 }
 
 struct Inner {
@@ -86,9 +101,20 @@ struct Inner {
     limits: vk::PhysicalDeviceLimits,
     debug_device: Option<ash::ext::debug_utils::Device>,
     acceleration: Option<Acceleration>,
-    /// A word of ones: the device count of whoever knows the count on the host.
-    unbounded: OnceLock<(vk::Buffer, vk::DeviceMemory, BufferRef)>,
+    constants: Constants,
 }
+
+/// A small buffer that is made before everything else and outlives every recording, in memory of its own: a word of ones, the device count of whoever
+/// knows the count on the host, and room to name where a kernel's optional array is not there.
+#[derive(Default)]
+struct Constants {
+    buffer: vk::Buffer,
+    memory: vk::DeviceMemory,
+    address: u64,
+}
+
+/// Its bytes.
+const CONSTANTS: u64 = 512;
 
 /// An allocator of our own.
 fn make_allocator(foundation: &Foundation) -> Result<Arc<Mutex<Allocator>>> {
@@ -118,6 +144,15 @@ impl Gpu {
             None if requirements.buffer_addresses => Binding::Address,
             None => Binding::Descriptors,
         };
+        if requirements.sizes_vary() && !requirements.subgroup_size_control {
+            let [least, usual, most] = requirements.subgroup_sizes;
+            let name = &report.name;
+            log::warn!(
+                "{name}: subgroups of {least} to {most}, no size control enabled; the driver is trusted to run kernels with {usual}"
+            );
+        }
+        let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
+        target.check(&report.room)?;
         let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(&foundation), Ok)?;
         let cache = if let Some(cache) = foundation.pipeline_cache {
             cache
@@ -129,10 +164,8 @@ impl Gpu {
         };
         // SAFETY: the handle is one of this instance.
         let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
-        let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
-        target.check(&report.room)?;
         let traced = requirements.ray_tracing;
-        let inner = Inner {
+        let mut inner = Inner {
             allocator: Some(allocator),
             pipelines: RwLock::default(),
             cache,
@@ -141,64 +174,32 @@ impl Gpu {
             limits,
             debug_device: foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device)),
             acceleration: traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines)),
-            unbounded: OnceLock::new(),
+            constants: Constants::default(),
             foundation,
         };
+        inner.make_constants()?;
         let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None };
-        gpu.make_unbounded()?;
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
         }
         Ok(gpu)
     }
 
-    /// The word of ones, in memory of its own: it is made before everything else and outlives every recording.
-    fn make_unbounded(&self) -> Result<()> {
-        let device = self.device();
-        let mut usage = super::memory::USAGE;
-        let mut flags = vk::MemoryAllocateFlagsInfo::default();
-        if self.has_addresses() {
-            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-            flags = flags.flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
-        }
-        // SAFETY: plain creation, binding and mapping of one small host-visible buffer; freed in `drop` of `Inner`.
-        unsafe {
-            let buffer =
-                device.create_buffer(&vk::BufferCreateInfo::default().size(512).usage(usage), None).map_err(failed("vkCreateBuffer"))?;
-            let needs = device.get_buffer_memory_requirements(buffer);
-            let memory = self.inner.foundation.instance.get_physical_device_memory_properties(self.inner.foundation.physical);
-            let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-            let kind = (0..memory.memory_type_count)
-                .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted));
-            let kind = kind.ok_or_else(|| Error::NoDevice("no host-visible memory for buffers".into()))?;
-            let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
-            let block = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"))?;
-            device.bind_buffer_memory(buffer, block, 0).map_err(failed("vkBindBufferMemory"))?;
-            let mapped = device.map_memory(block, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).map_err(failed("vkMapMemory"))?;
-            mapped.cast::<u32>().write(u32::MAX);
-            device.unmap_memory(block);
-            super::debug::name(self.debug_device(), buffer, "olbvh.unbounded");
-            let address = if self.has_addresses() {
-                device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(buffer))
-            } else {
-                0
-            };
-            let _ = self.inner.unbounded.set((buffer, block, BufferRef { buffer, offset: 0, size: 512, address }));
-        }
-        Ok(())
-    }
-
     /// The pipeline of a kernel with these constants, compiled at first use.
     pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
         let key = (K::INFO.name, spec.values());
-        if let Some(found) = self.inner.pipelines.read().ok().and_then(|p| p.get(&key).copied()) {
-            return Ok(found);
+        if let Some(found) = self.inner.pipelines.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
+            return Ok(*found);
         }
         let made = create_pipeline(self, K::INFO, &key.1)?;
-        if let Ok(mut pipelines) = self.inner.pipelines.write() {
-            pipelines.insert(key, made);
+        match self.inner.pipelines.write().unwrap_or_else(PoisonError::into_inner).entry(key) {
+            Entry::Vacant(place) => Ok(*place.insert(made)),
+            Entry::Occupied(first) => {
+                // SAFETY: another thread was first, and nobody has got this one.
+                unsafe { made.destroy(self.device()) };
+                Ok(*first.get())
+            }
         }
-        Ok(made)
     }
 
     /// What the device is.
@@ -209,6 +210,13 @@ impl Gpu {
     /// How kernels get their buffers.
     pub fn binding(&self) -> Binding {
         self.inner.binding
+    }
+
+    /// Usage of every buffer that a host hands to kernels: [`super::USAGE`], and the flag for addresses where buffers go by them.
+    pub fn usage(&self) -> vk::BufferUsageFlags {
+        let addresses =
+            if self.binding() == Binding::Address { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+        super::USAGE | addresses
     }
 
     /// Shapes of the kernels.
@@ -297,8 +305,8 @@ impl Gpu {
     }
 
     pub(crate) fn requires_subgroup_size(&self) -> bool {
-        let [least, _, most] = self.inner.foundation.report.requirements.subgroup_sizes;
-        self.inner.foundation.report.requirements.subgroup_size_control && least != most
+        let requirements = &self.report().requirements;
+        requirements.subgroup_size_control && requirements.sizes_vary()
     }
 
     pub(crate) fn has_addresses(&self) -> bool {
@@ -344,7 +352,8 @@ impl Gpu {
     }
 
     fn constant_buffer(&self) -> BufferRef {
-        self.inner.unbounded.get().map_or(BufferRef { buffer: vk::Buffer::null(), offset: 0, size: 512, address: 0 }, |u| u.2)
+        let Constants { buffer, address, .. } = self.inner.constants;
+        BufferRef { buffer, offset: 0, size: CONSTANTS, address }
     }
 
     /// A device-local buffer; see [`Buffer::new`].
@@ -357,6 +366,41 @@ impl Gpu {
 }
 
 impl Inner {
+    /// Makes the constants; what there is of them when something fails goes with the rest.
+    fn make_constants(&mut self) -> Result<()> {
+        let Foundation { instance, physical, device, report, .. } = &self.foundation;
+        let addresses = report.requirements.buffer_addresses;
+        let mut usage = super::memory::USAGE;
+        let mut flags = vk::MemoryAllocateFlagsInfo::default();
+        if addresses {
+            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
+            flags = flags.flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
+        }
+        let made = &mut self.constants;
+        // SAFETY: plain creation, binding and mapping of one small host-visible buffer; freed in `drop`.
+        unsafe {
+            let info = vk::BufferCreateInfo::default().size(CONSTANTS).usage(usage);
+            made.buffer = device.create_buffer(&info, None).map_err(failed("vkCreateBuffer"))?;
+            let needs = device.get_buffer_memory_requirements(made.buffer);
+            let memory = instance.get_physical_device_memory_properties(*physical);
+            let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
+            let kind = (0..memory.memory_type_count)
+                .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted));
+            let kind = kind.ok_or_else(|| Error::NoDevice("no host-visible memory for buffers".into()))?;
+            let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
+            made.memory = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"))?;
+            device.bind_buffer_memory(made.buffer, made.memory, 0).map_err(failed("vkBindBufferMemory"))?;
+            let mapped = device.map_memory(made.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).map_err(failed("vkMapMemory"))?;
+            mapped.cast::<u32>().write(u32::MAX);
+            device.unmap_memory(made.memory);
+            super::debug::name(self.debug_device.as_ref(), made.buffer, "olbvh.constants");
+            if addresses {
+                made.address = device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(made.buffer));
+            }
+        }
+        Ok(())
+    }
+
     /// Writes the pipeline cache beside its file and renames it, so that readers never see half of it.
     fn save_cache(&self) -> Option<()> {
         let file = self.cache_file.as_ref()?;
@@ -374,7 +418,7 @@ impl Inner {
 
 impl Drop for Inner {
     fn drop(&mut self) {
-        let Foundation { instance, device, pipeline_cache, ours, .. } = &self.foundation;
+        let Foundation { device, pipeline_cache, ours, .. } = &self.foundation;
         if pipeline_cache.is_none() {
             self.save_cache();
         }
@@ -385,26 +429,15 @@ impl Drop for Inner {
                 let _ = device.device_wait_idle();
             }
             for p in self.pipelines.get_mut().map(std::mem::take).unwrap_or_default().into_values() {
-                device.destroy_pipeline(p.handle, None);
-                device.destroy_pipeline_layout(p.layout, None);
-                device.destroy_descriptor_set_layout(p.set_layout, None);
+                p.destroy(device);
             }
             if pipeline_cache.is_none() {
                 device.destroy_pipeline_cache(self.cache, None);
             }
-            if let Some((buffer, memory, _)) = self.unbounded.take() {
-                device.destroy_buffer(buffer, None);
-                device.free_memory(memory, None);
-            }
-            drop(self.allocator.take());
-            if let Some(ours) = ours {
-                device.destroy_device(None);
-                if let Some(debug) = &ours.debug {
-                    debug.instance.destroy_debug_utils_messenger(debug.messenger, None);
-                }
-                instance.destroy_instance(None);
-            }
+            device.destroy_buffer(self.constants.buffer, None);
+            device.free_memory(self.constants.memory, None);
         }
+        drop(self.allocator.take());
     }
 }
 

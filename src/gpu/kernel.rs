@@ -3,7 +3,7 @@
 use super::context::{Binding, Gpu};
 use super::memory::BufferRef;
 use super::{debug, failed};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 
 /// How a kernel uses a buffer, from its declaration.
@@ -18,6 +18,8 @@ pub(crate) enum Access {
 pub(crate) struct BufferInfo {
     pub name: &'static str,
     pub access: Access,
+    /// What its address must be a multiple of.
+    pub alignment: u64,
 }
 
 /// A kernel as `build.rs` reflected it.
@@ -47,11 +49,26 @@ pub(crate) trait Kernel {
 }
 
 /// A pipeline with its layouts.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Default)]
 pub(crate) struct Pipeline {
     pub handle: vk::Pipeline,
     pub layout: vk::PipelineLayout,
     pub set_layout: vk::DescriptorSetLayout,
+}
+
+impl Pipeline {
+    /// Destroys what there is of it.
+    ///
+    /// # Safety
+    /// It is of this device, and nothing uses it any more.
+    pub(super) unsafe fn destroy(self, device: &ash::Device) {
+        // SAFETY: as the caller vouches; null handles are passed over.
+        unsafe {
+            device.destroy_pipeline(self.handle, None);
+            device.destroy_pipeline_layout(self.layout, None);
+            device.destroy_descriptor_set_layout(self.set_layout, None);
+        }
+    }
 }
 
 impl KernelInfo {
@@ -76,16 +93,26 @@ impl KernelInfo {
     }
 }
 
-/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars.
-pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Vec<u8> {
+/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars. A host may have forgotten an address; a device that
+/// is given none follows it all the same.
+pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Result<Vec<u8>> {
     let mut push = vec![0u8; K::INFO.push_bytes(binding)];
     arguments.scalars(K::INFO.scalar_base(binding), &mut push);
     if binding == Binding::Address {
-        for (place, buffer) in push.chunks_exact_mut(8).zip(arguments.buffers()) {
+        for ((place, buffer), info) in push.chunks_exact_mut(8).zip(arguments.buffers()).zip(K::INFO.buffers) {
+            // Nothing is looked for in a buffer of no bytes.
+            if buffer.size > 0 && (buffer.address == 0 || !buffer.address.is_multiple_of(info.alignment)) {
+                let fault = if buffer.address == 0 {
+                    "has no device address".into()
+                } else {
+                    format!("is not at a multiple of {} bytes", info.alignment)
+                };
+                return Err(Error::Invalid(format!("{} is given `{}`, which {fault}", K::INFO.name, info.name)));
+            }
             place.copy_from_slice(&buffer.address.to_le_bytes());
         }
     }
-    push
+    Ok(push)
 }
 
 /// The ranges that a kernel uses, and whether it writes them.
@@ -95,6 +122,17 @@ pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
 
 /// Compiles a kernel for a device.
 pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
+    let mut made = Pipeline::default();
+    let compiled = compile(gpu, info, constants, &mut made);
+    if compiled.is_err() {
+        // SAFETY: nobody has got it.
+        unsafe { made.destroy(gpu.device()) };
+    }
+    compiled.map(|()| made)
+}
+
+/// Makes one part of a pipeline after the other.
+fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pipeline) -> Result<()> {
     let device = gpu.device();
     let binding = gpu.binding();
     let words = info.words(binding, gpu.reads_wide());
@@ -113,21 +151,18 @@ pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u
         .collect();
     let values: Vec<u8> = constants.iter().flat_map(|(_, v)| v.to_le_bytes()).collect();
     let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
-    // SAFETY: all structs outlive the calls; objects belong to this device; a partial failure leaks at most one layout, which the
-    // device frees.
+    // SAFETY: all structs outlive the calls; objects belong to this device; the caller destroys what was made before a failure.
     unsafe {
-        let set_layout = if binding == Binding::Descriptors {
+        if binding == Binding::Descriptors {
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
-            device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?
-        } else {
-            vk::DescriptorSetLayout::null()
-        };
-        let sets = [set_layout];
+            made.set_layout = device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?;
+        }
+        let sets = [made.set_layout];
         let mut layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
         if binding == Binding::Descriptors {
             layout_info = layout_info.set_layouts(&sets);
         }
-        let layout = device.create_pipeline_layout(&layout_info, None).map_err(failed("vkCreatePipelineLayout"))?;
+        made.layout = device.create_pipeline_layout(&layout_info, None).map_err(failed("vkCreatePipelineLayout"))?;
         let module = device
             .create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&words), None)
             .map_err(failed("vkCreateShaderModule"))?;
@@ -141,12 +176,12 @@ pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u
             // Where the driver may choose, `gl_SubgroupSize` and the lanes that run can differ: nail both down.
             stage = stage.push_next(&mut required).flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
-        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
-        let made = device.create_compute_pipelines(gpu.pipeline_cache(), &infos, None);
+        let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(made.layout)];
+        let pipelines = device.create_compute_pipelines(gpu.pipeline_cache(), &infos, None);
         device.destroy_shader_module(module, None);
-        let pipeline = made.map_err(|(_, e)| failed("vkCreateComputePipelines")(e))?[0];
-        debug::name(gpu.debug_device(), pipeline, info.name);
-        debug::name(gpu.debug_device(), layout, info.name);
-        Ok(Pipeline { handle: pipeline, layout, set_layout })
+        made.handle = pipelines.map_err(|(_, e)| failed("vkCreateComputePipelines")(e))?[0];
     }
+    debug::name(gpu.debug_device(), made.handle, info.name);
+    debug::name(gpu.debug_device(), made.layout, info.name);
+    Ok(())
 }

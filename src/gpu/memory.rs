@@ -8,7 +8,7 @@ use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Usage of every buffer that kernels touch; the host's buffers need these flags too (the address one only with [`super::Binding::Address`]).
+/// Usage of every buffer that kernels touch, whatever the device; the host's need what [`Gpu::usage`] says.
 pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
     vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
         | vk::BufferUsageFlags::TRANSFER_SRC.as_raw()

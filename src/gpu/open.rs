@@ -3,7 +3,7 @@
 use super::context::{Foundation, Gpu, GpuOptions, Ours};
 use super::debug::DebugUtils;
 use super::failed;
-use super::requirements::DeviceReport;
+use super::requirements::{DeviceReport, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
@@ -38,7 +38,8 @@ fn open_instance() -> Result<Session> {
         wanted.push(ash::khr::portability_enumeration::NAME.as_ptr());
         flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     }
-    let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_2);
+    // What is used of 1.3 is asked for first; 1.2 does.
+    let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_3);
     let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&wanted).flags(flags);
     // SAFETY: all structs outlive the call.
     let instance = unsafe { entry.create_instance(&info, None) }.map_err(|e| match e {
@@ -99,60 +100,56 @@ impl Gpu {
     /// # Errors
     /// [`Error::NoVulkan`], [`Error::NoDevice`] with what is missing, [`Error::SelfTest`].
     pub fn new(options: &GpuOptions) -> Result<Self> {
-        let session = open_instance()?;
-        let chosen = choose(&session.instance, options.device.as_deref());
-        let (physical, report) = match chosen {
-            Ok(chosen) => chosen,
+        let Session { entry, instance, debug } = open_instance()?;
+        let made = choose(&instance, options.device.as_deref())
+            .and_then(|(physical, report)| Ok((physical, make_device(&instance, physical, &report.requirements)?, report)));
+        let (physical, device, report) = match made {
+            Ok(made) => made,
             Err(e) => {
                 // SAFETY: nothing made from the instance is left.
-                unsafe { session.instance.destroy_instance(None) };
+                unsafe { instance.destroy_instance(None) };
                 return Err(e);
             }
         };
-        Self::open(session, physical, report, options)
-    }
-
-    fn open(session: Session, physical: vk::PhysicalDevice, report: DeviceReport, options: &GpuOptions) -> Result<Self> {
-        let requirements = &report.requirements;
-        let Session { entry, instance, debug } = session;
-        let (family, _) = requirements.queue_family.unwrap_or_default();
-        let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-        let extensions: Vec<_> = requirements.extensions.iter().map(|e| e.as_ptr()).collect();
-        let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
-        let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
-        let core = vk::PhysicalDeviceFeatures::default().shader_int64(requirements.shader_int64);
-        let mut info =
-            vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions).enabled_features(&core);
-        if requirements.buffer_addresses {
-            info = info.push_next(&mut addresses);
-        }
-        if requirements.subgroup_size_control {
-            info = info.push_next(&mut control);
-        }
-        let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
-        let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
-        let mut ray_pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
-        if requirements.ray_tracing.any() {
-            info = info.push_next(&mut structures);
-        }
-        if requirements.ray_tracing.queries {
-            info = info.push_next(&mut ray_queries);
-        }
-        if requirements.ray_tracing.pipelines {
-            info = info.push_next(&mut ray_pipelines);
-        }
-        // SAFETY: only features and extensions that the device reported are enabled; all structs outlive the calls.
-        let (device, queue) = unsafe {
-            let device = instance.create_device(physical, &info, None).map_err(failed("vkCreateDevice"))?;
-            let queue = device.get_device_queue(family, 0);
-            (device, queue)
-        };
+        let (family, _) = report.requirements.queue_family.unwrap_or_default();
+        // SAFETY: the device was made with a queue of the family.
+        let queue = Some(Arc::new(Mutex::new(unsafe { device.get_device_queue(family, 0) })));
         let ours = Some(Ours { debug: if debug { DebugUtils::new(&entry, &instance) } else { None }, _entry: entry });
-        let queue = Some(Arc::new(Mutex::new(queue)));
         let (allocator, pipeline_cache) = (None, None);
         Self::on(
             Foundation { instance, physical, device, report, family, queue, allocator, pipeline_cache, debug_utils: debug, ours },
             options,
         )
     }
+}
+
+/// A device with everything enabled that is preferred and that it has.
+fn make_device(instance: &ash::Instance, physical: vk::PhysicalDevice, requirements: &Requirements) -> Result<ash::Device> {
+    let (family, _) = requirements.queue_family.unwrap_or_default();
+    let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
+    let extensions: Vec<_> = requirements.extensions.iter().map(|e| e.as_ptr()).collect();
+    let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
+    let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
+    let core = vk::PhysicalDeviceFeatures::default().shader_int64(requirements.shader_int64);
+    let mut info = vk::DeviceCreateInfo::default().queue_create_infos(&queues).enabled_extension_names(&extensions).enabled_features(&core);
+    if requirements.buffer_addresses {
+        info = info.push_next(&mut addresses);
+    }
+    if requirements.subgroup_size_control {
+        info = info.push_next(&mut control);
+    }
+    let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default().acceleration_structure(true);
+    let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
+    let mut ray_pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
+    if requirements.ray_tracing.any() {
+        info = info.push_next(&mut structures);
+    }
+    if requirements.ray_tracing.queries {
+        info = info.push_next(&mut ray_queries);
+    }
+    if requirements.ray_tracing.pipelines {
+        info = info.push_next(&mut ray_pipelines);
+    }
+    // SAFETY: only features and extensions that the device reported are enabled; all structs outlive the call.
+    unsafe { instance.create_device(physical, &info, None) }.map_err(failed("vkCreateDevice"))
 }

@@ -139,7 +139,7 @@ impl RayPipeline {
         r.barrier_between("compute → rays", (shader | transfer, writes | vk::AccessFlags::TRANSFER_WRITE), (rays, reads | writes));
         r.touch(&uses(arguments), self.info.name);
         if !r.is_rehearsal() {
-            let push = push_constants(arguments, Binding::Address);
+            let push = push_constants(arguments, Binding::Address)?;
             let ([launch, miss, hit], callable) = (&self.tables, vk::StridedDeviceAddressRegionKHR::default());
             // SAFETY: pipeline and tables belong together and to this device; push constants fit the layout made from the same numbers; who made
             // the recorder vouches for the command buffer.

@@ -106,7 +106,7 @@ impl<'a> Recorder<'a> {
         &self.stages
     }
 
-    /// The command buffer, for commands of the host's own between ours.
+    /// The command buffer, for commands of the host's own between ours. Of its barriers it tells by [`Recorder::host_barrier`].
     pub fn commands(&self) -> vk::CommandBuffer {
         self.commands
     }
@@ -149,7 +149,7 @@ impl<'a> Recorder<'a> {
             return Ok(());
         }
         let device = self.gpu.device();
-        let push = push_constants(arguments, self.gpu.binding());
+        let push = push_constants(arguments, self.gpu.binding())?;
         // SAFETY: pipeline, layouts and sets belong to this device; push constants fit the layout made from the same numbers; the
         // caller of `new` vouches for the command buffer.
         unsafe {
@@ -182,6 +182,22 @@ impl<'a> Recorder<'a> {
         self.barrier_between(label, (stages, writes), (stages | vk::PipelineStageFlags::DRAW_INDIRECT, writes | reads));
     }
 
+    /// Says that the host recorded such a barrier into [`Recorder::commands`] itself, or one that does more: from writes (and reads) of compute shaders
+    /// and transfers to whatever comes next. Records nothing.
+    pub fn host_barrier(&mut self, label: &'static str) {
+        self.pass_barrier(label);
+    }
+
+    /// What was used before a barrier can be used again; false if this one is to be left out.
+    fn pass_barrier(&mut self, label: &'static str) -> bool {
+        self.barriers.push(label);
+        let passed = self.drop_barrier != Some(self.barriers.len() as u32 - 1);
+        if passed {
+            self.uses.clear();
+        }
+        passed
+    }
+
     /// A barrier between these stages and accesses.
     pub(super) fn barrier_between(
         &mut self,
@@ -189,12 +205,7 @@ impl<'a> Recorder<'a> {
         (source, written): (vk::PipelineStageFlags, vk::AccessFlags),
         (target, used): (vk::PipelineStageFlags, vk::AccessFlags),
     ) {
-        self.barriers.push(label);
-        if self.drop_barrier == Some(self.barriers.len() as u32 - 1) {
-            return;
-        }
-        self.uses.clear();
-        if self.is_rehearsal() {
+        if !self.pass_barrier(label) || self.is_rehearsal() {
             return;
         }
         let barrier = vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(used);

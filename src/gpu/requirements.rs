@@ -31,7 +31,7 @@ pub struct Requirements {
     pub buffer_addresses: bool,
     /// Kernels can compute with 64-bit integers; a driver for processors then reads cells and vertices in half as many loads.
     pub shader_int64: bool,
-    /// Subgroup sizes can be required per pipeline.
+    /// Subgroup sizes can be required per pipeline, and full subgroups.
     pub subgroup_size_control: bool,
     /// Whether and how the device traces rays.
     pub ray_tracing: RayTracing,
@@ -117,8 +117,13 @@ fn missing(offer: &Offer) -> Vec<String> {
 }
 
 impl Requirements {
+    /// A driver may choose the size of subgroups.
+    pub(super) fn sizes_vary(&self) -> bool {
+        self.subgroup_sizes[0] != self.subgroup_sizes[2]
+    }
+
     /// Checks a physical device: Vulkan 1.2, a compute queue, subgroup basic, vote, arithmetic and ballot in compute, 256 invocations per
-    /// workgroup; buffer addresses and subgroup size control are preferred, ray tracing optional.
+    /// workgroup. Buffer addresses are preferred, subgroup size control is wanted where sizes vary, ray tracing is optional.
     pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
@@ -145,8 +150,9 @@ impl Requirements {
         let has = |name: &CStr| listed.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
         let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
-        let can_control = has(ash::ext::subgroup_size_control::NAME);
-        // SAFETY: as above; the extension struct is chained only where the extension exists.
+        // A part of Vulkan 1.3, which a driver need not list any more.
+        let can_control = properties.api_version >= vk::API_VERSION_1_3 || has(ash::ext::subgroup_size_control::NAME);
+        // SAFETY: as above; the struct of size control is chained only where the device knows it.
         let core = unsafe {
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut addresses);
             if can_control {

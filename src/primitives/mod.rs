@@ -17,7 +17,7 @@ pub(crate) use selftest::self_test;
 pub use sort::{SortScratch, cmd_sort_pairs};
 
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{DispatchArgs, DispatchArgsSpec};
 
 /// Number of items: an upper limit known to the host, and where given the true number in a word of device memory.
@@ -94,11 +94,14 @@ impl Arena {
     /// The next `bytes` bytes, aligned for every use.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the memory is too small.
+    /// [`Error::Invalid`] if the memory is too small, or lies in its buffer where parts cannot begin.
     pub fn take(&mut self, bytes: u64) -> Result<BufferRef> {
         let begin = self.used;
-        self.used = (begin + bytes.max(16)).next_multiple_of(crate::gpu::ALIGNMENT);
+        self.used = (begin + bytes.max(16)).next_multiple_of(ALIGNMENT);
         match self.memory {
+            Some(memory) if !memory.offset.is_multiple_of(ALIGNMENT) => {
+                Err(Error::Invalid(format!("memory at byte {} of its buffer; it must begin at a multiple of {ALIGNMENT}", memory.offset)))
+            }
             None => Ok(BufferRef { buffer: ash::vk::Buffer::null(), offset: begin, size: bytes.max(16), address: 0 }),
             Some(memory) if begin + bytes.max(16) <= memory.size => Ok(memory.part(begin, bytes.max(16))),
             Some(memory) => Err(Error::Invalid(format!("{} bytes of scratch memory are too few: {} are needed", memory.size, self.used))),

@@ -4,6 +4,7 @@
 
 pub mod baseline;
 pub mod counted;
+pub mod live;
 pub mod queries;
 
 use ash::vk;

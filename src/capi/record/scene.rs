@@ -5,7 +5,7 @@ use crate::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, M
 use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle, put, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, Gpu, USAGE};
+use crate::gpu::{ALIGNMENT, Gpu};
 use crate::options::{BuildOptions, Lists};
 use crate::primitives::Arena;
 use crate::query::Scene;
@@ -43,7 +43,7 @@ pub struct OlbvhPlanSizes {
     pub scratch: u64,
     /// Offsets of parts are multiples of this.
     pub alignment: u64,
-    /// `VkBufferUsageFlags` of every buffer; with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` as well.
+    /// `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
     pub usage: u32,
 }
 
@@ -109,7 +109,7 @@ pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPla
             memory: Arena::measure(|a| plan.memory(a, &planned))?,
             scratch: Arena::measure(|a| plan.scratch(gpu, a, &planned))?,
             alignment: ALIGNMENT,
-            usage: USAGE.as_raw(),
+            usage: gpu.usage().as_raw(),
         };
         put(out, sizes)
     })
@@ -136,10 +136,11 @@ pub extern "C" fn olbvh_scene_place(
                 format!("{} bytes of positions and {} of cells; the plan has {} and {}", positions.size, cells.size, needed.0, needed.1);
             return Err(Error::Invalid(text));
         }
+        let (positions, cells) = (positions.aligned("positions")?, cells.aligned("cells")?);
         let planned = plan.read()?;
         let (arrays, tree) = plan.memory(&mut Arena::new(memory.part()), &planned)?;
         let (mesh_scratch, build_scratch) = plan.scratch(gpu, &mut Arena::new(scratch.part()), &planned)?;
-        let input = MeshInput { positions: positions.part(), stride, points, cells: cells.part(), tets };
+        let input = MeshInput { positions, stride, points, cells, tets };
         let longest_leaf = if plan.longest_leaf == 0 { tets } else { plan.longest_leaf };
         let scene = Scene { mesh: MeshView { input, arrays }, tree, longest_leaf };
         give(out, OlbvhScene { gpu: gpu.clone(), scene, planned, mesh_scratch, build_scratch })
