@@ -33,7 +33,7 @@ impl BufferRef {
     /// A part of a buffer of the host's, `size` bytes from `offset` on. `address`: device address of the first byte, 0 where the device has no buffer addresses.
     ///
     /// # Safety
-    /// The buffer belongs to the device that the part is used on, has the usage of [`USAGE`] (with addresses, that for these as well), and so many bytes, at
+    /// The buffer belongs to the device that the part is used on, has the usage of [`Gpu::usage`], and so many bytes, at
     /// that address.
     pub unsafe fn from_raw(buffer: vk::Buffer, offset: u64, size: u64, address: u64) -> Self {
         Self { buffer, offset, size, address }
