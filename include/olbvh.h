@@ -54,6 +54,10 @@ typedef enum olbvh_status {
    Anything else; please report it.
    */
   OLBVH_STATUS_INTERNAL = 6,
+  /*
+   The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles, and begin again with another device.
+   */
+  OLBVH_STATUS_LOST = 7,
 } olbvh_status;
 
 /*
@@ -175,9 +179,14 @@ typedef struct olbvh_host_device {
    */
   uint64_t device;
   /*
-   `VkQueue` of that family, which nobody else submits to while a function of olbvh runs.
+   `VkQueue` of that family. Nobody else submits to it while a function runs that does work at once (`olbvh_gpu_from_host` with its self-test, uploads,
+   builds, queries); those that record do not touch it. 0: recording is all that is done, untested.
    */
   uint64_t queue;
+  /*
+   `VkPipelineCache` of the host's, which knows the kernels of earlier runs. 0: one that lasts as long as the `olbvh_gpu`.
+   */
+  uint64_t pipeline_cache;
   /*
    Queue family with compute; it needs nothing else.
    */

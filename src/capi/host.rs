@@ -18,8 +18,11 @@ pub struct OlbvhHostDevice {
     pub physical_device: u64,
     /// `VkDevice`.
     pub device: u64,
-    /// `VkQueue` of that family, which nobody else submits to while a function of olbvh runs.
+    /// `VkQueue` of that family. Nobody else submits to it while a function runs that does work at once (`olbvh_gpu_from_host` with its self-test, uploads,
+    /// builds, queries); those that record do not touch it. 0: recording is all that is done, untested.
     pub queue: u64,
+    /// `VkPipelineCache` of the host's, which knows the kernels of earlier runs. 0: one that lasts as long as the `olbvh_gpu`.
+    pub pipeline_cache: u64,
     /// Queue family with compute; it needs nothing else.
     pub queue_family: u32,
     /// Not 0: the feature `bufferDeviceAddress` is enabled.
@@ -39,7 +42,7 @@ pub struct OlbvhHostDevice {
 pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
         let host = handle(host, "host")?;
-        let null = [host.instance, host.physical_device, host.device, host.queue].contains(&0);
+        let null = [host.instance, host.physical_device, host.device].contains(&0);
         let Some(get) = host.get_instance_proc_addr.filter(|_| !null) else {
             return Err(missing("a handle of the host's device"));
         };
@@ -53,9 +56,9 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
                 physical: vk::PhysicalDevice::from_raw(host.physical_device),
                 device,
                 family: host.queue_family,
-                queue: Some(Arc::new(Mutex::new(vk::Queue::from_raw(host.queue)))),
+                queue: (host.queue != 0).then(|| Arc::new(Mutex::new(vk::Queue::from_raw(host.queue)))),
                 allocator: None,
-                pipeline_cache: None,
+                pipeline_cache: (host.pipeline_cache != 0).then(|| vk::PipelineCache::from_raw(host.pipeline_cache)),
                 enabled: Enabled {
                     buffer_addresses: host.buffer_addresses != 0,
                     shader_int64: host.shader_int64 != 0,

@@ -43,6 +43,8 @@ pub enum OlbvhStatus {
     Vulkan = 5,
     /// Anything else; please report it.
     Internal = 6,
+    /// The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles, and begin again with another device.
+    Lost = 7,
 }
 
 /// A device.
@@ -159,6 +161,7 @@ fn status_of(error: &Error) -> OlbvhStatus {
         Error::NoVulkan(_) | Error::NoDevice(_) | Error::SelfTest { .. } => OlbvhStatus::Device,
         Error::Memory { .. } => OlbvhStatus::Memory,
         Error::TooLarge(_) => OlbvhStatus::TooLarge,
+        Error::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. } => OlbvhStatus::Lost,
         Error::Vulkan { .. } => OlbvhStatus::Vulkan,
         _ => OlbvhStatus::Internal,
     }

@@ -173,6 +173,7 @@ fn a_c_host_records_by_address_and_asks() {
         physical_device: host.physical.as_raw(),
         device: host.device.handle().as_raw(),
         queue: host.queue().lock().unwrap().as_raw(),
+        pipeline_cache: 0,
         queue_family: host.family,
         buffer_addresses: u32::from(host.addresses),
         shader_int64: u32::from(host.int64),
@@ -183,7 +184,24 @@ fn a_c_host_records_by_address_and_asks() {
     frames(gpu);
     queries::owned(gpu);
     olbvh_gpu_free(gpu);
-    lent.queue = 0;
+    // Without a queue there is nothing but recording, here with a pipeline cache of the host's.
+    // SAFETY: plain creation; destroyed below, when nothing uses it any more.
+    let cache = unsafe { host.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }.unwrap();
+    (lent.queue, lent.pipeline_cache) = (0, cache.as_raw());
+    let gpu = made(|out| olbvh_gpu_from_host(&raw const lent, out));
+    let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
+    ok(olbvh_recording_begin(recording, 0, 0, 0));
+    ok(olbvh_cmd_barrier(recording));
+    ok(olbvh_recording_end(recording));
+    olbvh_recording_free(recording);
+    let (point, tet, mut mesh) = ([[0f32; 3]; 4], [[0u32, 1, 2, 3]], null_mut());
+    let upload = olbvh_mesh_upload(gpu, point.as_ptr().cast(), 4, tet.as_ptr().cast(), 1, 0, &raw mut mesh);
+    assert!(upload == OlbvhStatus::Invalid && message().contains("lent no queue"), "{}", message());
+    assert_eq!(handle(gpu, "gpu").unwrap().0.pipeline_cache(), cache);
+    olbvh_gpu_free(gpu);
+    // SAFETY: as above.
+    unsafe { host.device.destroy_pipeline_cache(cache, None) };
+    lent.device = 0;
     let mut none = null_mut();
     assert_eq!(olbvh_gpu_from_host(&raw const lent, &raw mut none), OlbvhStatus::Invalid);
 }
