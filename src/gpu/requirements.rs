@@ -168,7 +168,10 @@ impl Requirements {
             pipelines: can_trace && has(ash::khr::ray_tracing_pipeline::NAME),
         };
         let ray_tracing = traces_rays(instance, device, listed_ways);
-        let subgroup_size_control = can_control && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
+        // Metal chooses sizes by itself: MoltenVK has the features, but no stage takes a size that is required.
+        let can_require = control.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE);
+        let subgroup_size_control =
+            can_control && can_require && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
         let sizes = if can_control {
             [control.min_subgroup_size, subgroup.subgroup_size, control.max_subgroup_size]
         } else {
