@@ -1,7 +1,7 @@
 //! A device of the host's: what it must have enabled, and what it lends.
 
 use super::context::{Foundation, Gpu, GpuOptions};
-use super::requirements::{DeviceReport, RayTracing};
+use super::requirements::{DeviceReport, RayTracing, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::vulkan::Allocator;
@@ -66,22 +66,22 @@ impl Gpu {
     /// clone of the `Gpu` and everything made from it. When the last is dropped, nothing recorded through it is being executed.
     pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
         let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;
-        let mut report = DeviceReport::new(&instance, physical);
-        let requirements = &mut report.requirements;
-        if !requirements.missing.is_empty() {
-            return Err(Error::NoDevice(format!("{} lacks {}", report.name, requirements.missing.join(", "))));
-        }
+        let mut requirements = Requirements::check(&instance, physical);
         requirements.buffer_addresses &= enabled.buffer_addresses;
         requirements.shader_int64 &= enabled.shader_int64;
         requirements.subgroup_size_control &= enabled.subgroup_size_control;
         requirements.ray_tracing.queries &= enabled.ray_tracing.queries && requirements.buffer_addresses;
         requirements.ray_tracing.pipelines &= enabled.ray_tracing.pipelines && requirements.buffer_addresses;
+        let mut report = DeviceReport::of(&instance, physical, requirements);
+        if !report.requirements.missing.is_empty() {
+            return Err(Error::NoDevice(format!("{} lacks {}", report.name, report.requirements.missing.join(", "))));
+        }
         // SAFETY: the handle is one of this instance.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let Some(of_family) = families.get(family as usize).filter(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)) else {
             return Err(Error::NoDevice(format!("queue family {family} of {} has no compute", report.name)));
         };
-        requirements.queue_family = Some((family, of_family.timestamp_valid_bits));
+        report.requirements.queue_family = Some((family, of_family.timestamp_valid_bits));
         let (debug_utils, ours) = (enabled.debug_utils, None);
         Self::on(Foundation { instance, physical, device, report, family, queue, allocator, pipeline_cache, debug_utils, ours }, options)
     }

@@ -4,6 +4,9 @@ use crate::kernels::Room;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
+/// The vendor's number.
+const INTEL: u32 = 0x8086;
+
 /// How a device traces rays; a baseline uses that, nothing else does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayTracing {
@@ -116,6 +119,13 @@ fn missing(offer: &Offer) -> Vec<String> {
     missing
 }
 
+/// The subgroup size that kernels are compiled for: the usual one. Intel's is the largest, 32, which leaves a lane 32 or 64 words of registers, too few for
+/// the queries; where sizes can be required, half of it has twice as many.
+fn subgroup_of(vendor: u32, [least, usual, most]: [u32; 3], control: bool) -> u32 {
+    let size = if vendor == INTEL && control { usual.min(16).clamp(least, most) } else { usual };
+    size.max(1)
+}
+
 impl Requirements {
     /// A driver may choose the size of subgroups.
     pub(super) fn sizes_vary(&self) -> bool {
@@ -225,7 +235,11 @@ fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: Ray
 impl DeviceReport {
     /// Reads a device's properties and checks it.
     pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
-        let requirements = Requirements::check(instance, device);
+        Self::of(instance, device, Requirements::check(instance, device))
+    }
+
+    /// Reads a device's properties, for use with what is left of the requirements.
+    pub(super) fn of(instance: &ash::Instance, device: vk::PhysicalDevice, requirements: Requirements) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         // SAFETY: the handle is one of this instance; the structs live until the calls return.
         let (properties, memory) = unsafe {
@@ -234,7 +248,7 @@ impl DeviceReport {
             (properties.properties, instance.get_physical_device_memory_properties(device))
         };
         let (version, limits) = (properties.api_version, properties.limits);
-        let subgroup = requirements.subgroup_sizes[1].max(1);
+        let subgroup = subgroup_of(properties.vendor_id, requirements.subgroup_sizes, requirements.subgroup_size_control);
         // Kernels have room for the sums of 128 subgroups.
         let subgroups = requirements.workgroup_subgroups.min(128);
         let of_subgroups = subgroup.saturating_mul(subgroups);
@@ -265,6 +279,16 @@ impl DeviceReport {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn kernels_are_compiled_for_sizes_that_there_are() {
+        assert_eq!(subgroup_of(INTEL, [8, 32, 32], true), 16);
+        assert_eq!(subgroup_of(INTEL, [16, 32, 32], true), 16);
+        assert_eq!(subgroup_of(INTEL, [32, 32, 32], true), 32);
+        assert_eq!(subgroup_of(INTEL, [8, 32, 32], false), 32, "the driver chooses");
+        assert_eq!(subgroup_of(0x1002, [32, 64, 64], true), 64);
+        assert_eq!(subgroup_of(0, [0, 0, 0], false), 1);
+    }
 
     #[test]
     fn what_is_missing_is_named() {
