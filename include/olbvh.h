@@ -201,7 +201,7 @@ typedef struct olbvh_host_device {
   uint32_t shader_int64;
   /*
    Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
-   vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks.
+   vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks; Intel's are not.
    */
   uint32_t subgroup_size_control;
   /*

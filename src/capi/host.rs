@@ -30,7 +30,7 @@ pub struct OlbvhHostDevice {
     /// Not 0: feature `shaderInt64` is enabled, which only drivers for processors profit from.
     pub shader_int64: u32,
     /// Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
-    /// vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks.
+    /// vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks; Intel's are not.
     pub subgroup_size_control: u32,
     /// Not 0: the instance extension `VK_EXT_debug_utils` is enabled.
     pub debug_utils: u32,

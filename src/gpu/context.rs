@@ -5,7 +5,7 @@ use super::debug::DebugUtils;
 use super::failed;
 use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
 use super::memory::{Buffer, BufferRef, Ledger};
-use super::requirements::DeviceReport;
+use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
 use crate::kernels::{Row, Target};
 use ash::vk;
@@ -147,6 +147,12 @@ impl Gpu {
         if requirements.sizes_vary() && !requirements.subgroup_size_control {
             let [least, usual, most] = requirements.subgroup_sizes;
             let name = &report.name;
+            // These run a kernel in as many lanes as suits it, and say all the same that there are as many as usual.
+            if report.vendor == INTEL {
+                let text =
+                    format!("{name}: subgroups of {least} to {most}; `subgroupSizeControl` and `computeFullSubgroups` must be enabled");
+                return Err(Error::NoDevice(text));
+            }
             log::warn!(
                 "{name}: subgroups of {least} to {most}, no size control enabled; the driver is trusted to run kernels with {usual}"
             );

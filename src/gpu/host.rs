@@ -16,7 +16,7 @@ pub struct Enabled {
     /// Feature `shaderInt64`, which only drivers for processors profit from.
     pub shader_int64: bool,
     /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes vary: without it
-    /// the driver is trusted to run kernels with its usual size, which a warning in the log tells, and the self-test checks.
+    /// the driver is trusted to run kernels with its usual size, which a warning in the log tells, and the self-test checks; Intel's are not.
     pub subgroup_size_control: bool,
     /// `VK_KHR_acceleration_structure`, and of `VK_KHR_ray_query` and `VK_KHR_ray_tracing_pipeline` those named, with their features: for a baseline only.
     pub ray_tracing: RayTracing,

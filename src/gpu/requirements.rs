@@ -5,7 +5,7 @@ use ash::vk;
 use std::ffi::{CStr, c_char};
 
 /// The vendor's number.
-const INTEL: u32 = 0x8086;
+pub(super) const INTEL: u32 = 0x8086;
 
 /// How a device traces rays; a baseline uses that, nothing else does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
