@@ -187,7 +187,9 @@ impl Requirements {
         } else {
             [subgroup.subgroup_size; 3]
         };
-        let mut extensions: Vec<_> = [ash::ext::subgroup_size_control::NAME].into_iter().filter(|e| has(e)).collect();
+        // A device that is no whole Vulkan, such as MoltenVK's, must be told that this is known.
+        let always = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
+        let mut extensions: Vec<_> = always.into_iter().filter(|e| has(e)).collect();
         if ray_tracing.any() {
             extensions.extend(for_structures);
         }
