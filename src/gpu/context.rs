@@ -390,11 +390,20 @@ impl Inner {
             let needs = device.get_buffer_memory_requirements(made.buffer);
             let memory = instance.get_physical_device_memory_properties(*physical);
             let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-            let kind = (0..memory.memory_type_count)
-                .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted));
-            let kind = kind.ok_or_else(|| Error::NoDevice("no host-visible memory for buffers".into()))?;
-            let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
-            made.memory = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"))?;
+            let find = |wanted| {
+                (0..memory.memory_type_count)
+                    .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted))
+            };
+            // Every invocation reads the word: beside the device, if there is room, and not across a bus.
+            let mut allocated = Err(Error::NoDevice("no host-visible memory for buffers".into()));
+            for kind in [wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL, wanted].into_iter().filter_map(find) {
+                let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
+                allocated = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"));
+                if allocated.is_ok() {
+                    break;
+                }
+            }
+            made.memory = allocated?;
             device.bind_buffer_memory(made.buffer, made.memory, 0).map_err(failed("vkBindBufferMemory"))?;
             let mapped = device.map_memory(made.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).map_err(failed("vkMapMemory"))?;
             mapped.cast::<u32>().write(u32::MAX);
