@@ -189,13 +189,25 @@ impl Buffer {
         &self.name
     }
 
+    /// The allocation, if its memory has these properties besides being coherent.
+    fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
+        let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;
+        self.allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
+    }
+
     /// The bytes, where the memory is visible to the host.
     pub(crate) fn mapped(&self) -> Option<&[u8]> {
-        self.allocation.as_ref()?.mapped_slice()?.get(..self.size as usize)
+        self.coherent(vk::MemoryPropertyFlags::empty())?.mapped_slice()?.get(..self.size as usize)
+    }
+
+    /// As [`Buffer::mapped`], where the host reads it through its caches: without, it is faster to copy it to where it does.
+    pub(crate) fn cached(&self) -> Option<&[u8]> {
+        self.coherent(vk::MemoryPropertyFlags::HOST_CACHED)?.mapped_slice()?.get(..self.size as usize)
     }
 
     /// As [`Buffer::mapped`], to write.
     pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
+        self.coherent(vk::MemoryPropertyFlags::empty())?;
         self.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
     }
 }

@@ -167,7 +167,7 @@ impl Gpu {
         let count = part.size as usize / size_of::<T>();
         let mut data = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
-        if let Some(mapped) = buffer.mapped() {
+        if let Some(mapped) = buffer.cached() {
             let at = part.offset as usize;
             bytes.copy_from_slice(&mapped[at..at + bytes.len()]);
             return Ok(data);
