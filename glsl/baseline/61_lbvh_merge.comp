@@ -3,7 +3,7 @@
 #include "shared/layout.glsl"
 // LBVH baseline, hierarchy: every leaf climbs; at each node the first to arrive leaves its half and stops, the second goes on (Apetrei 2014).
 // Nobody waits for anybody, so no forward progress between workgroups is needed. On Mesa 22.3 lavapipe a memory barrier suspends the whole workgroup
-// as a control barrier does, which this loop does not survive: on processors a workgroup is one subgroup.
+// as a control barrier does, and Metal before 3.2 has none but control barriers, which this loop does not survive: there a workgroup is one subgroup.
 ARGUMENTS(9)
     uint tets;
 END_ARGUMENTS

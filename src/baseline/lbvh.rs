@@ -3,7 +3,7 @@
 use crate::build::{DeviceMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
-use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
+use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Structure};
@@ -86,8 +86,9 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     r.stage("lbvh.sort", |r| cmd_sort_pairs(r, codes, ids, CODE_BITS, Count::host(tets), &sort))?;
     r.barrier("lbvh.sort → lbvh.merge");
     r.stage("lbvh.merge", |r| {
-        // One subgroup on processors: see the kernel.
-        let workgroup = if r.gpu().report().kind == "cpu" { r.gpu().subgroup_size() } else { r.gpu().target().each };
+        // One subgroup where a memory barrier may be one for the workgroup: see the kernel.
+        let alone = matches!(Row::of(r.gpu().report()), Row::Cpu | Row::Apple);
+        let workgroup = if alone { r.gpu().subgroup_size() } else { r.gpu().target().each };
         let spec = LbvhMergeSpec { workgroup, ..Default::default() };
         let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, status, tets };
         r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup)))
