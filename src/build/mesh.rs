@@ -89,11 +89,22 @@ pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
     tets.div_ceil(SUMMING_GROUPS).max(1).next_multiple_of(workgroup)
 }
 
+/// Refuses points that overlap, and those beyond what shaders can number: an index is a signed word to them.
+pub(crate) fn check_points(what: &str, count: u32, stride: u32) -> Result<()> {
+    if stride < 3 {
+        return Err(Error::Invalid(format!("{what} {stride} floats apart; a point has three")));
+    }
+    if u64::from(count) * u64::from(stride) > 1 << 31 {
+        return Err(Error::TooLarge(format!("{count} {what} {stride} floats apart; shaders number 2^31 floats at most")));
+    }
+    Ok(())
+}
+
 /// Records stage 0. Reads `input` in compute shaders; writes `arrays` and `scratch` in transfers and compute shaders. The caller makes
 /// `input` visible before and ends with a barrier after.
 ///
 /// # Errors
-/// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra; [`Error::Invalid`] for a stride below 3.
+/// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra or 2^31 floats of positions; [`Error::Invalid`] for a stride below 3.
 pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
     cmd_prepare(r, input, arrays, scratch, None)
 }
@@ -112,9 +123,7 @@ fn cmd_prepare(
             "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks, see `blocks`"
         )));
     }
-    if stride < 3 {
-        return Err(Error::Invalid(format!("positions {stride} floats apart; a point has three")));
-    }
+    check_points("positions", points, stride)?;
     let MeshArrays { status, grid, bad, boundary, vertices, neighbours } = *arrays;
     let workgroup = r.gpu().target().each;
     let once = r.gpu().subgroup_size();

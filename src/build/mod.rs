@@ -18,6 +18,7 @@ mod ranges;
 mod stages;
 mod tree;
 
+pub(crate) use mesh::check_points;
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};

@@ -2,7 +2,7 @@
 
 use super::order::{PointOrder, cmd_sort_points};
 use super::{Scene, slices};
-use crate::build::{DeviceMesh, Tree};
+use crate::build::{DeviceMesh, Tree, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
@@ -99,14 +99,12 @@ enum Guide {
 /// Records point location. Reads mesh, tree and points in compute shaders, writes `output` in compute shaders; no barrier before or after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without order.
+/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without order; [`Error::TooLarge`] for points of more than 2^31 floats.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
     let tolerance = options.tolerance;
-    if stride < 3 {
-        return Err(Error::Invalid(format!("points {stride} floats apart; a point has three")));
-    }
+    check_points("points", count, stride)?;
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);

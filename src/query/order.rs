@@ -1,6 +1,7 @@
 //! The order in which [`super::Path::Sorted`] locates points: along the Morton curve.
 
 use super::PointInput;
+use crate::build::check_points;
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{PointCodes, PointCodesSpec};
@@ -35,10 +36,11 @@ impl PointOrder {
 /// after.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if a pipeline cannot be made.
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made; [`crate::Error::Invalid`] and [`crate::Error::TooLarge`] as [`super::cmd_locate`].
 pub fn cmd_sort_points(r: &mut Recorder<'_>, grid: BufferRef, input: &PointInput, memory: &PointOrder) -> Result<()> {
     let PointInput { points, stride, count, .. } = *input;
     let PointOrder { order, codes, ref sort } = *memory;
+    check_points("points", count, stride)?;
     let workgroup = r.gpu().target().query;
     r.stage("query.sort_points", |r| {
         let spec = PointCodesSpec { workgroup, code_bits: CODE_BITS, ..Default::default() };
