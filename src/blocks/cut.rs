@@ -1,7 +1,8 @@
 //! How a mesh is cut: boxes of cells, and the tetrahedra that each takes.
 
 use crate::build::{
-    BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, Tree, TreeMemory,
+    BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, MAX_ENTRIES, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, Tree,
+    TreeMemory,
 };
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -256,7 +257,7 @@ impl Size {
     /// About the most bytes that mesh and tree take while the tree is built; all there are if it cannot be numbered.
     fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
         let Self { points, tets, candidates, entries, leaves } = *self;
-        if tets > MAX_TETS as usize || candidates > u64::from(u32::MAX) {
+        if tets > MAX_TETS as usize || candidates > u64::from(u32::MAX) || entries > u64::from(MAX_ENTRIES) {
             return Ok(u64::MAX);
         }
         let (tets, candidates, entries, level) = (tets as u32, candidates as u32, entries as u32, options.level.unwrap_or(0));

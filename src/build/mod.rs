@@ -20,6 +20,7 @@ mod tree;
 
 pub(crate) use mesh::check_points;
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
+pub(crate) use plan::MAX_ENTRIES;
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use stages::MeshView;

@@ -6,6 +6,9 @@ use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
 
+/// Most entries of a tree: an index is a signed word to shaders.
+pub(crate) const MAX_ENTRIES: u32 = i32::MAX.cast_unsigned();
+
 /// Sizes that bound a build. A recorded one wants room for as many candidates as there are tetrahedra: [`super::BuildScratch::carve`] refuses less.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacity {
@@ -32,7 +35,7 @@ impl Capacity {
     /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with lists where the boundary is; the trees of
     /// others get coarser.
     pub fn usual(tets: u32, level: u32) -> Self {
-        Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8), level) }
+        Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).min(MAX_ENTRIES), level) }
     }
 
     /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, so that whatever is built lies within them.
@@ -44,7 +47,7 @@ impl Capacity {
         if size(0)? > bytes {
             return Err(Error::TooLarge(format!("a tree without entries takes {} bytes down to level {level}, not {bytes}", size(0)?)));
         }
-        let (mut fits, mut beyond) = (0, u32::MAX);
+        let (mut fits, mut beyond) = (0, MAX_ENTRIES + 1);
         while fits + 1 < beyond {
             let middle = fits + (beyond - fits) / 2;
             if size(middle)? <= bytes { fits = middle } else { beyond = middle }
@@ -241,8 +244,14 @@ impl SortedScratch {
     /// For this many entries and levels.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`crate::Error::Invalid`] if the arena is too small, [`crate::Error::TooLarge`] for 2^31 entries and more.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, capacity: &Capacity) -> Result<Self> {
+        if capacity.entries > MAX_ENTRIES {
+            return Err(Error::TooLarge(format!(
+                "{} entries; shaders number {MAX_ENTRIES} at most: a larger α makes fewer",
+                capacity.entries
+            )));
+        }
         let runs = capacity.entries.div_ceil(gpu.target().run.rows);
         let table = runs * (capacity.level + 1);
         Ok(Self {
