@@ -74,13 +74,14 @@ pub struct MeshScratch {
 }
 
 impl MeshScratch {
-    /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a face.
+    /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a face; beyond 429 million of them,
+    /// if most do: an index is a signed word to shaders.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.
     pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
         let tets = u64::from(tets);
-        Ok(Self { table: arena.words(5 * tets + 16)?, flat_cells: arena.words(tets.div_ceil(32))? })
+        Ok(Self { table: arena.words((5 * tets + 16).min(1 << 31))?, flat_cells: arena.words(tets.div_ceil(32))? })
     }
 }
 
