@@ -112,6 +112,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     bool by_walk = walks_in(leaf, range);
     if (by_walk) {
         Best first = walked(g, leaf, range, place, x), unused = no_best();
+        if (first.owner == NONE) return 0u;
         arrive(first.owner, x, unused);
         range = uvec2(0u, star_size);
     }

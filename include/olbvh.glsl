@@ -1050,6 +1050,7 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     bool by_walk = olbvh_walks_in(leaf, range);
     if (by_walk) {
         olbvh_Best first = olbvh_walked(g, leaf, range, place, x), unused = olbvh_no_best();
+        if (first.owner == olbvh_NONE) return 0u;
         olbvh_arrive(first.owner, x, unused);
         range = uvec2(0u, olbvh_star_size);
     }
