@@ -7,7 +7,7 @@ use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
 use super::memory::{Buffer, BufferRef, Ledger};
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
-use crate::kernels::{Row, Target};
+use crate::kernels::{ALL, Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::collections::HashMap;
@@ -144,6 +144,13 @@ impl Gpu {
             None if requirements.buffer_addresses => Binding::Address,
             None => Binding::Descriptors,
         };
+        // SAFETY: the handle is one of this instance.
+        let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
+        let (buffers, bound) = (ALL.iter().map(|k| k.buffers.len()).max().unwrap_or(0), limits.max_per_stage_descriptor_storage_buffers);
+        if binding == Binding::Descriptors && buffers > bound as usize {
+            let text = format!("{} binds {bound} storage buffers to a shader; kernels need {buffers}, or buffer addresses", report.name);
+            return Err(Error::NoDevice(text));
+        }
         if requirements.sizes_vary() && !requirements.subgroup_size_control {
             let [least, usual, most] = requirements.subgroup_sizes;
             let name = &report.name;
@@ -168,8 +175,6 @@ impl Gpu {
             // SAFETY: drivers check the header of the data and ignore what is not theirs.
             unsafe { device.create_pipeline_cache(&info, None) }.map_err(failed("vkCreatePipelineCache"))?
         };
-        // SAFETY: the handle is one of this instance.
-        let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
         let traced = requirements.ray_tracing;
         let mut inner = Inner {
             allocator: Some(allocator),
