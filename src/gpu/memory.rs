@@ -19,6 +19,9 @@ pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
 /// Offsets of arrays within a buffer are multiples of this: enough for every device's storage-buffer offsets and 16-byte loads.
 pub const ALIGNMENT: u64 = 256;
 
+/// Addresses of buffers are multiples of this, whatever the device asks for: kernels load 16 bytes at once.
+const LEAST_ALIGNMENT: u64 = 16;
+
 /// A part of a buffer, ours or the host's: what kernels get as an argument. It does not keep the buffer: that must live until commands that were recorded
 /// with it have been executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -151,7 +154,8 @@ impl Buffer {
         // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.
         let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
         // SAFETY: the handle was just made.
-        let requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+        let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+        requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
         let description =
             AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
         let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, claimed: 0, size, address: 0, name: name.into() };
