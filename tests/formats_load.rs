@@ -7,7 +7,7 @@ mod formats_small;
 use formats_small::{POINTS, TETS, all, replace, shared};
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
-use olbvh::mesh::On;
+use olbvh::mesh::{On, kuhn};
 
 fn open(path: impl AsRef<std::path::Path>) -> Loaded {
     load(&path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
@@ -79,6 +79,54 @@ fn shared_spellings_agree() {
         }
     }
     assert!(n >= 35, "{n} spellings");
+}
+
+/// A grid of cubes in uncompressed raw data.
+fn raw_vtu() -> Vec<u8> {
+    let mesh = kuhn([8, 8, 8]).unwrap();
+    let floats: Vec<u8> = mesh.points.iter().flatten().flat_map(|x| x.to_le_bytes()).collect();
+    let nodes: Vec<u8> = mesh.tets.iter().flatten().flat_map(|&v| i64::from(v).to_le_bytes()).collect();
+    let ends: Vec<u8> = (1..=mesh.tets.len()).flat_map(|i| (4 * i as i64).to_le_bytes()).collect();
+    let types = vec![10; mesh.tets.len()];
+    let (mut offset, mut data) = (0, Vec::new());
+    let mut array = |name: &str, kind: &str, components: u32, bytes: &[u8]| {
+        let xml = format!("<DataArray Name='{name}' type='{kind}' NumberOfComponents='{components}' format='appended' offset='{offset}'/>");
+        data.extend((bytes.len() as u64).to_le_bytes());
+        data.extend(bytes);
+        offset = data.len();
+        xml
+    };
+    let points = array("Points", "Float32", 3, &floats);
+    let cells = [("connectivity", "Int64", nodes), ("offsets", "Int64", ends), ("types", "UInt8", types)];
+    let cells: String = cells.iter().map(|(name, kind, bytes)| array(name, kind, 1, bytes)).collect();
+    let (n, m) = (mesh.points.len(), mesh.tets.len());
+    let head = format!(
+        "<VTKFile type='UnstructuredGrid' header_type='UInt64'><UnstructuredGrid><Piece NumberOfPoints='{n}' NumberOfCells='{m}'>\
+         <Points>{points}</Points><Cells>{cells}</Cells></Piece></UnstructuredGrid><AppendedData encoding='raw'>_"
+    );
+    [b"\xef\xbb\xbf", head.as_bytes(), &data, b"</AppendedData></VTKFile>"].concat()
+}
+
+#[test]
+fn what_stays_on_the_disk_is_read_as_from_memory() {
+    let folder = tempfile::tempdir().unwrap();
+    let packed = std::fs::read("tests/data/bracket_50k.vtu").unwrap();
+    for (name, bytes) in [("raw.vtu", raw_vtu()), ("packed.vtu", packed)] {
+        for part in [32, 31, 30, 16, 4, 1] {
+            let bytes = &bytes[..bytes.len() / 32 * part + bytes.len() % 32 * part / 32];
+            let path = write(&folder, name, bytes);
+            let (disk, memory) = (load(&path, &LoadOptions::default()), load_bytes(&path, bytes.to_vec(), &LoadOptions::default()));
+            match (disk, memory) {
+                (Ok(disk), Ok(memory)) => {
+                    assert!(part >= 31, "{name}: {part} of 32 parts are enough");
+                    assert_eq!(disk.report.bytes, memory.report.bytes);
+                    assert!(disk.mesh.tets.len() > 3000 && disk.mesh.tets == memory.mesh.tets && disk.mesh.points == memory.mesh.points);
+                    assert!(disk.mesh.fields.iter().zip(&memory.mesh.fields).all(|(a, b)| a.name == b.name && a.values == b.values));
+                }
+                (disk, memory) => assert_eq!(disk.unwrap_err().to_string(), memory.unwrap_err().to_string(), "{name}"),
+            }
+        }
+    }
 }
 
 #[test]

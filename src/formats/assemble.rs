@@ -93,7 +93,7 @@ impl<'a> Assembly<'a> {
         Self {
             source,
             format,
-            bytes: source.bytes.len() as u64,
+            bytes: source.len() as u64,
             points: Vec::new(),
             first_point: 0,
             arrays: Vec::new(),

@@ -1,33 +1,30 @@
 //! Whole numbers of a file, a window of them at a time: as 64-bit words all at once they would take up to eight times what they take in the file.
 
-use std::borrow::Cow;
 use std::ops::Range;
 
 use super::scalar::Scalar;
-
-/// Numbers converted at once.
-const WINDOW: usize = 1 << 14;
+use super::stored::{Stored, WINDOW};
+use crate::error::Result;
 
 /// Whole numbers as a file has them.
 #[derive(Default)]
 pub(crate) struct Integers<'a> {
     /// `None`: all of them are in the window.
-    stored: Option<Stored<'a>>,
+    stored: Option<(Stored<'a>, Encoding)>,
     /// Those converted last, from number `first` on.
     window: Vec<i64>,
     first: usize,
 }
 
-struct Stored<'a> {
-    bytes: Cow<'a, [u8]>,
+struct Encoding {
     scalar: Scalar,
     big_endian: bool,
 }
 
 impl<'a> Integers<'a> {
     /// Numbers stored as bytes.
-    pub fn stored(bytes: Cow<'a, [u8]>, scalar: Scalar, big_endian: bool) -> Self {
-        Self { stored: Some(Stored { bytes, scalar, big_endian }), ..Self::default() }
+    pub fn stored(bytes: Stored<'a>, scalar: Scalar, big_endian: bool) -> Self {
+        Self { stored: Some((bytes, Encoding { scalar, big_endian })), ..Self::default() }
     }
 
     /// Numbers read from text.
@@ -36,50 +33,54 @@ impl<'a> Integers<'a> {
     }
 
     pub fn len(&self) -> usize {
-        self.stored.as_ref().map_or(self.window.len(), |s| s.bytes.len() / s.scalar.size())
+        self.stored.as_ref().map_or(self.window.len(), |(bytes, encoding)| bytes.len() / encoding.scalar.size())
     }
 
     /// Number `i`; 0 beyond the last.
-    pub fn at(&mut self, i: usize) -> i64 {
-        self.slice(i..i + 1).first().copied().unwrap_or(0)
+    pub fn at(&mut self, i: usize) -> Result<i64> {
+        Ok(self.slice(i..i + 1)?.first().copied().unwrap_or(0))
     }
 
     /// Some that follow each other; none if there are not so many.
-    pub fn slice(&mut self, range: Range<usize>) -> &[i64] {
+    pub fn slice(&mut self, range: Range<usize>) -> Result<&[i64]> {
         if range.end > self.len() || range.start > range.end {
-            return &[];
+            return Ok(&[]);
         }
         if range.start < self.first || range.end > self.first + self.window.len() {
             let end = range.end.max(range.start + WINDOW).min(self.len());
-            if let Some(Stored { bytes, scalar, big_endian }) = &self.stored {
-                self.window = scalar.convert(&bytes[range.start * scalar.size()..end * scalar.size()], *big_endian);
+            if let Some((bytes, Encoding { scalar, big_endian })) = &self.stored {
+                let bytes = bytes.read(range.start * scalar.size()..end * scalar.size())?;
+                self.window.clear();
+                scalar.convert_to(&mut self.window, &bytes, *big_endian);
                 self.first = range.start;
             }
         }
-        &self.window[range.start - self.first..range.end - self.first]
+        Ok(&self.window[range.start - self.first..range.end - self.first])
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::source::Source;
     use super::*;
 
     #[test]
     fn windows_show_what_is_stored() {
+        let source = Source::new("none".as_ref(), Vec::new());
         let values: Vec<i64> = (0..3 * WINDOW as i64 + 5).map(|i| i * 7 - 40_000).collect();
         let little = values.iter().flat_map(|&v| (v as i32).to_le_bytes()).collect::<Vec<u8>>();
         let big = values.iter().flat_map(|&v| v.to_be_bytes()).collect::<Vec<u8>>();
         for mut numbers in [
-            Integers::stored(little.into(), Scalar::I32, false),
-            Integers::stored(big.into(), Scalar::I64, true),
+            Integers::stored(Stored::decoded(&source, little), Scalar::I32, false),
+            Integers::stored(Stored::decoded(&source, big), Scalar::I64, true),
             Integers::parsed(values.clone()),
         ] {
             assert_eq!(numbers.len(), values.len());
             for range in [0..4, 4..9, WINDOW - 2..WINDOW + 3, 0..2, 5..3 * WINDOW, 7..7, values.len() - 1..values.len(), 0..values.len()] {
-                assert_eq!(numbers.slice(range.clone()), &values[range]);
+                assert_eq!(numbers.slice(range.clone()).unwrap(), &values[range]);
             }
-            assert_eq!([3, WINDOW + 1, 0].map(|i| numbers.at(i)), [3, WINDOW + 1, 0].map(|i| values[i]));
-            assert!(numbers.slice(values.len()..values.len() + 1).is_empty() && numbers.at(values.len()) == 0);
+            assert_eq!([3, WINDOW + 1, 0].map(|i| numbers.at(i).unwrap()), [3, WINDOW + 1, 0].map(|i| values[i]));
+            assert!(numbers.slice(values.len()..values.len() + 1).unwrap().is_empty() && numbers.at(values.len()).unwrap() == 0);
         }
     }
 }

@@ -26,6 +26,7 @@ mod procedural;
 mod report;
 mod scalar;
 mod source;
+mod stored;
 mod tags;
 mod tetgen;
 mod unpack;

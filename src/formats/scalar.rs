@@ -112,6 +112,13 @@ impl Scalar {
 
     /// Converts stored numbers; a rest shorter than one number is left out.
     pub fn convert<T: Number>(self, bytes: &[u8], big: bool) -> Vec<T> {
+        let mut values = Vec::with_capacity(bytes.len() / self.size());
+        self.convert_to(&mut values, bytes, big);
+        values
+    }
+
+    /// The same, appended to others.
+    pub fn convert_to<T: Number>(self, values: &mut Vec<T>, bytes: &[u8], big: bool) {
         macro_rules! numbers {
             ($type:ty, $from:ident, $wide:ty) => {{
                 const SIZE: usize = size_of::<$type>();
@@ -121,9 +128,9 @@ impl Scalar {
                     word
                 });
                 if big {
-                    chunks.map(|word| T::$from(<$wide>::from(<$type>::from_be_bytes(word)))).collect()
+                    values.extend(chunks.map(|word| T::$from(<$wide>::from(<$type>::from_be_bytes(word)))));
                 } else {
-                    chunks.map(|word| T::$from(<$wide>::from(<$type>::from_le_bytes(word)))).collect()
+                    values.extend(chunks.map(|word| T::$from(<$wide>::from(<$type>::from_le_bytes(word)))));
                 }
             }};
         }

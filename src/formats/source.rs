@@ -1,34 +1,90 @@
-//! A file read whole, and errors that name a place in it.
+//! A file's content, and errors that name a place in it.
 
+use std::borrow::Cow;
+use std::fs::File;
+use std::io::{Read, Seek, SeekFrom};
+use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// A file in memory.
+/// Read at once while looking for where the raw data of a file begin.
+const PIECE: u64 = 1 << 14;
+
+const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The content of a file.
 pub(crate) struct Source {
     /// Its path, for messages.
     pub path: PathBuf,
-    /// Its content, without a UTF-8 byte-order mark.
+    /// Its content without a UTF-8 byte-order mark: all of it, or its beginning, if `rest` is left on the disk.
     pub bytes: Vec<u8>,
+    rest: Option<Rest>,
+}
+
+/// A file of which the beginning has been read.
+struct Rest {
+    file: File,
+    /// Bytes before the content, a byte-order mark.
+    mark: usize,
+    /// Bytes of the content.
+    length: usize,
 }
 
 impl Source {
-    /// Reads the whole file, of which `kinds` are understood. A memory map would save the copy, but a map of a file that another process cuts short kills
-    /// this one.
+    /// Reads a file, of which `kinds` are understood: the whole of it, but for raw data appended to XML, which are read when they are asked for. (A memory map
+    /// would do that for all, but a map of a file that another process cuts short kills this one.)
     pub fn read(path: &Path, kinds: &str) -> Result<Self> {
-        match std::fs::read(path) {
-            Ok(bytes) => Ok(Self::new(path, bytes)),
+        match Self::open(path) {
+            Ok(source) => Ok(source),
             Err(_) if path.is_dir() => Err(Self::new(path, Vec::new()).error(format!("a folder; name a file in it ({kinds})"))),
             Err(source) => Err(Error::Io { path: path.into(), source }),
         }
     }
 
+    fn open(path: &Path) -> std::io::Result<Self> {
+        let mut file = File::open(path)?;
+        let about = file.metadata()?;
+        let length = usize::try_from(about.len()).unwrap_or(usize::MAX);
+        let mut bytes = Vec::new();
+        bytes.try_reserve_exact(length.saturating_add(1))?;
+        let mut search = RawData::default();
+        while !search.failed && Read::take(&mut file, PIECE).read_to_end(&mut bytes)? > 0 {
+            if search.found_in(&bytes) && bytes.len() < length {
+                let read = bytes.len();
+                let mut source = Self::new(path, bytes);
+                source.bytes.shrink_to_fit();
+                let mark = read - source.bytes.len();
+                return Ok(Self { rest: Some(Rest { file, mark, length: length - mark }), ..source });
+            }
+        }
+        file.read_to_end(&mut bytes)?;
+        Ok(Self::new(path, bytes))
+    }
+
     /// The content of a file.
     pub fn new(path: &Path, mut bytes: Vec<u8>) -> Self {
-        if bytes.starts_with(b"\xef\xbb\xbf") {
-            bytes.drain(..3);
+        if bytes.starts_with(BYTE_ORDER_MARK) {
+            bytes.drain(..BYTE_ORDER_MARK.len());
         }
-        Self { path: path.into(), bytes }
+        Self { path: path.into(), bytes, rest: None }
+    }
+
+    /// Bytes of the content.
+    pub fn len(&self) -> usize {
+        self.rest.as_ref().map_or(self.bytes.len(), |rest| rest.length)
+    }
+
+    /// Bytes of the content, from the disk if they are there.
+    pub fn window(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, String> {
+        let Some(rest) = self.rest.as_ref().filter(|_| range.end > self.bytes.len()) else {
+            return self.bytes.get(range).map(Cow::Borrowed).ok_or_else(|| "it lies beyond the end of the file".into());
+        };
+        let mut file = &rest.file;
+        let mut bytes = vec![0; range.len()];
+        let read = file.seek(SeekFrom::Start((range.start + rest.mark) as u64)).and_then(|_| file.read_exact(&mut bytes));
+        read.map_err(|error| format!("the file cannot be read further: {error}"))?;
+        Ok(Cow::Owned(bytes))
     }
 
     /// An error without a place.
@@ -56,6 +112,33 @@ impl Source {
         let before = &self.bytes[..at.min(self.bytes.len())];
         let feed_follows = |i: usize| self.bytes.get(i + 1) == Some(&b'\n');
         1 + before.iter().enumerate().filter(|&(i, &b)| b == b'\n' || (b == b'\r' && !feed_follows(i))).count()
+    }
+}
+
+/// A search for raw data appended to XML, in a content that grows.
+#[derive(Default)]
+struct RawData {
+    /// Bytes looked at.
+    done: usize,
+    /// Where the element begins.
+    tag: Option<usize>,
+    /// There are none.
+    failed: bool,
+}
+
+impl RawData {
+    /// Whether they have begun: behind the element's tag there is something.
+    fn found_in(&mut self, bytes: &[u8]) -> bool {
+        const TAG: &[u8] = b"<AppendedData";
+        let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
+        self.failed = !text.trim_ascii_start().starts_with(b"<");
+        let from = self.done.saturating_sub(TAG.len());
+        self.done = bytes.len();
+        self.tag = self.tag.or_else(|| bytes[from..].windows(TAG.len()).position(|w| w == TAG).map(|at| from + at));
+        let Some(tag) = self.tag.filter(|_| !self.failed) else { return false };
+        let Some(end) = bytes[tag..].iter().position(|&b| b == b'>') else { return false };
+        self.failed = !bytes[tag..tag + end].windows(3).any(|w| w == b"raw");
+        !self.failed && !bytes[tag + end + 1..].trim_ascii_start().is_empty()
     }
 }
 

@@ -1,11 +1,14 @@
 //! Legacy VTK files (`.vtk`), versions 1.0 to 5.1, text and binary (big-endian).
 
+use std::ops::Range;
+
 use super::assemble::{Array, Assembly};
 use super::cells;
 use super::integers::Integers;
 use super::report::Fate;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::stored::{Content, Stored};
 use crate::error::Result;
 use crate::mesh::On;
 
@@ -25,10 +28,10 @@ struct Cells<'a> {
 
 impl Cells<'_> {
     /// The nodes of cell `i`. `at`: where the one before ended, and then this one.
-    fn nodes(&mut self, i: usize, at: &mut usize) -> &[i64] {
+    fn nodes(&mut self, i: usize, at: &mut usize) -> Result<&[i64]> {
         let (begin, end) = match &mut self.offsets {
-            Some(offsets) => (*at, offsets.at(i + 1) as usize),
-            None => (*at + 1, *at + 1 + self.nodes.at(*at) as usize),
+            Some(offsets) => (*at, offsets.at(i + 1)? as usize),
+            None => (*at + 1, *at + 1 + self.nodes.at(*at)? as usize),
         };
         *at = end;
         self.nodes.slice(begin..end)
@@ -77,10 +80,10 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
     assembly.reserve(types.len());
     let mut end = 0;
     for cell in 0..cells.count {
-        let number = types.at(cell);
+        let number = types.at(cell)?;
         let kind = cells::vtk(number);
         let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
-        let nodes = cells.nodes(cell, &mut end);
+        let nodes = cells.nodes(cell, &mut end)?;
         if ghosts.get(cell) == Some(&true) {
             assembly.skip("ghost cell", Fate::Ghost);
             continue;
@@ -167,11 +170,12 @@ impl<'a> Reader<'a> {
     fn integers(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Integers<'a>> {
         let Some(scalar) = scalar.filter(|_| self.binary) else { return self.values(scalar, count, what).map(Integers::parsed) };
         self.tokens.line();
-        Ok(Integers::stored(self.bytes(Some(scalar), count, what)?.into(), scalar, true))
+        let range = self.range(Some(scalar), count, what)?;
+        Ok(Integers::stored(Stored::new(self.source, what.to_owned(), Content::File(range), None), scalar, true))
     }
 
-    /// The bytes of `count` binary numbers.
-    fn bytes(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<&'a [u8]> {
+    /// Where the bytes of `count` binary numbers are.
+    fn range(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Range<usize>> {
         let at = self.tokens.at;
         let size = scalar.map_or(Some(count.div_ceil(8)), |s| count.checked_mul(s.size()));
         let size = size.filter(|&s| s <= self.tokens.left()).ok_or_else(|| {
@@ -179,11 +183,11 @@ impl<'a> Reader<'a> {
                 .error_byte(at, format!("{count} numbers ({what} each) are announced, but only {} bytes are left", self.tokens.left()))
         })?;
         self.tokens.at += size;
-        Ok(&self.source.bytes[at..at + size])
+        Ok(at..at + size)
     }
 
     fn binary_values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
-        let bytes = self.bytes(scalar, count, what)?;
+        let bytes = &self.source.bytes[self.range(scalar, count, what)?];
         Ok(match scalar {
             Some(scalar) => scalar.convert(bytes, true),
             None => (0..count).map(|i| T::from_i64(i64::from(bytes[i / 8] >> (7 - i % 8) & 1))).collect(),
@@ -217,7 +221,7 @@ impl<'a> Reader<'a> {
             if next == list.len() {
                 return Err(fail(format!("lies beyond the {size} numbers of the list")));
             }
-            let (length, left) = (list.at(next), list.len() - next - 1);
+            let (length, left) = (list.at(next)?, list.len() - next - 1);
             let fits = usize::try_from(length).ok().filter(|&l| l <= left);
             next += 1 + fits.ok_or_else(|| fail(format!("announces {length} points, but {left} numbers are left")))?;
         }
@@ -239,13 +243,13 @@ impl<'a> Reader<'a> {
         let scalar = self.scalar()?;
         let nodes = self.integers(scalar, size, "a point of a cell")?;
         let fail = |message: String| self.source.error_line(at, format!("CELLS: {message}"));
-        let (count, first) = (offsets.len().saturating_sub(1), offsets.at(0));
+        let (count, first) = (offsets.len().saturating_sub(1), offsets.at(0)?);
         if first != 0 {
             return Err(fail(format!("the first offset is {first}, not 0")));
         }
         let mut last = 0;
         for cell in 0..count {
-            let end = offsets.at(cell + 1);
+            let end = offsets.at(cell + 1)?;
             if end < last {
                 return Err(fail(format!("the offsets of cell {cell} go backwards")));
             }

@@ -42,9 +42,9 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let text = head(source);
     let skeleton = Parser { source, reader: Reader::from_str(&text), stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
     let mut codec = skeleton.codec;
-    codec.budget = Budget::new(source.bytes.len(), options);
+    codec.budget = Budget::new(source.len(), options);
     let mut assembly = Assembly::new(source, skeleton.format);
-    assembly.padding = Budget::new(source.bytes.len(), options);
+    assembly.padding = Budget::new(source.len(), options);
     let mut places = Places::new();
     let n_pieces = skeleton.pieces.len();
     let mut starts = Vec::with_capacity(n_pieces);
@@ -145,11 +145,8 @@ impl Parser<'_, '_> {
             return Err(self.source.error_byte(end + space, "the appended data must begin with an underscore"));
         }
         let start = end + space + 1;
-        let stop = if base64 {
-            bytes[space..].iter().position(|&b| b == b'<').map_or(self.source.bytes.len(), |n| end + space + n)
-        } else {
-            self.source.bytes.len()
-        };
+        let stop = if base64 { bytes[space..].iter().position(|&b| b == b'<').map(|n| end + space + n) } else { None };
+        let stop = stop.unwrap_or(self.source.len());
         Ok(Appended { base64, range: start..stop.max(start) })
     }
 
@@ -335,19 +332,10 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
     };
     let mut types = codec.integers(source, find("types")?, Some(piece.cells))?;
     let mut offsets = codec.integers(source, find("offsets")?, Some(piece.cells))?;
-    let mut previous = 0;
-    for cell in 0..offsets.len() {
-        let end = offsets.at(cell);
-        if end < previous {
-            return Err(
-                source.error_in("array `offsets`", format!("cell {cell} of piece {index} would end at {end}, but begins at {previous}"))
-            );
-        }
-        previous = end;
-    }
     let mut connectivity = codec.integers(source, find("connectivity")?, None)?;
-    if previous != connectivity.len() as i64 {
-        let message = format!("the last cell of piece {index} ends at {previous}, but `connectivity` has {} values", connectivity.len());
+    let (all, last) = (connectivity.len() as i64, offsets.at(offsets.len() - 1)?);
+    if last != all {
+        let message = format!("the last cell of piece {index} ends at {last}, but `connectivity` has {all} values");
         return Err(source.error_in("array `offsets`", message));
     }
     let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
@@ -356,8 +344,12 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
     for cell in 0..types.len() {
-        let (number, end) = (types.at(cell), offsets.at(cell) as usize);
-        let nodes = connectivity.slice(start..end);
+        let (number, end) = (types.at(cell)?, offsets.at(cell)?);
+        if !(start..=all).contains(&end) {
+            let message = format!("cell {cell} of piece {index} would reach from {start} to {end} of {all} values");
+            return Err(source.error_in("array `offsets`", message));
+        }
+        let nodes = connectivity.slice(start as usize..end as usize)?;
         start = end;
         if kind.is_none_or(|(n, _)| n != number) {
             let found = cells::vtk(number);
@@ -366,7 +358,11 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
-        if ghosts.as_mut().is_some_and(|(values, marks)| marks(values.at(cell))) {
+        let ghost = match &mut ghosts {
+            Some((values, marks)) => marks(values.at(cell)?),
+            None => false,
+        };
+        if ghost {
             assembly.skip("ghost cell", Fate::Ghost);
         } else if let Some((_, kind)) = kind {
             assembly.push(kind, nodes, offset)?;

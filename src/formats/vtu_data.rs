@@ -8,12 +8,12 @@ use std::ops::Range;
 
 use base64::Engine as _;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
-use rayon::prelude::*;
 
 use super::budget::Budget;
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::stored::{Blocks, Content, Stored};
 use super::unpack::Compressor;
 use crate::error::{Error, Result};
 
@@ -57,7 +57,7 @@ pub(crate) struct Codec {
 
 /// The encoded bytes of an array.
 enum Stream<'a> {
-    Raw(&'a [u8]),
+    Raw(&'a Source, Range<usize>),
     Base64(Vec<&'a [u8]>),
 }
 
@@ -106,7 +106,7 @@ impl Codec {
         }
         Ok(match &array.place {
             Place::Ascii(parts) => Integers::parsed(ascii(source, array, scalar, parts, count)?),
-            _ => Integers::stored(self.bytes(source, array, scalar, count)?, scalar, self.big_endian),
+            _ => Integers::stored(self.stored(source, array, scalar, count)?, scalar, self.big_endian),
         })
     }
 
@@ -115,20 +115,22 @@ impl Codec {
         if let Place::Ascii(parts) = &array.place {
             return ascii(source, array, scalar, parts, count);
         }
-        Ok(scalar.convert(&self.bytes(source, array, scalar, count)?, self.big_endian))
+        self.stored(source, array, scalar, count)?.convert(scalar, self.big_endian)
     }
 
     /// The bytes of an array that is no text.
-    fn bytes<'a>(&mut self, source: &'a Source, array: &StoredArray, scalar: Scalar, count: Option<u64>) -> Result<Cow<'a, [u8]>> {
+    fn stored<'a>(&mut self, source: &'a Source, array: &StoredArray, scalar: Scalar, count: Option<u64>) -> Result<Stored<'a>> {
+        let what = name(source, array);
         if count == Some(0) {
-            return Ok(Cow::Borrowed(&[]));
+            return Ok(Stored::new(source, what, Content::Decoded(Vec::new()), None));
         }
         let stream = self.stream(source, array)?;
-        let bytes = match self.compressor {
-            None => self.plain(&stream, scalar, count),
-            Some(compressor) => self.unpack(&stream, compressor, scalar, count),
+        let found = match self.compressor {
+            None => self.plain(&stream, scalar, count).map(|content| (content, None)),
+            Some(compressor) => self.packed(&stream, compressor, scalar, count).map(|(content, blocks)| (content, Some(blocks))),
         };
-        bytes.map_err(|message| place(source, array, &message))
+        let (content, blocks) = found.map_err(|message| place(source, array, &message))?;
+        Ok(Stored::new(source, what, content, blocks))
     }
 
     fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
@@ -139,8 +141,8 @@ impl Codec {
                 let start = usize::try_from(*offset).ok().and_then(|o| appended.range.start.checked_add(o));
                 let start = start.filter(|&s| s < appended.range.end);
                 let start = start.ok_or_else(|| place(source, array, &format!("offset {offset} lies beyond the end of the file")))?;
-                let bytes = &source.bytes[start..appended.range.end];
-                Ok(if appended.base64 { Stream::Base64(vec![bytes]) } else { Stream::Raw(bytes) })
+                let range = start..appended.range.end;
+                Ok(if appended.base64 { Stream::Base64(vec![&source.bytes[range]]) } else { Stream::Raw(source, range) })
             }
         }
     }
@@ -158,32 +160,28 @@ impl Codec {
         }
     }
 
-    fn plain<'a>(&self, stream: &Stream<'a>, scalar: Scalar, count: Option<u64>) -> Result<Cow<'a, [u8]>, String> {
+    fn plain(&self, stream: &Stream<'_>, scalar: Scalar, count: Option<u64>) -> Result<Content, String> {
         let size = self.header(&stream.prefix(self.word as u64)?, 0);
         check_size(size, scalar, count)?;
         let all = size.checked_add(self.word as u64).ok_or("its size overflows")?;
-        Ok(match stream.prefix(all)? {
-            Cow::Borrowed(bytes) => Cow::Borrowed(&bytes[self.word..]),
-            Cow::Owned(mut bytes) => {
-                bytes.drain(..self.word);
-                Cow::Owned(bytes)
-            }
-        })
+        stream.content(self.word, all)
     }
 
-    fn unpack(
+    /// Where the compressed blocks are, and what they are like.
+    fn packed(
         &mut self,
         stream: &Stream<'_>,
         compressor: Compressor,
         scalar: Scalar,
         count: Option<u64>,
-    ) -> Result<Cow<'static, [u8]>, String> {
+    ) -> Result<(Content, Blocks), String> {
         let word = self.word as u64;
         let start = stream.prefix(3 * word)?;
         let [blocks, block, last] = [0, 1, 2].map(|i| self.header(&start, i));
+        let mut found = Blocks { compressor, packed: Vec::new(), block: block as usize, size: 0 };
         if blocks == 0 {
             check_size(0, scalar, count)?;
-            return Ok(Cow::Borrowed(&[]));
+            return Ok((Content::Decoded(Vec::new()), found));
         }
         if block == 0 || last > block {
             return Err(format!("{blocks} compressed blocks of {block} bytes with a last one of {last}"));
@@ -193,30 +191,28 @@ impl Codec {
         check_size(size, scalar, count)?;
         let refused = |limit: String| format!("it would unpack to {size} bytes, {limit}; save it without compression");
         self.budget.spend(size).map_err(refused)?;
+        found.size = size as usize;
         let header = blocks.checked_add(3).and_then(|n| n.checked_mul(word)).ok_or("its number of blocks overflows")?;
         let sizes = stream.prefix(header)?;
-        let mut end = header;
-        let mut ranges = Vec::with_capacity(blocks as usize);
+        let mut end = 0u64;
         for i in 0..blocks as usize {
             let begin = end;
             end = end.checked_add(self.header(&sizes, i + 3)).ok_or("the sizes of its blocks overflow")?;
-            ranges.push(begin as usize..end as usize);
+            found.packed.push(begin as usize..end as usize);
         }
-        let packed = stream.prefix(end)?;
-        let mut bytes = vec![0; size as usize];
-        let parts: Vec<_> = bytes.chunks_mut(usize::try_from(block).unwrap_or(usize::MAX)).zip(ranges).enumerate().collect();
-        parts.into_par_iter().try_for_each(|(i, (out, range))| {
-            let result = compressor.unpack(&packed[range], out);
-            result.map_err(|why| format!("block {i} of {blocks} ({}): {why}", compressor.name()))
-        })?;
-        Ok(Cow::Owned(bytes))
+        let all = end.checked_add(header).ok_or("the sizes of its blocks overflow")?;
+        Ok((stream.content(header as usize, all)?, found))
     }
+}
+
+/// An array for messages.
+fn name(source: &Source, array: &StoredArray) -> String {
+    format!("array `{}` (line {})", printable(array.name.as_bytes()), source.line(array.at))
 }
 
 /// An error about an array.
 fn place(source: &Source, array: &StoredArray, message: &str) -> Error {
-    let place = format!("array `{}` (line {})", printable(array.name.as_bytes()), source.line(array.at));
-    source.error_in(place, message)
+    source.error_in(name(source, array), message)
 }
 
 fn check_size(size: u64, scalar: Scalar, count: Option<u64>) -> Result<(), String> {
@@ -260,18 +256,36 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
 }
 
 impl<'a> Stream<'a> {
-    /// The first `n` bytes.
-    fn prefix(&self, n: u64) -> Result<Cow<'a, [u8]>, String> {
+    /// `n` as a size, if there are so many bytes.
+    fn within(&self, n: u64) -> Result<usize, String> {
         let room = match self {
-            Stream::Raw(bytes) => bytes.len(),
+            Stream::Raw(_, range) => range.len(),
             Stream::Base64(parts) => parts.iter().map(|p| p.len()).sum::<usize>() / 4 * 3 + 3,
         };
-        let n = usize::try_from(n).ok().filter(|&n| n <= room);
-        let n = n.ok_or_else(|| format!("it is longer than the {room} bytes that are left of the file"))?;
+        let fits = usize::try_from(n).ok().filter(|&n| n <= room);
+        fits.ok_or_else(|| format!("it is longer than the {room} bytes that are left of the file"))
+    }
+
+    /// The first `n` bytes.
+    fn prefix(&self, n: u64) -> Result<Cow<'a, [u8]>, String> {
+        let n = self.within(n)?;
         match self {
-            Stream::Raw(bytes) => Ok(Cow::Borrowed(&bytes[..n])),
+            Stream::Raw(source, range) => source.window(range.start..range.start + n),
             Stream::Base64(parts) => decode_base64(parts, n).map(Cow::Owned),
         }
+    }
+
+    /// What lies behind a header, up to byte `n`.
+    fn content(&self, header: usize, n: u64) -> Result<Content, String> {
+        let n = self.within(n)?;
+        Ok(match self {
+            Stream::Raw(_, range) => Content::File(range.start + header..range.start + n),
+            Stream::Base64(parts) => {
+                let mut bytes = decode_base64(parts, n)?;
+                bytes.drain(..header);
+                Content::Decoded(bytes)
+            }
+        })
     }
 }
 

@@ -1,0 +1,118 @@
+//! The bytes of an array: as they stand in the file, or unpacked, a window at a time, so that no array is in memory twice.
+
+use std::borrow::Cow;
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use super::scalar::{Number, Scalar};
+use super::source::Source;
+use super::unpack::Compressor;
+use crate::error::Result;
+
+/// Numbers converted at once.
+pub(crate) const WINDOW: usize = 1 << 18;
+
+/// An array of a file.
+pub(crate) struct Stored<'a> {
+    source: &'a Source,
+    /// Which one, for messages.
+    what: String,
+    content: Content,
+    blocks: Option<Blocks>,
+}
+
+/// Where bytes are.
+pub(crate) enum Content {
+    /// In this range of the file.
+    File(Range<usize>),
+    /// Here: they were text.
+    Decoded(Vec<u8>),
+}
+
+/// Blocks that were compressed one by one.
+pub(crate) struct Blocks {
+    pub compressor: Compressor,
+    /// Where each lies in the content.
+    pub packed: Vec<Range<usize>>,
+    /// Bytes of each once unpacked, but for the last.
+    pub block: usize,
+    /// Bytes of all of them.
+    pub size: usize,
+}
+
+impl<'a> Stored<'a> {
+    pub fn new(source: &'a Source, what: String, content: Content, blocks: Option<Blocks>) -> Self {
+        Self { source, what, content, blocks }
+    }
+
+    /// Bytes of it.
+    pub fn len(&self) -> usize {
+        self.blocks.as_ref().map_or_else(|| self.content.len(), |blocks| blocks.size)
+    }
+
+    /// The bytes in a range, which must lie in it.
+    pub fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>> {
+        let bytes = match &self.blocks {
+            None => self.content.read(self.source, range),
+            Some(blocks) => blocks.read(range, |packed| self.content.read(self.source, packed)).map(Cow::Owned),
+        };
+        bytes.map_err(|message| self.source.error_in(&self.what, message))
+    }
+
+    /// All of it as numbers.
+    pub fn convert<T: Number>(&self, scalar: Scalar, big_endian: bool) -> Result<Vec<T>> {
+        let mut values = Vec::with_capacity(self.len() / scalar.size());
+        let window = WINDOW * scalar.size();
+        for begin in (0..self.len()).step_by(window) {
+            scalar.convert_to(&mut values, &self.read(begin..self.len().min(begin + window))?, big_endian);
+        }
+        Ok(values)
+    }
+}
+
+impl Content {
+    fn len(&self) -> usize {
+        match self {
+            Content::File(range) => range.len(),
+            Content::Decoded(bytes) => bytes.len(),
+        }
+    }
+
+    fn read<'c>(&'c self, source: &'c Source, range: Range<usize>) -> Result<Cow<'c, [u8]>, String> {
+        match self {
+            Content::File(all) => source.window(all.start + range.start..all.start + range.end),
+            Content::Decoded(bytes) => Ok(Cow::Borrowed(&bytes[range])),
+        }
+    }
+}
+
+impl Blocks {
+    /// Unpacks those that meet a range, side by side, and keeps what lies in it.
+    fn read<'c>(&self, range: Range<usize>, content: impl Fn(Range<usize>) -> Result<Cow<'c, [u8]>, String>) -> Result<Vec<u8>, String> {
+        if range.is_empty() {
+            return Ok(Vec::new());
+        }
+        let (first, last) = (range.start / self.block, (range.end - 1) / self.block);
+        let (begin, end) = (first * self.block, self.size.min((last + 1) * self.block));
+        let start = self.packed[first].start;
+        let packed = content(start..self.packed[last].end)?;
+        let mut bytes = vec![0; end - begin];
+        let parts: Vec<_> = bytes.chunks_mut(self.block).zip(&self.packed[first..]).enumerate().collect();
+        parts.into_par_iter().try_for_each(|(i, (out, range))| {
+            let result = self.compressor.unpack(&packed[range.start - start..range.end - start], out);
+            result.map_err(|why| format!("block {} of {} ({}): {why}", first + i, self.packed.len(), self.compressor.name()))
+        })?;
+        bytes.truncate(range.end - begin);
+        bytes.drain(..range.start - begin);
+        Ok(bytes)
+    }
+}
+
+#[cfg(test)]
+impl Stored<'_> {
+    /// Without a file.
+    pub fn decoded(source: &Source, bytes: Vec<u8>) -> Stored<'_> {
+        Stored::new(source, String::new(), Content::Decoded(bytes), None)
+    }
+}
