@@ -129,7 +129,7 @@ fn memory_of_a_recorded_build() {
             |a: &mut Arena| Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?));
         let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
         let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
-        gpu.run("olbvh.test.build", |r| cmd_build(r, &view, &tree, &capacity, &options, &scratch)).unwrap();
+        gpu.run("olbvh.test.build", |r| cmd_build(r, &view, &tree, &options, &scratch)).unwrap();
         let status = gpu.download::<BuildStatus>(&memory, tree.status.part(0, size_of::<BuildStatus>() as u64)).unwrap()[0];
         assert!(status.overflow == 0 && status.entries <= capacity.entries && status.nodes <= capacity.nodes);
         levels.push(status.level);
@@ -222,7 +222,7 @@ fn every_capacity() {
                 .unwrap();
             gpu.run("olbvh.test.sweep", |r| {
                 built.iter().zip(rooms).try_for_each(|(Built { tree, owners }, &room)| {
-                    cmd_build(r, &view, tree, &tree.capacity, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
+                    cmd_build(r, &view, tree, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
                     let scene = Scene { mesh: view, tree: *tree, longest_leaf: tets };
                     cmd_locate(r, &scene, &points, &LocateOutput { owners: *owners, barycentrics }, &LocateOptions::default())?;
                     r.barrier("locate → build");

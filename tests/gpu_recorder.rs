@@ -288,7 +288,7 @@ fn construction() {
                 let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
                 let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
                 let barriers = every_barrier_counts(&gpu, &format!("build {assign} {boxes} {}", gpu.target().name), |r| {
-                    cmd_build(r, &view, &tree, &capacity, &options, &scratch)?;
+                    cmd_build(r, &view, &tree, &options, &scratch)?;
                     let arrays = [tree.status, tree.grid, tree.p, tree.po, tree.co, tree.flags, tree.masks];
                     read(r, &arrays.into_iter().chain(tree.boxes).collect::<Vec<_>>(), &sink);
                     Ok(())
