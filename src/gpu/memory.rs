@@ -189,15 +189,19 @@ impl Buffer {
         &self.name
     }
 
-    /// The bytes, where the memory is visible to the host.
+    /// The bytes, where the host sees them as the device does: nothing here flushes a cache.
     pub(crate) fn mapped(&self) -> Option<&[u8]> {
-        self.allocation.as_ref()?.mapped_slice()?.get(..self.size as usize)
+        self.allocation.as_ref().filter(|a| is_coherent(a))?.mapped_slice()?.get(..self.size as usize)
     }
 
     /// As [`Buffer::mapped`], to write.
     pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
-        self.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
+        self.allocation.as_mut().filter(|a| is_coherent(a))?.mapped_slice_mut()?.get_mut(..self.size as usize)
     }
+}
+
+fn is_coherent(allocation: &Allocation) -> bool {
+    allocation.memory_properties().contains(vk::MemoryPropertyFlags::HOST_COHERENT)
 }
 
 impl std::fmt::Debug for Buffer {
