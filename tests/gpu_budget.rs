@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, MeshView, Tree, TreeMemory, cmd_build};
+use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
@@ -117,7 +117,7 @@ fn memory_of_a_recorded_build() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = diagonal();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let tets = view.input.tets;
     let mut levels = Vec::new();
     for bytes in [64 << 10, 256 << 10, 1 << 20, 8 << 20] {
@@ -179,7 +179,7 @@ fn every_capacity() {
     let topology = topology(&mesh).unwrap();
     let sizes = measure(&mesh, &topology, &Vertices::new(&mesh, &topology.grid));
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Reject).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let (input, tets) = (view.input, view.input.tets);
     let points = PointInput { points: input.positions, stride: input.stride, count: input.points, hints: None, order: None };
     for (lists, by_entries) in [(Lists::All, false), (Lists::Boundary, false), (Lists::Boundary, true)] {

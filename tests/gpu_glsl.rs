@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 use ash::vk;
-use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::mesh::kuhn_jittered;
@@ -143,7 +143,7 @@ fn check(binding: Binding) {
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+        let view = device.view();
         let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
         let options = LocateOptions::default();
         let expected = locate(&device, &tree, &points, None, &options, &|_, _| {}).unwrap();

@@ -224,7 +224,7 @@ fn ranges_of_a_field() {
     let mesh = kuhn_jittered([6, 5, 4], 0.3, 1).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
     let drawn = gpu.upload("olbvh.test.drawn", &[[0.4f32, 0.5]]).unwrap();
     let nodes = tree.memory().capacity.nodes;
@@ -273,7 +273,7 @@ fn construction() {
             Ok(())
         });
         assert!(barriers >= 5);
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+        let view = device.view();
         for assign in Assign::ALL {
             for (boxes, capacity) in [
                 (false, Capacity::for_entries(60_000, 8)),

@@ -1,5 +1,6 @@
 //! Stage 0: a mesh on the device — bad cells, bounds and grid, normalised vertices, neighbours and boundary bits (SPEC 2.1, 2.3).
 
+use super::stages::MeshView;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
 use crate::kernels::{
@@ -272,6 +273,11 @@ impl DeviceMesh {
     /// Number of points and of tetrahedra.
     pub(crate) fn sizes(&self) -> [usize; 2] {
         [self.input.points as usize, self.input.tets as usize]
+    }
+
+    /// Both of the following, as what is recorded takes them.
+    pub fn view(&self) -> MeshView {
+        MeshView { input: self.input, arrays: self.arrays }
     }
 
     /// Where points and cells lie.

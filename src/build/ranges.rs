@@ -86,9 +86,8 @@ impl FieldRanges {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
         }
         let field = self.gpu.upload("olbvh.ranges.field", values)?;
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
         let ranges = self.memory();
-        self.time = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &view, tree.memory(), (field.all(), on), ranges))?.1;
+        self.time = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges))?.1;
         Ok(())
     }
 

@@ -2,7 +2,7 @@
 
 use super::mesh::DeviceMesh;
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
-use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use super::stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid};
@@ -47,7 +47,7 @@ impl Tree {
     /// [`crate::Error::Invalid`] for α outside 0…10, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
     /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let view = mesh.view();
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
         let mut stages = Vec::new();
 

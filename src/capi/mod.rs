@@ -14,7 +14,7 @@ mod record;
 #[cfg(test)]
 mod tests;
 
-use crate::build::{BadCells, DeviceMesh, MeshInput, MeshView, Tree};
+use crate::build::{BadCells, DeviceMesh, MeshInput, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions};
@@ -315,8 +315,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
         let device = &mesh.device;
         let gpu = device.gpu();
         let tree = Tree::build(gpu, device, &options)?;
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
-        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&view, tree.memory(), None).addresses()])?;
+        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&device.view(), tree.memory(), None).addresses()])?;
         give(out, OlbvhTree { mesh, tree, addresses })
     })
 }

@@ -123,7 +123,7 @@ pub struct Searched {
 impl Searched {
     /// A mesh in memory of our own.
     pub fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
-        Self { mesh: MeshView { input: *mesh.input(), arrays: *mesh.arrays() }, structure: structure.into() }
+        Self { mesh: mesh.view(), structure: structure.into() }
     }
 
     /// The same with other flags for the nodes of an octree.
@@ -164,8 +164,7 @@ fn slices(longest: u32) -> (u32, u32) {
 impl Scene {
     /// A mesh and its tree in memory of our own.
     pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Self {
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
-        Self { mesh: view, tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
+        Self { mesh: mesh.view(), tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
     }
 }
 
