@@ -200,10 +200,11 @@ impl DeviceMesh {
     /// # Errors
     /// As [`DeviceMesh::upload`].
     pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
+        let number = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra; 32 bits number 2^32")));
+        let (points, tets) = (number(mesh.points.len())?, number(mesh.tets.len())?);
         let given = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[*grid])).transpose()?;
         let positions = gpu.upload("olbvh.mesh.positions", &mesh.points)?;
         let cells = gpu.upload("olbvh.mesh.cells", &mesh.tets)?;
-        let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
         let memory = gpu.buffer("olbvh.mesh.arrays", Arena::measure(carve)?)?;

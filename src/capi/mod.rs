@@ -279,9 +279,6 @@ pub extern "C" fn olbvh_mesh_upload(
     out: *mut *mut OlbvhMesh,
 ) -> OlbvhStatus {
     border(|| {
-        let limit = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra in one mesh")));
-        limit(point_count)?;
-        limit(tet_count)?;
         let points = array(points.cast::<[f32; 3]>(), point_count, "points")?.to_vec();
         let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?.to_vec();
         let mesh = Mesh::new(points, tets);
