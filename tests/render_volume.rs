@@ -84,9 +84,7 @@ fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
     let topology = topology(mesh).unwrap();
     let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
     let scene = Scene::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
-    let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-    let bounds = Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) };
-    let expected = brute_force(&scene, settings, &bounds);
+    let expected = brute_force(&scene, settings, &Bounds::from(&tree.grid));
     let picture = render(&scene, &|_, _| ());
     let off = picture.pixels.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
     assert!(off * 1000 <= expected.len() / 4, "{what}: {off} of {} pixels differ", expected.len() / 4);

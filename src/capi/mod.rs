@@ -20,6 +20,7 @@ use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions};
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::render::Bounds;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -328,15 +329,14 @@ pub extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
 pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
     border(|| {
         let OlbvhTree { mesh, tree, addresses } = handle(tree, "tree")?;
-        let (status, grid) = (tree.status(), tree.grid());
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let (status, Bounds { lo, hi }) = (tree.status(), tree.grid().into());
         let info = OlbvhTreeInfo {
             level: status.level,
             entries: status.entries,
             nodes: status.nodes,
             leaves: status.leaves,
-            lo: corner(grid.lo),
-            hi: corner(grid.hi),
+            lo,
+            hi,
             bad_cells: mesh.device.status().bad,
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             address: addresses.all().address,

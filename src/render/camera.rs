@@ -3,6 +3,7 @@
 mod spec;
 
 use crate::error::{Error, Result};
+use crate::layout::Grid;
 use crate::reference::grid::MIN_EXTENT;
 use glam::DVec3;
 
@@ -15,6 +16,13 @@ pub struct Bounds {
     pub lo: [f32; 3],
     /// Upper corner.
     pub hi: [f32; 3],
+}
+
+impl From<&Grid> for Bounds {
+    fn from(grid: &Grid) -> Self {
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        Self { lo: corner(grid.lo), hi: corner(grid.hi) }
+    }
 }
 
 impl Bounds {

@@ -260,8 +260,7 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     let [mesh, other] = meshes();
     let settings = OlbvhPictureSettings { shading: 0, ..settings() };
     let plan = |gpu: &OlbvhTree| {
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let bounds = Bounds { lo: corner(gpu.tree.grid().lo), hi: corner(gpu.tree.grid().hi) };
+        let bounds = Bounds::from(gpu.tree.grid());
         let (neighbours, field) =
             (gpu.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
         Prepared::new(&settings.read().unwrap(), &mesh, &bounds, &neighbours, |_| true, &field).unwrap().plan

@@ -13,7 +13,6 @@ use olbvh::reference::overlap::{Side, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
-use olbvh::render::Bounds;
 use olbvh::slicing::bands;
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
@@ -118,11 +117,10 @@ impl<'a> CpuTree<'a> {
         let start = Instant::now();
         let tree = olbvh::reference::build::build(mesh, &topology, options)?;
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
         let summary = Summary {
             counts: topology.counts,
             bad: topology.bad.clone(),
-            bounds: Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) },
+            bounds: (&tree.grid).into(),
             level: tree.grid.level,
             wanted: match options.level {
                 Some(level) => level,

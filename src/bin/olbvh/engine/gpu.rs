@@ -11,7 +11,6 @@ use olbvh::options::BuildOptions;
 use olbvh::query;
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::volume::Picture;
-use olbvh::render::Bounds;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -64,7 +63,6 @@ impl Engine for Device {
         let device = DeviceMesh::upload(&self.0, mesh, BadCells::Skip)?;
         let tree = Tree::build(&self.0, &device, options)?;
         let (cells, built) = (device.status(), tree.status());
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
         let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
         let summary = Summary {
             counts: Counts {
@@ -75,7 +73,7 @@ impl Engine for Device {
                 flat: cells.zero_volume,
             },
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
-            bounds: Bounds { lo: corner(tree.grid().lo), hi: corner(tree.grid().hi) },
+            bounds: tree.grid().into(),
             level: built.level,
             wanted: options.level.unwrap_or(built.heuristic_level),
             entries: u64::from(built.entries),
