@@ -146,6 +146,13 @@ impl Plan {
         }
     }
 
+    /// The picture of colours as [`crate::query::Drawn`] and the kernels have them, over the background: four bytes per pixel, straight alpha.
+    pub fn pixels(&self, colors: &[[f32; 4]]) -> Vec<u8> {
+        let [width, height] = self.size;
+        let rows = colors.chunks(width.max(1) as usize).zip(0..height);
+        rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| self.background.pixel(color, y, height))).collect()
+    }
+
     /// The reciprocal of the step.
     pub fn inverse_step(&self) -> f32 {
         1.0 / self.step

@@ -109,9 +109,7 @@ impl Engine for Device {
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
         let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.apart();
-        let [width, height] = plan.size;
-        let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
-        let pixels = rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
+        let pixels = plan.pixels(&drawn.colors);
         let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
         let picture = Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms };
         Ok(took.with(Drawn { picture, range, step: plan.step }))
