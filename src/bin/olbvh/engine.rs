@@ -1,4 +1,4 @@
-//! The seam between the subcommands and what computes: build a tree, locate points, draw.
+//! The seam between the subcommands and what computes.
 
 mod cpu;
 mod gpu;
@@ -43,8 +43,8 @@ pub trait Engine {
     fn name(&self) -> String;
     /// The shapes of its kernels, and where they come from; nothing without kernels.
     fn target(&self) -> Option<&Shapes>;
-    /// Marks the boundary and builds the tree.
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>>;
+    /// Marks the boundary, builds the tree, and tells what they are like.
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds owner, barycentric coordinates and value of each point.
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>>;
     /// The same, but finds every tetrahedron that contains each point.
@@ -65,12 +65,6 @@ pub struct Question<'a> {
     pub options: BuildOptions,
     /// Whether all pairs are found.
     pub pairs: bool,
-}
-
-/// A mesh with its tree.
-pub trait Built {
-    /// What they are like.
-    fn summary(&self) -> &Summary;
 }
 
 /// A picture and what was found out for it.

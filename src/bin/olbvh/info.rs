@@ -42,10 +42,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(true)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
-    let built = engine.build(&loaded.mesh, &options)?;
-    let summary = built.summary();
-    let json = json(args, engine.as_ref(), &loaded, summary);
-    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, summary, common.verbose).to_string())
+    let summary = engine.summary(&loaded.mesh, &options)?;
+    let json = json(args, engine.as_ref(), &loaded, &summary);
+    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, &summary, common.verbose).to_string())
 }
 
 /// Lower and upper corner in the coordinates of the source.

@@ -1,6 +1,6 @@
 //! The reference implementation as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
+use super::{Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
 use olbvh::blocks::{InBlocks, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
@@ -26,7 +26,8 @@ struct CpuTree<'a> {
     mesh: &'a Mesh,
     topology: Topology,
     tree: TreeArrays,
-    summary: Summary,
+    topology_ms: f64,
+    build_ms: f64,
 }
 
 impl Engine for Cpu {
@@ -38,8 +39,27 @@ impl Engine for Cpu {
         None
     }
 
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
-        Ok(Box::new(CpuTree::new(mesh, options)?))
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary> {
+        let CpuTree { topology, tree, topology_ms, build_ms, .. } = CpuTree::new(mesh, options)?;
+        let wanted = match options.level {
+            Some(level) => level,
+            None => measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
+        };
+        Ok(Summary {
+            counts: topology.counts,
+            bad: topology.bad,
+            bounds: (&tree.grid).into(),
+            level: tree.grid.level,
+            wanted,
+            entries: tree.p.len() as u64,
+            nodes: u64::from(tree.nodes()),
+            leaves: tree.leaves().len() as u64,
+            memory: tree.memory(),
+            paper_bytes: tree.memory().paper(),
+            topology_ms,
+            build_ms,
+            stages: Vec::new(),
+        })
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
@@ -106,7 +126,7 @@ fn on_host<T>(
 ) -> Result<InBlocks<T>> {
     no_memory(memory)?;
     let tree = CpuTree::new(mesh, options)?;
-    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.summary.build_ms / 1e3 })
+    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3 })
 }
 
 impl<'a> CpuTree<'a> {
@@ -117,25 +137,7 @@ impl<'a> CpuTree<'a> {
         let start = Instant::now();
         let tree = olbvh::reference::build::build(mesh, &topology, options)?;
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let summary = Summary {
-            counts: topology.counts,
-            bad: topology.bad.clone(),
-            bounds: (&tree.grid).into(),
-            level: tree.grid.level,
-            wanted: match options.level {
-                Some(level) => level,
-                None => measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
-            },
-            entries: tree.p.len() as u64,
-            nodes: u64::from(tree.nodes()),
-            leaves: tree.leaves().len() as u64,
-            memory: tree.memory(),
-            paper_bytes: tree.memory().paper(),
-            topology_ms,
-            build_ms,
-            stages: Vec::new(),
-        };
-        Ok(Self { mesh, topology, tree, summary })
+        Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
     fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Vec<Located> {
@@ -153,12 +155,6 @@ impl<'a> CpuTree<'a> {
             report(all.len() as u64, points.len() as u64);
         }
         all
-    }
-}
-
-impl Built for CpuTree<'_> {
-    fn summary(&self) -> &Summary {
-        &self.summary
     }
 }
 

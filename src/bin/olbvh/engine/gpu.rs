@@ -1,6 +1,6 @@
 //! A Vulkan device as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
+use super::{Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
 use olbvh::blocks::{self, InBlocks, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -47,9 +47,6 @@ fn cache_file() -> Option<PathBuf> {
     Some(folder.join("olbvh").join(concat!("pipelines-", env!("CARGO_PKG_VERSION"), ".bin")))
 }
 
-/// A mesh and its tree, measured.
-struct Measured(Summary);
-
 impl Engine for Device {
     fn name(&self) -> String {
         self.0.report().name.clone()
@@ -59,12 +56,12 @@ impl Engine for Device {
         Some(&self.1)
     }
 
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary> {
         let device = DeviceMesh::upload(&self.0, mesh, BadCells::Skip)?;
         let tree = Tree::build(&self.0, &device, options)?;
         let (cells, built) = (device.status(), tree.status());
         let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
-        let summary = Summary {
+        Ok(Summary {
             counts: Counts {
                 cells: device.input().tets,
                 bad: cells.bad,
@@ -84,8 +81,7 @@ impl Engine for Device {
             topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
-        };
-        Ok(Box::new(Measured(summary)))
+        })
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
@@ -117,11 +113,5 @@ impl Engine for Device {
 
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
         Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.apart().1)
-    }
-}
-
-impl Built for Measured {
-    fn summary(&self) -> &Summary {
-        &self.0
     }
 }
