@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "field")]
     all: bool,
     /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
-    #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
+    #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
     /// Each point lies near the one before, as samples of a line or a scan do; without, no order is assumed.
     #[arg(long, conflicts_with = "all")]
