@@ -6,7 +6,7 @@ use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderS
 use crate::error::{Error, Result};
 use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
-use crate::reference::grid::canonical;
+use crate::reference::grid::{canonical, two_to};
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.
@@ -180,8 +180,7 @@ impl Plan {
 pub fn interval_slack(grid: &Grid) -> [f32; 3] {
     let (lo, hi) = (grid.lo, grid.hi);
     let largest = (0..3).map(|c| canonical(hi[c] - lo[c])).fold(0.0, f32::max);
-    let power = |n: u32| f32::from_bits((127 - n) << 23);
-    [0, 1, 2].map(|c| canonical(largest * power(18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * power(21)))
+    [0, 1, 2].map(|c| canonical(largest * two_to(-18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * two_to(-21)))
 }
 
 /// A plan and the normals that its light needs.
