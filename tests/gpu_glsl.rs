@@ -147,7 +147,7 @@ fn check(binding: Binding) {
         let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
         let options = LocateOptions::default();
         let expected = locate(&device, &tree, &points, None, &options, &|_, _| {}).unwrap();
-        let all = locate_all(&device, &tree, &points, &options, &|_, _| {}).unwrap();
+        let all = locate_all(&device, &tree, &points, options.tolerance, &|_, _| {}).unwrap();
         for (i, [owner, owners, value, slope, met]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");

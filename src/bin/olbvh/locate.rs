@@ -75,7 +75,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let points = load_points(&args.points).map_err(Failure::input)?;
     // The difference in double precision: that is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
-    let path = if args.all { query::Path::Descent } else { query::Path::suited(local.len(), mesh.tets.len(), args.coherent) };
+    let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
     let asked = Points { mesh, options, points: &local, how: LocateOptions { path, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);
