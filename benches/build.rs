@@ -30,7 +30,7 @@ fn construction(c: &mut Criterion) {
         };
         group.bench_function(BenchmarkId::new(stage, "any"), |b| b.iter_custom(run));
     }
-    for assign in Assign::ALL {
+    for assign in Assign::EVERY {
         let options = BuildOptions { assign, ..BuildOptions::default() };
         let tree = Tree::build(&gpu, &on_device, &options).expect("a tree");
         assert!(tree.download().expect("arrays") == build(&mesh, &topology, &options).expect("a tree"));

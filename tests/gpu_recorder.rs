@@ -274,7 +274,7 @@ fn construction() {
         });
         assert!(barriers >= 5);
         let view = device.view();
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             for (boxes, capacity) in [
                 (false, Capacity::for_entries(60_000, 8)),
                 (true, Capacity::for_entries(60_000, 1)),
