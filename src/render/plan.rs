@@ -216,7 +216,7 @@ impl Prepared {
         settings.check()?;
         if !settings.iso.is_empty() && field.on == On::Cells {
             return Err(Error::Invalid(format!(
-                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or --opacity to show some values only",
+                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or an opacity that shows some values only",
                 field.name
             )));
         }
