@@ -1,4 +1,4 @@
-//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/*boundary*`.
+//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/0*`.
 
 use super::grid::{COORDINATE_LIMIT, Grid, canonical};
 use super::tet::Tet;

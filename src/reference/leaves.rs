@@ -1,4 +1,5 @@
-//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_leaves`.
+//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_flag_leaves` and
+//! `41_finish_leaves`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{Topology, bit};

@@ -252,7 +252,7 @@ impl Direction<'_> {
     }
 }
 
-/// Step 1 of one direction: the places of the vertices of used by valid cells.
+/// Step 1 of one direction: the places of the vertices that valid cells use.
 fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
     let Side { mesh, topology, .. } = direction.own;
     let mut used = vec![false; mesh.points.len()];
