@@ -157,11 +157,7 @@ fn merge(all: &mut Overlapped, found: Overlapped) {
     if let Some(pairs) = found.overlap.pairs {
         all.overlap.pairs.get_or_insert_default().extend(pairs);
     }
-    for (sum, effort) in all.overlap.effort.iter_mut().zip(found.overlap.effort) {
-        sum.by_vertex += effort.by_vertex;
-        sum.by_node += effort.by_node;
-        sum.searched += effort.searched;
-        sum.located += effort.located;
-        sum.narrow += effort.narrow;
+    for (sum, effort) in all.overlap.effort.iter_mut().zip(&found.overlap.effort) {
+        sum.add(effort);
     }
 }

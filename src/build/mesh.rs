@@ -10,7 +10,7 @@ use crate::kernels::{
 use crate::layout::{Grid, MeshStatus};
 use crate::mesh::Mesh;
 use crate::primitives::{Arena, cmd_fill};
-use crate::reference::boundary::fault_of;
+use crate::reference::boundary::{fault_of, set_bits};
 
 /// Most tetrahedra of one mesh: faces are numbered in 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
@@ -234,8 +234,7 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn bad_cells(&self) -> Result<Vec<u32>> {
-        let words = self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?;
-        Ok((0..self.input.tets).filter(|t| words[(t / 32) as usize] >> (t % 32) & 1 != 0).collect())
+        Ok(set_bits(self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?))
     }
 
     /// Boundary bits, one per tetrahedron.

@@ -5,7 +5,7 @@ use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemo
 use super::stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
-use crate::layout::{BuildStatus, Grid};
+use crate::layout::{BuildStatus, Grid, wide};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::too_large;
@@ -206,7 +206,7 @@ impl Tree {
 }
 
 fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
-    let entries: [u64; 11] = std::array::from_fn(|k| u64::from(status.total[2 * k]) | u64::from(status.total[2 * k + 1]) << 32);
+    let entries: [u64; 11] = std::array::from_fn(|k| wide([status.total[2 * k], status.total[2 * k + 1]]));
     if status.overflow != 0 {
         return Err(too_large(&entries, options));
     }

@@ -11,7 +11,6 @@ mod volume;
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
 pub use order::{PointOrder, cmd_sort_points};
-pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};

@@ -69,6 +69,18 @@ pub fn bit(words: &[u32], i: u32) -> bool {
     words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
 }
 
+/// Numbers of the bits of packed words that are set, ascending.
+pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
+    let of_word = |(w, mut bits): (u32, u32)| {
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
+            bits &= bits - 1;
+            Some(32 * w + bit)
+        })
+    };
+    (0..).zip(words).flat_map(of_word).collect()
+}
+
 impl Topology {
     /// Bad cells, bounds and their grid alone: no neighbours, nothing marked as boundary.
     ///

@@ -297,7 +297,8 @@ fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Ef
 }
 
 impl Effort {
-    fn add(&mut self, other: &Self) {
+    /// Sums up.
+    pub(crate) fn add(&mut self, other: &Self) {
         self.by_vertex += other.by_vertex;
         self.by_node += other.by_node;
         self.searched += other.searched;
