@@ -111,6 +111,8 @@ pub struct Summary {
     pub memory: Memory,
     /// Bytes as the paper counts them.
     pub paper_bytes: u64,
+    /// Bytes of the neighbour table, which is the mesh's, not the tree's.
+    pub neighbour_bytes: u64,
     /// Milliseconds for neighbours and boundary.
     pub topology_ms: f64,
     /// Milliseconds for the tree.

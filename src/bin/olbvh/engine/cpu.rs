@@ -56,6 +56,7 @@ impl Engine for Cpu {
             leaves: tree.leaves().len() as u64,
             memory: tree.memory(),
             paper_bytes: tree.memory().paper(),
+            neighbour_bytes: size_of_val(&topology.neighbours[..]) as u64,
             topology_ms,
             build_ms,
             stages: Vec::new(),

@@ -78,6 +78,7 @@ impl Engine for Device {
             leaves: u64::from(built.leaves),
             memory: tree.sizes(),
             paper_bytes: tree.sizes().paper(),
+            neighbour_bytes: device.neighbour_bytes(),
             topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
             build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
             stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
