@@ -2,7 +2,7 @@
 
 use super::stages::MeshView;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{
     CheckCells, CheckCellsSpec, FindNeighbours, FindNeighboursSpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, NormaliseVertices,
     NormaliseVerticesSpec,
@@ -179,7 +179,7 @@ pub struct DeviceMesh {
     arrays: MeshArrays,
     grid: Grid,
     status: MeshStatus,
-    time: Readback,
+    stages: Vec<StageTime>,
     _positions: Buffer,
     _cells: Buffer,
     memory: Buffer,
@@ -219,7 +219,8 @@ impl DeviceMesh {
         if status.overflow != 0 {
             return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
         }
-        let made = Self { gpu: gpu.clone(), input, arrays, grid, status, time, _positions: positions, _cells: cells, memory };
+        let made =
+            Self { gpu: gpu.clone(), input, arrays, grid, status, stages: time.stages, _positions: positions, _cells: cells, memory };
         if policy == BadCells::Reject && status.bad > 0 {
             let list = made.bad_cells()?;
             let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
@@ -300,9 +301,9 @@ impl DeviceMesh {
         &self.status
     }
 
-    /// Device time of stage 0.
-    pub fn time(&self) -> &Readback {
-        &self.time
+    /// Device time of every part of stage 0, in order.
+    pub fn stages(&self) -> &[StageTime] {
+        &self.stages
     }
 
     /// Bytes of the neighbour table, counted apart from the tree.

@@ -17,7 +17,7 @@ mod tests;
 use crate::build::{BadCells, DeviceMesh, MeshInput, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{Buffer, Gpu, GpuOptions};
+use crate::gpu::{Buffer, Gpu, GpuOptions, StageTime};
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::render::Bounds;
@@ -338,7 +338,7 @@ pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInf
             lo,
             hi,
             bad_cells: mesh.device.status().bad,
-            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
+            build_ms: StageTime::sum(tree.stages()),
             address: addresses.all().address,
         };
         put(out, info)

@@ -25,6 +25,13 @@ pub struct StageTime {
     pub milliseconds: f64,
 }
 
+impl StageTime {
+    /// Milliseconds of these stages together.
+    pub fn sum<'a>(stages: impl IntoIterator<Item = &'a Self>) -> f64 {
+        stages.into_iter().map(|s| s.milliseconds).sum()
+    }
+}
+
 /// What a submission brings back.
 #[derive(Clone, Debug, Default)]
 pub struct Readback {
@@ -35,7 +42,7 @@ pub struct Readback {
 impl Readback {
     /// Milliseconds of all stages of that name.
     pub fn milliseconds(&self, name: &str) -> f64 {
-        self.stages.iter().filter(|s| s.name == name).map(|s| s.milliseconds).sum()
+        StageTime::sum(self.stages.iter().filter(|s| s.name == name))
     }
 }
 

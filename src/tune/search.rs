@@ -87,7 +87,7 @@ struct Searcher<'a> {
 
 /// Milliseconds of the stages with these beginnings.
 fn sum(stages: &[StageTime], beginnings: &[&str]) -> f64 {
-    stages.iter().filter(|s| beginnings.iter().any(|b| s.name.starts_with(b))).map(|s| s.milliseconds).sum()
+    StageTime::sum(stages.iter().filter(|s| beginnings.iter().any(|b| s.name.starts_with(b))))
 }
 
 /// Lower and upper quartile.
@@ -221,7 +221,7 @@ fn gains(work: &dyn Work, start: &Target, best: &Target) -> Result<Vec<Gain>> {
         }
     }
     let of = |runs: &[Vec<StageTime>], chosen: &dyn Fn(&StageTime) -> bool| {
-        median(&runs.iter().map(|run| run.iter().filter(|s| chosen(s)).map(|s| s.milliseconds).sum()).collect::<Vec<f64>>())
+        median(&runs.iter().map(|run| StageTime::sum(run.iter().filter(|s| chosen(s)))).collect::<Vec<f64>>())
     };
     let gain = |stage: &str, chosen: &dyn Fn(&StageTime) -> bool| Gain {
         stage: stage.into(),

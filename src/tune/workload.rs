@@ -105,7 +105,7 @@ impl<'a> Workload<'a> {
         let mesh = DeviceMesh::upload(&gpu, self.mesh, BadCells::Skip)?;
         let tree = |lists| Tree::build(&gpu, &mesh, &BuildOptions { lists, ..BuildOptions::default() });
         let (whole, boundary) = (tree(Lists::All)?, tree(Lists::Boundary)?);
-        let stages = mesh.time().stages.iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
+        let stages = mesh.stages().iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
         Ok((Prepared { target: target.clone(), mesh, whole, boundary }, stages))
     }
 

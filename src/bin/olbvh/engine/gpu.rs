@@ -5,7 +5,7 @@ use crate::common::{Common, Outcome};
 use olbvh::blocks::{self, InBlocks, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
-use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::gpu::{Gpu, GpuOptions, StageTime};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::query;
@@ -79,9 +79,9 @@ impl Engine for Device {
             memory: tree.sizes(),
             paper_bytes: tree.sizes().paper(),
             neighbour_bytes: device.neighbour_bytes(),
-            topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
-            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
-            stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
+            topology_ms: StageTime::sum(device.stages()),
+            build_ms: StageTime::sum(tree.stages()),
+            stages: device.stages().iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
         })
     }
 
