@@ -169,8 +169,11 @@ impl Gpu {
     /// Reads a part of a buffer back.
     ///
     /// # Errors
-    /// A failed Vulkan call, or no memory for the transfer.
+    /// [`Error::Invalid`] for a part of another buffer, a failed Vulkan call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
+        if part.buffer != buffer.all().buffer {
+            return Err(Error::Invalid(format!("a part to be read of another buffer than {}", buffer.name())));
+        }
         let count = part.size as usize / size_of::<T>();
         let mut data = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
