@@ -20,6 +20,8 @@ mod tree;
 
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+#[cfg(feature = "cli")]
+pub(crate) use plan::{SHARE, filtered};
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use stages::MeshView;
 pub use tree::Tree;
