@@ -11,7 +11,7 @@ use crate::primitives::{
 
 /// Shapes of kernels that a case runs under; a device's own is one of the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TargetKind {
+pub(crate) enum TargetKind {
     /// Whatever the device would choose, or the caller did.
     Device,
     /// Serial tiles, as for processors.

@@ -94,12 +94,6 @@ impl Camera {
         Ok(Self { eye, forward, right, up: right.cross(forward), projection })
     }
 
-    /// The default camera: a three-quarter view from the front, z upwards, that shows the larger sides of the box more frontally and
-    /// just holds all of it. `aspect` is width over height.
-    pub fn frame(bounds: &Bounds, aspect: f64) -> Self {
-        Self::frame_from(bounds, &bounds.corners(), aspect, three_quarter(bounds), DVec3::Z, Some(DEFAULT_FOV))
-    }
-
     /// A camera on the side `from` (a direction, of any length) of the box that just holds all `points` in it; perspective with that
     /// angle in degrees, `None`: orthographic.
     pub fn frame_from(bounds: &Bounds, points: &[DVec3], aspect: f64, from: DVec3, up: DVec3, fov: Option<f64>) -> Self {
