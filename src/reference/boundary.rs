@@ -112,18 +112,6 @@ impl Topology {
     pub fn valid_cells(&self) -> u32 {
         self.counts.cells - self.counts.bad
     }
-
-    /// Refuses a mesh with bad cells (the policy `Reject`), naming the first five.
-    ///
-    /// # Errors
-    /// [`Error::BadCells`].
-    pub fn reject_bad(&self) -> Result<()> {
-        if self.bad.is_empty() {
-            return Ok(());
-        }
-        let first: Vec<String> = self.bad.iter().take(5).map(|(tet, fault)| format!("cell {tet}: {fault}")).collect();
-        Err(Error::BadCells { count: self.bad.len() as u64, first: first.join(", ") })
-    }
 }
 
 /// Computes the topology of `mesh`. Bad cells are counted and listed, never an error.
