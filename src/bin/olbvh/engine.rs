@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, Points, Stack, View};
+use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
@@ -25,18 +25,6 @@ pub type Report<'a> = &'a (dyn Fn(u64, u64) + Sync);
 /// Takes the bands of a stack of slices.
 pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;
 
-/// Where two meshes overlap, and how long that took.
-pub struct Overlapped {
-    /// What intersects what.
-    pub overlap: Overlap,
-    /// Seconds for both trees.
-    pub build_seconds: f64,
-    /// Seconds for the overlap.
-    pub seconds: f64,
-    /// Trees that were built: two, or more where meshes are cut into blocks.
-    pub trees: u32,
-}
-
 /// Something that builds trees. Bytes of device memory, where a question takes them, are the most that may be used; without, all there are.
 pub trait Engine {
     /// What it is called in results.
@@ -50,21 +38,11 @@ pub trait Engine {
     /// The same, but finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds out where they overlap.
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped>;
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks>;
-}
-
-/// Two meshes, and what is asked of them.
-pub struct Question<'a> {
-    /// A and B.
-    pub meshes: [&'a Mesh; 2],
-    /// How their trees are built.
-    pub options: BuildOptions,
-    /// Whether all pairs are found.
-    pub pairs: bool,
 }
 
 /// A picture and what was found out for it.

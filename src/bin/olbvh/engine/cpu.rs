@@ -1,7 +1,7 @@
 //! The reference implementation as an engine.
 
-use super::{Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
-use olbvh::blocks::{InBlocks, Points, Stack, View};
+use super::{Drawn, Engine, Located, Report, Sink, Summary};
+use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
@@ -9,7 +9,7 @@ use olbvh::query::{self, LocateOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::{self, Location, Locator, order_of};
-use olbvh::reference::overlap::{Side, overlap};
+use olbvh::reference::overlap::{Overlap, Side, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
@@ -74,7 +74,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
         no_memory(memory)?;
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
@@ -82,11 +82,10 @@ impl Engine for Cpu {
         let build = olbvh::reference::build::build;
         let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
         let build_seconds = start.elapsed().as_secs_f64();
-        let start = Instant::now();
         let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
-        let overlap = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        let answer = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
         report(1, 1);
-        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64(), trees: 2 })
+        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds })
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {

@@ -1,8 +1,8 @@
 //! A Vulkan device as an engine.
 
-use super::{Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
+use super::{Drawn, Engine, Located, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, Points, Stack, View};
+use olbvh::blocks::{self, InBlocks, Meshes, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
@@ -10,9 +10,9 @@ use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::query;
 use olbvh::reference::boundary::{Counts, fault_of};
+use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// An opened device, and where the shapes of its kernels come from.
 pub struct Device(Gpu, Shapes);
@@ -97,11 +97,9 @@ impl Engine for Device {
         blocks::locate_all(&self.0, self.memory(memory), asked, report)
     }
 
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
-        let start = Instant::now();
-        let found = blocks::overlap(&self.0, self.memory(memory), asked.meshes, &asked.options, asked.pairs, report)?;
-        let seconds = start.elapsed().as_secs_f64() - found.build_seconds;
-        Ok(Overlapped { overlap: found.answer.overlap, build_seconds: found.build_seconds, seconds, trees: found.trees })
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
+        let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.apart();
+        Ok(took.with(found.overlap))
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
