@@ -1,4 +1,4 @@
-//! Compiles every kernel of `glsl/` in both permutations, reflects it, and generates its Rust side into `OUT_DIR`:
+//! Compiles every kernel of `glsl/` in its three forms, reflects it, and generates its Rust side into `OUT_DIR`:
 //! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V), `layout.rs` (shared structs), and `olbvh.glsl` for the shaders
 //! of other programs.
 

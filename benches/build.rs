@@ -12,7 +12,7 @@ use std::time::Duration;
 /// Sum of the stages of that name; all of them for "all".
 fn time_of(stages: &[StageTime], name: &str) -> Duration {
     let chosen = stages.iter().filter(|s| name == "all" || s.name == name);
-    Duration::from_secs_f64(chosen.map(|s| s.milliseconds).sum::<f64>() * 1e-3)
+    Duration::from_secs_f64(StageTime::sum(chosen) * 1e-3)
 }
 
 fn construction(c: &mut Criterion) {
@@ -25,12 +25,12 @@ fn construction(c: &mut Criterion) {
     for stage in ["mesh.clear", "mesh.bounds", "mesh.boundary"] {
         assert!(on_device.neighbours().expect("neighbours") == topology.neighbours);
         let run = |iterations: u64| -> Duration {
-            let once = |_| time_of(&DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh").time().stages, stage);
+            let once = |_| time_of(DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).expect("a mesh").stages(), stage);
             (0..iterations).map(once).sum()
         };
         group.bench_function(BenchmarkId::new(stage, "any"), |b| b.iter_custom(run));
     }
-    for assign in Assign::ALL {
+    for assign in Assign::EVERY {
         let options = BuildOptions { assign, ..BuildOptions::default() };
         let tree = Tree::build(&gpu, &on_device, &options).expect("a tree");
         assert!(tree.download().expect("arrays") == build(&mesh, &topology, &options).expect("a tree"));

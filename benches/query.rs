@@ -37,7 +37,7 @@ fn location(c: &mut Criterion) {
     let mut group = c.benchmark_group("locate");
     group.sample_size(10).throughput(Throughput::Elements(u64::from(POINTS)));
     let mut expected: Option<Vec<u32>> = None;
-    for assign in Assign::ALL {
+    for assign in Assign::EVERY {
         let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).expect("a tree");
         let scene = Scene::new(&on_device, &tree);
         for (name, path) in [("descent", Path::Descent), ("traversal", Path::Traversal(8))] {

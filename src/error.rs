@@ -10,7 +10,7 @@ pub type Result<T, E = Error> = std::result::Result<T, E>;
 #[non_exhaustive]
 pub enum Error {
     /// No Vulkan implementation could be loaded on this machine.
-    #[error("no Vulkan on this machine: {0}, or use the CPU (--device cpu)")]
+    #[error("no Vulkan on this machine: {0}")]
     NoVulkan(String),
     /// No physical device meets the requirements, or the one asked for does not exist.
     #[error("no suitable Vulkan device: {0}")]

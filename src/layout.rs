@@ -2,4 +2,9 @@
 
 #![allow(clippy::doc_markdown)]
 
+/// A number of 64 bits as it stands in a struct, the lower word first.
+pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {
+    low as u64 | (high as u64) << 32
+}
+
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));

@@ -24,7 +24,7 @@
 //! ```no_run
 //! use olbvh::{build::*, gpu::{Buffer, BufferRef, Gpu, Recorder}, options::BuildOptions, primitives::Arena, query::*, Result};
 //!
-//! struct Frame { input: MeshInput, arrays: MeshArrays, scratch: MeshScratch, tree: TreeMemory, build_scratch: BuildScratch, capacity: Capacity, memory: Buffer }
+//! struct Frame { input: MeshInput, arrays: MeshArrays, scratch: MeshScratch, tree: TreeMemory, build_scratch: BuildScratch, memory: Buffer }
 //!
 //! /// `positions`: three floats per point; `cells`: four indices per tetrahedron. Either buffer is yours.
 //! fn plan(gpu: &Gpu, (positions, points): (BufferRef, u32), (cells, tets): (BufferRef, u32)) -> Result<Frame> {
@@ -37,7 +37,7 @@
 //!     let memory = gpu.buffer("olbvh.frame.memory", Arena::measure(carve)?)?;
 //!     let (arrays, scratch, tree, build_scratch) = carve(&mut Arena::new(memory.all()))?;
 //!     let input = MeshInput { positions, stride: 3, points, cells, tets };
-//!     Ok(Frame { input, arrays, scratch, tree, build_scratch, capacity, memory })
+//!     Ok(Frame { input, arrays, scratch, tree, build_scratch, memory })
 //! }
 //!
 //! /// Into your command buffer, after `// SAFETY: …` and `Recorder::new(&gpu, commands, None)`.
@@ -45,7 +45,7 @@
 //!     cmd_prepare_mesh(r, &frame.input, &frame.arrays, &frame.scratch)?; // positions must be visible to compute shaders
 //!     r.barrier("mesh → tree");
 //!     let mesh = MeshView { input: frame.input, arrays: frame.arrays };
-//!     cmd_build(r, &mesh, &frame.tree, &frame.capacity, &BuildOptions::default(), &frame.build_scratch)?; // ends with a barrier
+//!     cmd_build(r, &mesh, &frame.tree, &BuildOptions::default(), &frame.build_scratch)?; // ends with a barrier
 //!     let scene = Scene { mesh, tree: frame.tree, longest_leaf: frame.input.tets };
 //!     cmd_locate(r, &scene, asked, found, &LocateOptions::default())
 //! } // then your barrier from compute writes to whatever reads `found`, and `Recorder::finish`

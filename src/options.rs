@@ -35,9 +35,9 @@ pub enum Lists {
 
 /// Names of the variants, as the command line and reports use them.
 macro_rules! named {
-    ($type:ident, $what:literal, [$($variant:ident = $name:literal),+]) => {
+    ($type:ident, $what:literal, [$($variant:ident = $name:literal),+ $(,)?]) => {
         impl $type {
-            /// Every variant.
+            /// Every variant, in order.
             pub const EVERY: [Self; [$($name),+].len()] = [$(Self::$variant),+];
 
             /// The name used on the command line and in reports.
@@ -55,24 +55,21 @@ macro_rules! named {
         }
 
         impl std::str::FromStr for $type {
-            type Err = Error;
+            type Err = $crate::Error;
 
-            fn from_str(name: &str) -> Result<Self> {
+            fn from_str(name: &str) -> $crate::Result<Self> {
                 let found = Self::EVERY.into_iter().find(|v| v.name().eq_ignore_ascii_case(name));
                 let known = || Self::EVERY.map(Self::name).join(", ");
-                found.ok_or_else(|| Error::Invalid(format!("unknown {} `{name}`; known are {}", $what, known())))
+                found.ok_or_else(|| $crate::Error::Invalid(format!("unknown {} `{name}`; known are {}", $what, known())))
             }
         }
     };
 }
 
+pub(crate) use named;
+
 named!(Assign, "assignment", [Aabb = "aabb", Planes = "planes", Exact = "exact"]);
 named!(Lists, "kind of lists", [All = "all", Boundary = "boundary"]);
-
-impl Assign {
-    /// All three, weakest first.
-    pub const ALL: [Self; 3] = Self::EVERY;
-}
 
 /// How to build a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -143,7 +140,7 @@ mod tests {
 
     #[test]
     fn assignments_have_names() {
-        for a in Assign::ALL {
+        for a in Assign::EVERY {
             assert_eq!(a.to_string().parse::<Assign>().unwrap(), a);
         }
         for lists in Lists::EVERY {

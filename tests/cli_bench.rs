@@ -178,6 +178,8 @@ fn two_results_are_compared() {
     );
     let tables = std::fs::read_to_string(folder.path().join("changes.md")).unwrap();
     assert!(tables.contains("## Summary") && tables.contains("## Times, kuhn:3,2,2") && tables.contains("WHAT DIFFERS"), "{tables}");
+    let replacing = bench(folder.path(), &["--compare", "a.json", "b.json", "-o", "b.json"]);
+    assert_eq!(replacing.status.code(), Some(2));
     let missing = bench(folder.path(), &["--compare", "a.json", "nothing.json"]);
     assert_eq!(missing.status.code(), Some(3));
     assert_eq!(bench(folder.path(), &["--compare", "a.json"]).status.code(), Some(2));

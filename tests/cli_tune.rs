@@ -98,7 +98,15 @@ fn profiles_are_found_and_passed_over() {
     named(&mut narrow, "each", 3.into());
     let mut unknown = profile.clone();
     named(&mut unknown, "colour", 3.into());
-    let wrong = [(foreign, "made for the driver `Another 1.0`"), (narrow.clone(), "each is 3"), (unknown, "colour"), (Value::Null, "null")];
+    let mut short = profile.clone();
+    short["target"]["run"]["rows"] = 1.into();
+    let wrong = [
+        (foreign, "made for the driver `Another 1.0`"),
+        (narrow.clone(), "each is 3"),
+        (short, "run.rows is 1; for large meshes"),
+        (unknown, "colour"),
+        (Value::Null, "null"),
+    ];
     for (wrong, what) in wrong {
         write(&file, &wrong);
         let (line, remarks) = home.kernels(&[], &[]);

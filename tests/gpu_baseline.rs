@@ -135,8 +135,7 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
 
 /// A picture by either structure; `None` where there is nothing to see.
 fn same_picture(name: &str, b: &Both, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
-    let three = |v: [f32; 4]| [v[0], v[1], v[2]];
-    let bounds = Bounds { lo: three(b.device.grid().lo), hi: three(b.device.grid().hi) };
+    let bounds = Bounds::from(b.device.grid());
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
     let prepared = Prepared::new(settings, &b.mesh, &bounds, &neighbours, valid, field).ok()?;

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::blocks::{Points, Stack, View, locate, locate_all, overlap, render, slice};
+use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, overlap, render, slice};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -50,9 +50,8 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
         most = most.max(found.trees);
     }
-    let how = LocateOptions { path: Path::Descent, ..how };
-    let whole = query::locate_all(&device, &tree, &points, &how, QUIET).unwrap();
-    assert_eq!(locate_all(gpu, memory, &Points { how, ..asked }, QUIET).unwrap().answer, whole);
+    let whole = query::locate_all(&device, &tree, &points, how.tolerance, QUIET).unwrap();
+    assert_eq!(locate_all(gpu, memory, &asked, QUIET).unwrap().answer, whole);
     most
 }
 
@@ -117,7 +116,7 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let [x, y] = [0, 1].map(|i| Party { mesh: &devices[i], tree: &trees[i] });
         let whole = query::overlap(x, y, pairs, QUIET).unwrap().overlap;
         let memory = 2 << 20;
-        let found = overlap(gpu, memory, [a, &b], &options, pairs, QUIET).unwrap();
+        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, QUIET).unwrap();
         println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
         assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
         assert_eq!(found.answer.overlap.a, whole.a);

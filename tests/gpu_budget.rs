@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, MeshView, Tree, TreeMemory, cmd_build};
+use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
@@ -117,7 +117,7 @@ fn memory_of_a_recorded_build() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = diagonal();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let tets = view.input.tets;
     let mut levels = Vec::new();
     for bytes in [64 << 10, 256 << 10, 1 << 20, 8 << 20] {
@@ -129,7 +129,7 @@ fn memory_of_a_recorded_build() {
             |a: &mut Arena| Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?));
         let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
         let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
-        gpu.run("olbvh.test.build", |r| cmd_build(r, &view, &tree, &capacity, &options, &scratch)).unwrap();
+        gpu.run("olbvh.test.build", |r| cmd_build(r, &view, &tree, &options, &scratch)).unwrap();
         let status = gpu.download::<BuildStatus>(&memory, tree.status.part(0, size_of::<BuildStatus>() as u64)).unwrap()[0];
         assert!(status.overflow == 0 && status.entries <= capacity.entries && status.nodes <= capacity.nodes);
         levels.push(status.level);
@@ -179,7 +179,7 @@ fn every_capacity() {
     let topology = topology(&mesh).unwrap();
     let sizes = measure(&mesh, &topology, &Vertices::new(&mesh, &topology.grid));
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Reject).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let (input, tets) = (view.input, view.input.tets);
     let points = PointInput { points: input.positions, stride: input.stride, count: input.points, hints: None, order: None };
     for (lists, by_entries) in [(Lists::All, false), (Lists::Boundary, false), (Lists::Boundary, true)] {
@@ -222,7 +222,7 @@ fn every_capacity() {
                 .unwrap();
             gpu.run("olbvh.test.sweep", |r| {
                 built.iter().zip(rooms).try_for_each(|(Built { tree, owners }, &room)| {
-                    cmd_build(r, &view, tree, &tree.capacity, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
+                    cmd_build(r, &view, tree, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
                     let scene = Scene { mesh: view, tree: *tree, longest_leaf: tets };
                     cmd_locate(r, &scene, &points, &LocateOutput { owners: *owners, barycentrics }, &LocateOptions::default())?;
                     r.barrier("locate → build");

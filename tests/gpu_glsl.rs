@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 use ash::vk;
-use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree};
+use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::mesh::kuhn_jittered;
@@ -143,11 +143,11 @@ fn check(binding: Binding) {
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+        let view = device.view();
         let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
         let options = LocateOptions::default();
         let expected = locate(&device, &tree, &points, None, &options, &|_, _| {}).unwrap();
-        let all = locate_all(&device, &tree, &points, &options, &|_, _| {}).unwrap();
+        let all = locate_all(&device, &tree, &points, options.tolerance, &|_, _| {}).unwrap();
         for (i, [owner, owners, value, slope, met]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");

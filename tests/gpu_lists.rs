@@ -5,7 +5,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use olbvh::query::{LocateOptions, LocateOutput, Party, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice};
 use olbvh::reference::boundary::{NONE, Topology, topology};
 use olbvh::reference::build::build;
@@ -83,7 +83,7 @@ impl Subject {
                 assert_eq!((e.owner, e.barycentric), (found.owners[i], found.barycentrics[i]), "{path:?} {}", what(i));
             }
         }
-        let lists = locate_all(&self.device, &tree, &points, &LocateOptions::default(), QUIET).unwrap();
+        let lists = locate_all(&self.device, &tree, &points, TOLERANCE, QUIET).unwrap();
         for (i, list) in lists.iter().enumerate() {
             assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
         }

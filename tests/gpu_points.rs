@@ -93,7 +93,7 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     let first = build(0.0, Assign::Exact, Lists::Boundary);
     let third = count.div_ceil(3);
     let mut located = 0;
-    for (k, assign) in Assign::ALL.into_iter().enumerate() {
+    for (k, assign) in Assign::EVERY.into_iter().enumerate() {
         let from = begin + k * third;
         let points: Vec<_> = (from..(from + third).min(begin + count)).map(|i| point(&mesh, side as f32, i)).collect();
         let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners;

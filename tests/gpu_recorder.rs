@@ -224,7 +224,7 @@ fn ranges_of_a_field() {
     let mesh = kuhn_jittered([6, 5, 4], 0.3, 1).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
     let drawn = gpu.upload("olbvh.test.drawn", &[[0.4f32, 0.5]]).unwrap();
     let nodes = tree.memory().capacity.nodes;
@@ -273,8 +273,8 @@ fn construction() {
             Ok(())
         });
         assert!(barriers >= 5);
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
-        for assign in Assign::ALL {
+        let view = device.view();
+        for assign in Assign::EVERY {
             for (boxes, capacity) in [
                 (false, Capacity::for_entries(60_000, 8)),
                 (true, Capacity::for_entries(60_000, 1)),
@@ -288,7 +288,7 @@ fn construction() {
                 let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
                 let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
                 let barriers = every_barrier_counts(&gpu, &format!("build {assign} {boxes} {}", gpu.target().name), |r| {
-                    cmd_build(r, &view, &tree, &capacity, &options, &scratch)?;
+                    cmd_build(r, &view, &tree, &options, &scratch)?;
                     let arrays = [tree.status, tree.grid, tree.p, tree.po, tree.co, tree.flags, tree.masks];
                     read(r, &arrays.into_iter().chain(tree.boxes).collect::<Vec<_>>(), &sink);
                     Ok(())

@@ -18,7 +18,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("formats", &["error", "layout", "mesh", "options", "reference", "render"]),
     // `kernels` holds what is generated for `gpu`'s pipelines, and `gpu` runs the self-test of `primitives` before it trusts a device.
     ("gpu", &["error", "kernels", "primitives"]),
-    ("kernels", &["error", "gpu", "layout"]),
+    ("kernels", &["error", "gpu", "layout", "options"]),
     ("primitives", &["error", "gpu", "kernels", "layout"]),
     ("build", &["error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),

@@ -37,7 +37,6 @@ pub struct Body {
     scratch: HostBuffer,
     mesh_scratch: MeshScratch,
     build_scratch: BuildScratch,
-    capacity: Capacity,
     options: BuildOptions,
     sets: Option<(vk::DescriptorPool, vk::DescriptorSetLayout)>,
 }
@@ -109,7 +108,6 @@ impl Body {
             scratch,
             mesh_scratch,
             build_scratch,
-            capacity,
             options,
             sets,
         })
@@ -140,7 +138,7 @@ impl Body {
         r.barrier("frame.before → frame.mesh");
         cmd_prepare_mesh(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
-        cmd_build(r, mesh, arrays, &self.capacity, &self.options, &self.build_scratch)
+        cmd_build(r, mesh, arrays, &self.options, &self.build_scratch)
     }
 
     pub fn free(self, host: &Host) {

@@ -149,7 +149,7 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh) -> Result<Self> {
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let view = mesh.view();
         let tets = view.input.tets;
         let carve = |a: &mut Arena| BinaryTree::carve(a, tets);
         let memory = gpu.buffer("olbvh.lbvh.tree", Arena::measure(carve)?)?;
@@ -196,7 +196,7 @@ impl Lbvh {
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
         let memory = gpu.buffer("olbvh.lbvh.located", Arena::measure(carve)?)?;
         let (owners, barycentrics, unfinished) = carve(&mut Arena::new(memory.all()))?;
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let view = mesh.view();
         let (asked, output) = ((uploaded.all(), points.len() as u32), LocateOutput { owners, barycentrics });
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {

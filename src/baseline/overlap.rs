@@ -5,9 +5,10 @@ use crate::build::DeviceMesh;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Groups, Recorder};
 use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
-use crate::layout::{NodeFrame, OverlapStatus};
+use crate::layout::{NodeFrame, OverlapStatus, wide};
 use crate::primitives::Arena;
-use crate::query::{Overlapped, set_bits};
+use crate::query::Overlapped;
+use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{joint_grid, node_frame};
 use std::mem::offset_of;
 
@@ -111,7 +112,7 @@ impl Lbvh {
         let hits = |way: &Way<'_>| Ok::<_, crate::Error>(set_bits(gpu.download(&memory, way.hits)?));
         (done.overlap.a, done.overlap.b) = (hits(&ways[0])?, hits(&ways[1])?);
         for (effort, status) in done.overlap.effort.iter_mut().zip(statuses) {
-            effort.narrow = u64::from(status.narrow[0]) | u64::from(status.narrow[1]) << 32;
+            effort.narrow = wide(status.narrow);
         }
         Ok(done)
     }

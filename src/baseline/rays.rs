@@ -10,9 +10,10 @@ use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipel
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput};
+use crate::reference::grid::two_to;
 
 /// From normalised coordinates to those of the scene, [0, 2): safe for whatever the device multiplies.
-const SCALE: f32 = f32::from_bits((127 - 40) << 23);
+const SCALE: f32 = two_to(-40);
 
 /// How rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -72,7 +72,7 @@ impl Runs {
     /// Of one stage, or of all together.
     pub(super) fn timing(&self, stage: Option<&str>) -> Timing {
         let chosen = |s: &&StageTime| stage.is_none_or(|name| s.name == name);
-        let sums = self.stages.iter().map(|run| run.iter().filter(chosen).map(|s| s.milliseconds).sum());
+        let sums = self.stages.iter().map(|run| StageTime::sum(run.iter().filter(chosen)));
         let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
         for (i, run) in self.stages.iter().enumerate() {
             for s in run.iter().filter(chosen) {

@@ -7,7 +7,7 @@ use super::traffic::traffic;
 use super::{CopyRate, Kind, Scale, Settings, Suite, Timing};
 use crate::baseline::RayMethod;
 use crate::error::Result;
-use crate::gpu::Gpu;
+use crate::gpu::{Gpu, StageTime};
 use crate::kernels::Target;
 use glam::DVec3;
 use serde::Serialize;
@@ -202,7 +202,7 @@ impl StructureReport {
         let Structure::Octree(tree) = structure else { return };
         let build = self.figure(Quantity::Build).map(|f| f.timing.stages_ms.clone()).unwrap_or_default();
         let stage = |(name, bytes): (&'static str, u64)| {
-            let ms = build.get(name).copied().unwrap_or_else(|| subject.device.time().milliseconds(name));
+            let ms = build.get(name).copied().unwrap_or_else(|| StageTime::sum(subject.device.stages().iter().filter(|s| s.name == name)));
             let gb_per_s = bytes as f64 / ms * 1e-6;
             (ms > 0.0).then(|| StageFigure { stage: name.into(), ms, bytes, gb_per_s, of_copy_rate: gb_per_s / copy.gb_per_s })
         };
@@ -314,7 +314,7 @@ impl MeshReport {
             points: input.points,
             boundary: status.boundary,
             quality: Quality::of(subject),
-            topology_ms: subject.device.time().stages.iter().map(|s| s.milliseconds).sum(),
+            topology_ms: StageTime::sum(subject.device.stages()),
             structures: Vec::new(),
             skipped: Vec::new(),
         }

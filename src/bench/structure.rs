@@ -29,7 +29,7 @@ pub enum Kind {
 impl Kind {
     /// Every structure, in the order of the tables; the first one's answers are those that the others must give.
     pub fn all() -> Vec<Self> {
-        let [aabb, planes, exact] = Assign::ALL.map(|assign| (assign, Lists::All));
+        let [aabb, planes, exact] = Assign::EVERY.map(|assign| (assign, Lists::All));
         let choices = [aabb, planes, exact, (Assign::default(), Lists::Boundary)];
         let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
         octrees.chain([Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()

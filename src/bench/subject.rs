@@ -35,8 +35,7 @@ impl<'a> Subject<'a> {
     pub(super) fn new(gpu: &'a Gpu, mesh: &'a Mesh, settings: &Settings) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let grid = *device.grid();
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let bounds = Bounds { lo: corner(grid.lo), hi: corner(grid.hi) };
+        let bounds = Bounds::from(&grid);
         let extent = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
         let move_it = || {
             let mut moved = mesh.clone();

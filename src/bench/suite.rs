@@ -1,8 +1,7 @@
 //! What is measured: which meshes, how large the questions are, how long.
 
 use super::{Budget, Kind};
-use crate::error::{Error, Result};
-use crate::options::{Assign, Lists};
+use crate::options::{Assign, Lists, named};
 use serde::Serialize;
 
 /// A choice of meshes and sizes.
@@ -21,9 +20,6 @@ pub enum Suite {
 }
 
 impl Suite {
-    /// Every suite, smallest first.
-    pub const ALL: [Self; 4] = [Self::Quick, Self::Paper, Self::Full, Self::Scaling];
-
     /// The structures that are measured.
     pub(super) fn kinds(self) -> Vec<Kind> {
         let plain = |kind: &Kind| match kind {
@@ -33,16 +29,6 @@ impl Suite {
         };
         let all = Kind::all();
         if self == Self::Scaling { all.into_iter().filter(plain).collect() } else { all }
-    }
-
-    /// The name used on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Quick => "quick",
-            Self::Paper => "paper",
-            Self::Full => "full",
-            Self::Scaling => "scaling",
-        }
     }
 
     /// Its meshes as [`crate::formats::load`] takes them, with the mesh of the paper that each stands for.
@@ -70,14 +56,7 @@ impl Suite {
     }
 }
 
-impl std::str::FromStr for Suite {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        let found = Self::ALL.into_iter().find(|s| s.name().eq_ignore_ascii_case(name));
-        found.ok_or_else(|| Error::Invalid(format!("unknown suite `{name}`; known are quick, paper, full, scaling")))
-    }
-}
+named!(Suite, "suite", [Quick = "quick", Paper = "paper", Full = "full", Scaling = "scaling"]);
 
 /// Sizes of the questions, the same for every structure.
 #[derive(Clone, Copy, Debug, Serialize)]

@@ -24,12 +24,10 @@
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value.
 
-use crate::build::{DeviceMesh, Tree};
+use crate::build::{DeviceMesh, SHARE, Tree, filtered};
 use crate::kernels::Target;
-use crate::options::{Assign, Lists};
+use crate::options::Lists;
 
-/// Candidates per share, as the filter has it.
-const SHARE: u64 = 32;
 /// Bytes that a scan moves per value.
 const SCAN: u64 = 12;
 
@@ -40,8 +38,8 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let (nodes, internal, leaves) = (u64::from(status.nodes), u64::from(status.internal), u64::from(status.leaves));
     let level = status.level;
     let cells_and_vertices = 16 * t + 16 * p;
-    let filtered = options.assign != Assign::Aabb || options.lists != Lists::All;
-    let shares = t.max(u64::from(status.candidates) / SHARE);
+    let filtered = filtered(options);
+    let shares = t.max(u64::from(status.candidates / SHARE));
     let marks = if options.lists == Lists::Boundary { 8u64.pow(level).div_ceil(8) } else { 0 };
     let filter = cells_and_vertices + 4 * t + 8 * shares + SCAN * shares + 3 * marks;
     let (passes, digit_bits) = target.sort.passes(3 * level);

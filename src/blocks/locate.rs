@@ -60,14 +60,14 @@ pub fn locate(
     Ok(took.with(all))
 }
 
-/// Every tetrahedron that contains each point, as [`query::locate_all`] finds them.
+/// Every tetrahedron that contains each point, as [`query::locate_all`] finds them; of [`Points::how`] the tolerance counts.
 ///
 /// # Errors
 /// As [`locate`].
 pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
     let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
-        let found = query::locate_all(&placed.mesh, &placed.tree, points, &asked.how, &|_, _| {})?;
+        let found = query::locate_all(&placed.mesh, &placed.tree, points, asked.how.tolerance, &|_, _| {})?;
         for (&i, owners) in ids.iter().zip(found) {
             all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
         }

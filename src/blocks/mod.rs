@@ -24,7 +24,7 @@ mod render;
 mod slice;
 
 pub use locate::{Points, locate, locate_all};
-pub use overlap::overlap;
+pub use overlap::{Meshes, overlap};
 pub use render::{Picture, View, render};
 pub use slice::{Stack, slice};
 

@@ -36,19 +36,24 @@ impl Node {
     }
 }
 
-/// Overlap of A and B, whose points lie in one space, as [`query::overlap`] finds it, within `memory` bytes of device memory. Pairs nearer to touching than
+/// Two meshes, which may not fit the device, and what is asked of them.
+#[derive(Clone, Copy, Debug)]
+pub struct Meshes<'a> {
+    /// A and B, whose points lie in one space.
+    pub meshes: [&'a Mesh; 2],
+    /// How their trees are built.
+    pub options: BuildOptions,
+    /// Whether all pairs are found.
+    pub pairs: bool,
+}
+
+/// Overlap of A and B, as [`query::overlap`] finds it, within `memory` bytes of device memory. Pairs nearer to touching than
 /// 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The effort is the sum over all pairs of blocks.
 ///
 /// # Errors
 /// As [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
-pub fn overlap(
-    gpu: &Gpu,
-    memory: u64,
-    meshes: [&Mesh; 2],
-    options: &BuildOptions,
-    pairs: bool,
-    report: &dyn Fn(u64, u64),
-) -> Result<InBlocks<Overlapped>> {
+pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Overlapped>> {
+    let Meshes { meshes, ref options, pairs } = *asked;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
@@ -157,11 +162,7 @@ fn merge(all: &mut Overlapped, found: Overlapped) {
     if let Some(pairs) = found.overlap.pairs {
         all.overlap.pairs.get_or_insert_default().extend(pairs);
     }
-    for (sum, effort) in all.overlap.effort.iter_mut().zip(found.overlap.effort) {
-        sum.by_vertex += effort.by_vertex;
-        sum.by_node += effort.by_node;
-        sum.searched += effort.searched;
-        sum.located += effort.located;
-        sum.narrow += effort.narrow;
+    for (sum, effort) in all.overlap.effort.iter_mut().zip(&found.overlap.effort) {
+        sum.add(effort);
     }
 }

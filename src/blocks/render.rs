@@ -10,7 +10,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Drawn, Rays};
 use crate::reference::ranges::visible;
-use crate::render::{Bounds, Plan, Prepared, RenderSettings};
+use crate::render::{Plan, Prepared, RenderSettings};
 use rayon::prelude::*;
 
 /// A field of a mesh that may not fit the device.
@@ -57,7 +57,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
     let source = Source::new(mesh, options, memory)?;
     // Light and opacity of a volume depend on what is on the surface, those of surfaces inside do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
-    let prepared = Prepared::new(settings, mesh, &bounds(&source.grid), &neighbours, |t| source.is_valid(t as u32), field)?;
+    let prepared = Prepared::new(settings, mesh, &(&source.grid).into(), &neighbours, |t| source.is_valid(t as u32), field)?;
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
     let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, drawn: Drawn::default(), took };
@@ -83,16 +83,11 @@ fn render_whole(placed: &Placed, asked: &View<'_>, report: &dyn Fn(u64, u64)) ->
     let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
     let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
-    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &bounds(tree.grid()), &neighbours, valid, field)?;
+    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &tree.grid().into(), &neighbours, valid, field)?;
     drop(neighbours);
     let normals = (!normals.is_empty()).then_some(normals.as_slice());
     let drawn = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;
     Ok(Picture { drawn, plan, range })
-}
-
-fn bounds(grid: &Grid) -> Bounds {
-    let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-    Bounds { lo: corner(grid.lo), hi: corner(grid.hi) }
 }
 
 /// A picture that is drawn in blocks.

@@ -1,7 +1,8 @@
 //! Stage 0: a mesh on the device — bad cells, bounds and grid, normalised vertices, neighbours and boundary bits (SPEC 2.1, 2.3).
 
+use super::stages::MeshView;
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{
     CheckCells, CheckCellsSpec, FindNeighbours, FindNeighboursSpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, NormaliseVertices,
     NormaliseVerticesSpec,
@@ -9,7 +10,7 @@ use crate::kernels::{
 use crate::layout::{Grid, MeshStatus};
 use crate::mesh::Mesh;
 use crate::primitives::{Arena, cmd_fill};
-use crate::reference::boundary::fault_of;
+use crate::reference::boundary::{fault_of, set_bits};
 
 /// Most tetrahedra of one mesh: faces are numbered in 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
@@ -188,7 +189,7 @@ pub struct DeviceMesh {
     arrays: MeshArrays,
     grid: Grid,
     status: MeshStatus,
-    time: Readback,
+    stages: Vec<StageTime>,
     _positions: Buffer,
     _cells: Buffer,
     memory: Buffer,
@@ -209,10 +210,11 @@ impl DeviceMesh {
     /// # Errors
     /// As [`DeviceMesh::upload`].
     pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
+        let number = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra; 32 bits number 2^32")));
+        let (points, tets) = (number(mesh.points.len())?, number(mesh.tets.len())?);
         let given = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[*grid])).transpose()?;
         let positions = gpu.upload("olbvh.mesh.positions", &mesh.points)?;
         let cells = gpu.upload("olbvh.mesh.cells", &mesh.tets)?;
-        let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
         let memory = gpu.buffer("olbvh.mesh.arrays", Arena::measure(carve)?)?;
@@ -227,7 +229,8 @@ impl DeviceMesh {
         if status.overflow != 0 {
             return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
         }
-        let made = Self { gpu: gpu.clone(), input, arrays, grid, status, time, _positions: positions, _cells: cells, memory };
+        let made =
+            Self { gpu: gpu.clone(), input, arrays, grid, status, stages: time.stages, _positions: positions, _cells: cells, memory };
         if policy == BadCells::Reject && status.bad > 0 {
             let list = made.bad_cells()?;
             let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
@@ -242,8 +245,7 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn bad_cells(&self) -> Result<Vec<u32>> {
-        let words = self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?;
-        Ok((0..self.input.tets).filter(|t| words[(t / 32) as usize] >> (t % 32) & 1 != 0).collect())
+        Ok(set_bits(self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?))
     }
 
     /// Boundary bits, one per tetrahedron.
@@ -284,6 +286,11 @@ impl DeviceMesh {
         [self.input.points as usize, self.input.tets as usize]
     }
 
+    /// Both of the following, as what is recorded takes them.
+    pub fn view(&self) -> MeshView {
+        MeshView { input: self.input, arrays: self.arrays }
+    }
+
     /// Where points and cells lie.
     pub fn input(&self) -> &MeshInput {
         &self.input
@@ -304,9 +311,9 @@ impl DeviceMesh {
         &self.status
     }
 
-    /// Device time of stage 0.
-    pub fn time(&self) -> &Readback {
-        &self.time
+    /// Device time of every part of stage 0, in order.
+    pub fn stages(&self) -> &[StageTime] {
+        &self.stages
     }
 
     /// Bytes of the neighbour table, counted apart from the tree.

@@ -10,7 +10,7 @@
 //! 5 ranges   smallest and largest value of a field per node: cells · down · up                             (once per field and time step)
 //! ```
 //! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole pipeline within given capacities;
-//! [`Tree::build`] records the same stages in three submissions, and reads two counts back to allocate exactly.
+//! [`Tree::build`] records the same stages in three or four submissions, and reads counts back between them to allocate exactly.
 
 mod mesh;
 mod plan;
@@ -22,6 +22,8 @@ pub(crate) use mesh::check_points;
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
 pub(crate) use plan::MAX_ENTRIES;
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+#[cfg(feature = "cli")]
+pub(crate) use plan::{SHARE, filtered};
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use stages::MeshView;
 pub use tree::Tree;
@@ -63,34 +65,27 @@ impl BuildScratch {
     }
 }
 
-/// Records a whole build within `capacity`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
+/// Records a whole build within the capacity of `tree`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
 /// more entries, a coarser one is built, down to the root alone, which has no more entries than there are tetrahedra; `tree.status` says what was, and that
 /// nothing was where a budget or [`Capacity::entries`] is too small for the root.
 ///
-/// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
+/// `scratch` is carved for that capacity and these options. First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
 /// write, behind it stands a barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for α outside 0…10.
-pub fn cmd_build(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    tree: &TreeMemory,
-    capacity: &Capacity,
-    options: &BuildOptions,
-    scratch: &BuildScratch,
-) -> Result<()> {
+pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, options: &BuildOptions, scratch: &BuildScratch) -> Result<()> {
     let BuildScratch { counts, filter, sorted } = scratch;
-    cmd_depth(r, mesh, tree.status, tree.grid, options, (capacity.candidates, capacity.level), counts)?;
+    cmd_depth(r, mesh, tree.status, tree.grid, options, (tree.capacity.candidates, tree.capacity.level), counts)?;
     cmd_count(r, mesh, tree.grid, options, counts)?;
     if let Some(filter) = filter {
         cmd_filter(r, mesh, tree.grid, options, counts, filter)?;
-        cmd_fit(r, mesh, tree, capacity, options, counts, filter)?;
+        cmd_fit(r, mesh, tree, options, counts, filter)?;
     }
-    cmd_codes(r, mesh, tree, capacity, counts, filter.as_ref(), sorted)?;
-    let entries = entries(capacity, counts, filter.as_ref());
-    cmd_count_splits(r, tree.status, tree.grid, capacity, entries, sorted)?;
-    cmd_splits(r, tree, capacity, entries, sorted)?;
-    cmd_leaves(r, mesh, tree, capacity, entries, filter.as_ref(), sorted)?;
-    cmd_levels(r, tree, capacity, sorted)
+    cmd_codes(r, mesh, tree, counts, filter.as_ref(), sorted)?;
+    let entries = entries(tree, counts, filter.as_ref());
+    cmd_count_splits(r, tree, entries, sorted)?;
+    cmd_splits(r, tree, entries, sorted)?;
+    cmd_leaves(r, mesh, tree, entries, filter.as_ref(), sorted)?;
+    cmd_levels(r, tree, sorted)
 }

@@ -2,7 +2,7 @@
 
 use super::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Readback, Recorder};
+use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{MergeRanges, MergeRangesSpec, PushRanges, PushRangesSpec, ScatterRanges, ScatterRangesSpec};
 use crate::mesh::On;
 
@@ -60,7 +60,7 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
 pub struct FieldRanges {
     gpu: Gpu,
     buffer: Buffer,
-    time: Readback,
+    stages: Vec<StageTime>,
 }
 
 impl FieldRanges {
@@ -71,7 +71,7 @@ impl FieldRanges {
     pub fn new(mesh: &DeviceMesh, tree: &Tree, field: (&[f32], On)) -> Result<Self> {
         let gpu = tree.gpu();
         let buffer = gpu.buffer("olbvh.ranges.values", range_bytes(tree.status().nodes))?;
-        let mut made = Self { gpu: gpu.clone(), buffer, time: Readback::default() };
+        let mut made = Self { gpu: gpu.clone(), buffer, stages: Vec::new() };
         made.update(mesh, tree, field)?;
         Ok(made)
     }
@@ -86,9 +86,8 @@ impl FieldRanges {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
         }
         let field = self.gpu.upload("olbvh.ranges.field", values)?;
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
         let ranges = self.memory();
-        self.time = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &view, tree.memory(), (field.all(), on), ranges))?.1;
+        self.stages = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges))?.1.stages;
         Ok(())
     }
 
@@ -106,7 +105,7 @@ impl FieldRanges {
     }
 
     /// Device time of the last update.
-    pub fn time(&self) -> &Readback {
-        &self.time
+    pub fn stages(&self) -> &[StageTime] {
+        &self.stages
     }
 }

@@ -1,7 +1,7 @@
 //! The stages of a build as functions that append to a recorder; [`super`] puts them in order.
 
 use super::mesh::{MeshArrays, MeshInput, summing_share};
-use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SeedScratch, SortedScratch, TreeMemory, TryScratch, filtered};
+use super::plan::{CountScratch, FilterScratch, SHARE, SeedScratch, SortedScratch, TreeMemory, TryScratch, filtered};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -109,13 +109,12 @@ pub(crate) fn cmd_fit(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
     tree: &TreeMemory,
-    capacity: &Capacity,
     options: &BuildOptions,
     scratch: &CountScratch,
     filter: &FilterScratch,
 ) -> Result<()> {
     let Some(tries) = filter.tries else { return Ok(()) };
-    let (grid, status, tets) = (tree.grid, tree.status, mesh.input.tets);
+    let (TreeMemory { grid, status, capacity, .. }, tets) = (*tree, mesh.input.tets);
     let TryScratch { live, groups, shares: tried_shares, entries: tried_entries } = tries;
     let (shares, entries, capacity, levels) = (scratch.total, filter.entries, capacity.entries, capacity.level);
     let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
@@ -256,13 +255,12 @@ pub(crate) fn cmd_codes(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
     tree: &TreeMemory,
-    capacity: &Capacity,
     counts: &CountScratch,
     filter: Option<&FilterScratch>,
     scratch: &SortedScratch,
 ) -> Result<()> {
     let MeshInput { cells, tets, .. } = mesh.input;
-    let (grid, quantized, bad) = (tree.grid, mesh.arrays.vertices, mesh.arrays.bad);
+    let (TreeMemory { grid, capacity, .. }, quantized, bad) = (*tree, mesh.arrays.vertices, mesh.arrays.bad);
     let (offsets, candidates, codes, ids) = (counts.offsets, counts.candidates, scratch.codes, tree.p);
     let target = r.gpu().target();
     r.stage("build.emit", |r| {
@@ -304,24 +302,18 @@ pub(crate) fn cmd_codes(
         }
         Ok(())
     })?;
-    let entries = entries(capacity, counts, filter);
+    let entries = entries(tree, counts, filter);
     r.stage("build.sort", |r| cmd_sort_pairs(r, codes, ids, 3 * capacity.level, entries, &scratch.sort))
 }
 
 /// The number of entries as the device knows it.
-pub(crate) fn entries(capacity: &Capacity, counts: &CountScratch, filter: Option<&FilterScratch>) -> Count {
-    Count::device(capacity.entries, filter.map_or(counts.candidates, |f| f.entries))
+pub(crate) fn entries(tree: &TreeMemory, counts: &CountScratch, filter: Option<&FilterScratch>) -> Count {
+    Count::device(tree.capacity.entries, filter.map_or(counts.candidates, |f| f.entries))
 }
 
 /// Stage 3, first part: how many nodes end where on each level; `NO` and the number of nodes, into `status`.
-pub(crate) fn cmd_count_splits(
-    r: &mut Recorder<'_>,
-    status: BufferRef,
-    grid: BufferRef,
-    capacity: &Capacity,
-    entries: Count,
-    scratch: &SortedScratch,
-) -> Result<()> {
+pub(crate) fn cmd_count_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count, scratch: &SortedScratch) -> Result<()> {
+    let TreeMemory { status, grid, capacity, .. } = *tree;
     let target = r.gpu().target();
     let (live, codes, splits, table_length) = (entries.word(r.gpu()), scratch.codes, scratch.splits, scratch.table_length);
     let once = r.gpu().subgroup_size();
@@ -355,15 +347,9 @@ pub(crate) fn cmd_count_splits(
 }
 
 /// Stage 3, second part: `PO` and `CO`.
-pub(crate) fn cmd_splits(
-    r: &mut Recorder<'_>,
-    tree: &TreeMemory,
-    capacity: &Capacity,
-    entries: Count,
-    scratch: &SortedScratch,
-) -> Result<()> {
+pub(crate) fn cmd_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count, scratch: &SortedScratch) -> Result<()> {
     let target = r.gpu().target().run;
-    let TreeMemory { status, grid, po, co, .. } = *tree;
+    let TreeMemory { status, grid, po, co, capacity, .. } = *tree;
     r.stage("build.splits", |r| {
         r.fill(tree.flags, 0);
         r.fill(tree.masks, 0);
@@ -393,7 +379,6 @@ pub(crate) fn cmd_leaves(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
     tree: &TreeMemory,
-    capacity: &Capacity,
     entries: Count,
     filter: Option<&FilterScratch>,
     scratch: &SortedScratch,
@@ -404,7 +389,7 @@ pub(crate) fn cmd_leaves(
     let marks = filter.and_then(|f| f.seeds).map(|s| s.marks);
     r.stage("build.leaves", |r| {
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));
-        let (live, run, capacity) = (entries.word(r.gpu()), target.run, capacity.entries);
+        let (live, run, capacity) = (entries.word(r.gpu()), target.run, tree.capacity.entries);
         let (cells, vertices, codes) = (mesh.input.cells, mesh.arrays.vertices, scratch.codes);
         let id_mask = id_mask(tree.lists, mesh.input.tets as usize);
         if id_mask != u32::MAX {
@@ -427,13 +412,13 @@ pub(crate) fn cmd_leaves(
 }
 
 /// Stage 4, second part: internal nodes, level by level upwards (Alg. 2).
-pub(crate) fn cmd_levels(r: &mut Recorder<'_>, tree: &TreeMemory, capacity: &Capacity, scratch: &SortedScratch) -> Result<()> {
+pub(crate) fn cmd_levels(r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
     let workgroup = r.gpu().target().each;
     let TreeMemory { status, grid, po, co, flags, masks, .. } = *tree;
     let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
     let spec = MergeLevelSpec { workgroup, boxes: u32::from(tree.boxes.is_some()), ..Default::default() };
     r.stage("build.levels", |r| {
-        for level in (0..capacity.level).rev() {
+        for level in (0..tree.capacity.level).rev() {
             let merge = MergeLevel { grid, status, codes: scratch.codes, po, co, flags, masks, boxes, level };
             r.dispatch(&merge, spec, Groups::Indirect(scratch.groups.part(u64::from(12 * level), 12)))?;
             r.barrier("levels.lower → levels.upper");

@@ -2,10 +2,10 @@
 
 use super::mesh::DeviceMesh;
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
-use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use super::stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
-use crate::layout::{BuildStatus, Grid};
+use crate::layout::{BuildStatus, Grid, wide};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::too_large;
@@ -40,14 +40,14 @@ fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Resul
 }
 
 impl Tree {
-    /// Builds a tree over a mesh: three submissions, between them the numbers of entries and nodes are read back, so that
-    /// exactly what is needed is allocated.
+    /// Builds a tree over a mesh: in four submissions (three with the paper's lists, where every candidate is an entry), between them the numbers of
+    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] for α outside 0…10, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
     /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
+        let view = mesh.view();
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
         let mut stages = Vec::new();
 
@@ -65,8 +65,7 @@ impl Tree {
         let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
 
         // Which candidates are entries.
-        let filter_buffer = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
-        let (filter_buffer, filter) = filter_buffer;
+        let (filter_buffer, filter) = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         if let Some(filter) = &filter {
             let ((), time) = gpu.run("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
             stages.extend(time.stages);
@@ -77,9 +76,8 @@ impl Tree {
         capacity.nodes = Capacity::for_entries(capacity.entries, level).nodes;
         let entry_buffer = gpu.buffer("olbvh.tree.p", 4 * u64::from(capacity.entries.max(4)))?;
         let (sorted_buffer, sorted) = reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
-        let entries = entries(&capacity, &counts, filter.as_ref());
         let nothing = gpu.nothing();
-        let mut memory = TreeMemory {
+        let head_memory = TreeMemory {
             assign,
             capacity,
             lists,
@@ -92,9 +90,10 @@ impl Tree {
             masks: nothing,
             boxes: None,
         };
+        let entries = entries(&head_memory, &counts, filter.as_ref());
         let ((), time) = gpu.run("olbvh.build.codes", |r| {
-            cmd_codes(r, &view, &memory, &capacity, &counts, filter.as_ref(), &sorted)?;
-            cmd_count_splits(r, status, grid, &capacity, entries, &sorted)
+            cmd_codes(r, &view, &head_memory, &counts, filter.as_ref(), &sorted)?;
+            cmd_count_splits(r, &head_memory, entries, &sorted)
         })?;
         stages.extend(time.stages);
         let planned: BuildStatus = first(gpu, &head, status)?;
@@ -119,16 +118,14 @@ impl Tree {
                 boxes: if options.boxes { Some(a.words(6 * nodes)?) } else { None },
             })
         };
-        let (node_buffer, nodes) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
-        let head_memory = memory;
-        memory = nodes;
+        let (node_buffer, memory) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
         let ((), time) = gpu.run("olbvh.build.nodes", |r| {
-            r.copy(head_memory.status.part(0, size_of::<BuildStatus>() as u64), memory.status);
-            r.copy(head_memory.grid.part(0, size_of::<Grid>() as u64), memory.grid);
+            r.copy(status.part(0, size_of::<BuildStatus>() as u64), memory.status);
+            r.copy(grid.part(0, size_of::<Grid>() as u64), memory.grid);
             r.barrier("head → splits");
-            cmd_splits(r, &memory, &capacity, entries, &sorted)?;
-            cmd_leaves(r, &view, &memory, &capacity, entries, filter.as_ref(), &sorted)?;
-            cmd_levels(r, &memory, &capacity, &sorted)
+            cmd_splits(r, &memory, entries, &sorted)?;
+            cmd_leaves(r, &view, &memory, entries, filter.as_ref(), &sorted)?;
+            cmd_levels(r, &memory, &sorted)
         })?;
         stages.extend(time.stages);
         let status: BuildStatus = first(gpu, &node_buffer, memory.status)?;
@@ -209,7 +206,7 @@ impl Tree {
 }
 
 fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
-    let entries: [u64; 11] = std::array::from_fn(|k| u64::from(status.total[2 * k]) | u64::from(status.total[2 * k + 1]) << 32);
+    let entries: [u64; 11] = std::array::from_fn(|k| wide([status.total[2 * k], status.total[2 * k + 1]]));
     if status.overflow != 0 {
         return Err(too_large(&entries, options));
     }

@@ -14,12 +14,13 @@ mod record;
 #[cfg(test)]
 mod tests;
 
-use crate::build::{BadCells, DeviceMesh, MeshInput, MeshView, Tree};
+use crate::build::{BadCells, DeviceMesh, MeshInput, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{Buffer, Gpu, GpuOptions};
+use crate::gpu::{Buffer, Gpu, GpuOptions, StageTime};
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::render::Bounds;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -279,9 +280,6 @@ pub extern "C" fn olbvh_mesh_upload(
     out: *mut *mut OlbvhMesh,
 ) -> OlbvhStatus {
     border(|| {
-        let limit = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra in one mesh")));
-        limit(point_count)?;
-        limit(tet_count)?;
         let points = array(points.cast::<[f32; 3]>(), point_count, "points")?.to_vec();
         let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?.to_vec();
         let mesh = Mesh::new(points, tets);
@@ -315,8 +313,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
         let device = &mesh.device;
         let gpu = device.gpu();
         let tree = Tree::build(gpu, device, &options)?;
-        let view = MeshView { input: *device.input(), arrays: *device.arrays() };
-        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&view, tree.memory(), None).addresses()])?;
+        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&device.view(), tree.memory(), None).addresses()])?;
         give(out, OlbvhTree { mesh, tree, addresses })
     })
 }
@@ -332,17 +329,16 @@ pub extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
 pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
     border(|| {
         let OlbvhTree { mesh, tree, addresses } = handle(tree, "tree")?;
-        let (status, grid) = (tree.status(), tree.grid());
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        let (status, Bounds { lo, hi }) = (tree.status(), tree.grid().into());
         let info = OlbvhTreeInfo {
             level: status.level,
             entries: status.entries,
             nodes: status.nodes,
             leaves: status.leaves,
-            lo: corner(grid.lo),
-            hi: corner(grid.hi),
+            lo,
+            hi,
             bad_cells: mesh.device.status().bad,
-            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
+            build_ms: StageTime::sum(tree.stages()),
             address: addresses.all().address,
         };
         put(out, info)

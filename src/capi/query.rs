@@ -6,7 +6,7 @@ use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh};
 use crate::query::{LocateOptions, Party, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
-use crate::render::{Bounds, Prepared, RenderSettings, TransferFunction};
+use crate::render::{Prepared, RenderSettings, TransferFunction};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
@@ -201,12 +201,10 @@ pub extern "C" fn olbvh_render(
         let pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?;
         let (values, on) = mesh.field(values, on_cells)?;
         let field = Field { name: "values".into(), on, values };
-        let (device, grid) = (&mesh.device, tree.grid());
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let bounds = Bounds { lo: corner(grid.lo), hi: corner(grid.hi) };
+        let device = &mesh.device;
         let (neighbours, bad) = (device.neighbours()?, device.bad_cells()?);
         let valid = |tet: usize| bad.binary_search(&(tet as u32)).is_err();
-        let prepared = Prepared::new(&settings, &mesh.download()?, &bounds, &neighbours, valid, &field)?;
+        let prepared = Prepared::new(&settings, &mesh.download()?, &tree.grid().into(), &neighbours, valid, &field)?;
         let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
         pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, &|_, _| {})?.colors);
         Ok(())

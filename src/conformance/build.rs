@@ -6,7 +6,7 @@ use super::build_expected::Expected;
 use super::failure::{Stop, Verdict, compare, compare_one};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
-use crate::build::{BuildScratch, Capacity, DeviceMesh, MeshView, Tree, TreeMemory, cmd_build};
+use crate::build::{BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
@@ -125,14 +125,14 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
 }
 
 fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &Capacity, expected: &Expected) -> Verdict {
-    let view = MeshView { input: *device.input(), arrays: *device.arrays() };
+    let view = device.view();
     let carve_tree = |a: &mut Arena| TreeMemory::carve(a, capacity, options);
     let tree_memory = Guarded::scratch(gpu, "olbvh.conformance.tree", Arena::measure(carve_tree)?)?;
     let tree = carve_tree(&mut Arena::new(tree_memory.all()))?;
     let carve = |a: &mut Arena| BuildScratch::carve(gpu, a, view.input.tets, capacity, options);
     let scratch_memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
     let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
-    gpu.run("olbvh.conformance.build", |r| cmd_build(r, &view, &tree, capacity, options, &scratch))?;
+    gpu.run("olbvh.conformance.build", |r| cmd_build(r, &view, &tree, options, &scratch))?;
 
     let content = tree_memory.read(gpu, "build")?;
     let scratch_content = scratch_memory.read(gpu, "build")?;

@@ -34,7 +34,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
         way: Way::Recorded,
         target: TargetKind::Device,
     };
-    for (i, assign) in Assign::ALL.into_iter().enumerate() {
+    for (i, assign) in Assign::EVERY.into_iter().enumerate() {
         let case = BuildCase { assign, ..case };
         // Quick: the record-only layer with boxes at α = 0, ours at a larger α.
         build(cases, mesh.group, BuildCase { boxes: true, ..case });
@@ -66,7 +66,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 /// Trees under every row of the table of targets.
 fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for target in Row::ALL.map(TargetKind::Row) {
+    for target in Row::EVERY.map(TargetKind::Row) {
         for (assign, lists) in [(Assign::Aabb, Lists::All), (Assign::Exact, Lists::Boundary)] {
             build(cases, mesh.group, BuildCase { mesh, alpha: 0.0, assign, lists, boxes: true, way: Way::Recorded, target });
         }
@@ -75,7 +75,7 @@ fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 /// Trees over a mesh of the caller's.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for (assign, lists) in Assign::ALL.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
+    for (assign, lists) in Assign::EVERY.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
         let tight = BuildCase { mesh, alpha: 0.0, assign, lists, boxes: false, way: Way::Tight, target: TargetKind::Device };
         for alpha in [0.0, 1.0, 2.0] {
             build(cases, Group::Quick, BuildCase { alpha, boxes: alpha == 0.0, way: Way::Owned, ..tight });

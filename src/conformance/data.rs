@@ -1,5 +1,7 @@
 //! Seeded inputs.
 
+pub(crate) use crate::mesh::hash as mix;
+
 /// Kinds of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Keys {
@@ -49,15 +51,6 @@ impl Keys {
         };
         (0..n).map(key).collect()
     }
-}
-
-/// A well-mixed 32-bit permutation (Wellons' lowbias32).
-pub(crate) fn mix(mut h: u32) -> u32 {
-    h ^= h >> 16;
-    h = h.wrapping_mul(0x7feb_352d);
-    h ^= h >> 15;
-    h = h.wrapping_mul(0x846c_a68b);
-    h ^ (h >> 16)
 }
 
 /// A seeded sequence.

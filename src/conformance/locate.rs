@@ -8,7 +8,7 @@ use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
-use crate::options::{Assign, BuildOptions, Lists};
+use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
@@ -128,7 +128,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
             let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
-            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, &LocateOptions::default(), quiet)?)
+            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, TOLERANCE, quiet)?)
         }
         How::Values => {
             // Whole numbers below 2^12: products and sums differ by the rounding of the barycentrics' division at most.

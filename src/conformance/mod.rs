@@ -41,14 +41,13 @@ pub use failure::Failure;
 pub use lab::{Lab, Outcome, Report};
 #[doc(hidden)]
 pub use overlap::{Both, check_overlap};
-pub use primitives::TargetKind;
 
 use build::BuildCase;
 use locate::LocateCase;
 use meshes::MeshRecipe;
 use overlap::OverlapCase;
 use picture::PictureCase;
-use primitives::{ReduceCase, ScanCase, SortCase};
+use primitives::{ReduceCase, ScanCase, SortCase, TargetKind};
 use ranges::RangesCase;
 use slice::SliceCase;
 

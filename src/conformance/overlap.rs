@@ -10,6 +10,7 @@ use crate::mesh::{Mesh, kuhn_jittered};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{Party, overlap};
 use crate::reference::boundary::{Topology, topology};
+use crate::reference::build::build;
 use crate::reference::overlap::{Side, overlap as reference};
 use crate::tree::TreeArrays;
 
@@ -60,7 +61,7 @@ impl Both {
         let topology = topology(&mesh)?;
         let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
         let tree = Tree::build(gpu, &device, options)?;
-        Ok(Self { topology, host: tree.download()?, mesh, device, tree })
+        Ok(Self { host: build(&mesh, &topology, options)?, topology, mesh, device, tree })
     }
 
     fn sides(&self) -> Sides<'_> {

@@ -59,10 +59,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let normals = &scene.prepared.normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
         let drawn = render(device, &tree, plan, (&field.values, field.on), normals, &|_, _| {})?;
-        let [width, height] = plan.size;
-        let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
-        let pixels: Vec<u8> =
-            rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
+        let pixels = plan.pixels(&drawn.colors);
         let expected = draw(&scene, &|_, _| {});
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // The intervals follow the tree's leaves, the picture does not.

@@ -11,7 +11,7 @@ use crate::primitives::{
 
 /// Shapes of kernels that a case runs under; a device's own is one of the first two.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum TargetKind {
+pub(crate) enum TargetKind {
     /// Whatever the device would choose, or the caller did.
     Device,
     /// Serial tiles, as for processors.
@@ -26,21 +26,15 @@ pub enum TargetKind {
 
 impl TargetKind {
     /// Name in cases; the device's own has none.
-    pub(crate) fn suffix(self) -> &'static str {
+    pub(crate) fn suffix(self) -> String {
         match self {
             Self::Device => "",
             Self::Serial => "/serial",
             Self::Ballot => "/ballot",
             Self::Narrow => "/narrow",
-            Self::Row(Row::Portable) => "/row-portable",
-            Self::Row(Row::Cpu) => "/row-cpu",
-            Self::Row(Row::Nvidia) => "/row-nvidia",
-            Self::Row(Row::Amd) => "/row-amd",
-            Self::Row(Row::Intel) => "/row-intel",
-            Self::Row(Row::Apple) => "/row-apple",
-            Self::Row(Row::Arm) => "/row-arm",
-            Self::Row(Row::Qualcomm) => "/row-qualcomm",
+            Self::Row(row) => return format!("/row-{row}"),
         }
+        .into()
     }
 
     /// The target on a device with this room; `None`: the device's own.

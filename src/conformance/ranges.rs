@@ -5,7 +5,7 @@ use super::failure::{Verdict, compare, compare_one, fail};
 use super::meshes::MeshRecipe;
 use super::picture::field;
 use super::twin::Twin;
-use crate::build::{DeviceMesh, FieldRanges, MeshView, Tree, cmd_ranges, range_bytes};
+use crate::build::{DeviceMesh, FieldRanges, Tree, cmd_ranges, range_bytes};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
@@ -41,7 +41,7 @@ pub(crate) fn check(gpu: &Gpu, case: &RangesCase, twin: &mut Twin, device: &Devi
     let built = twin.tree(&options)?;
     let (mesh, topology, host) = (&twin.mesh, &twin.topology, built.tree());
     let tree = Tree::build(gpu, device, &options)?;
-    let (view, nodes) = (MeshView { input: *device.input(), arrays: *device.arrays() }, host.nodes());
+    let (view, nodes) = (device.view(), host.nodes());
     let mut field = field(mesh, case.on);
     let mut owned = FieldRanges::new(device, &tree, (&field.values, field.on))?;
     let bits = |ranges: &[[f32; 2]]| ranges.iter().map(|r| r.map(f32::to_bits)).collect::<Vec<_>>();

@@ -9,6 +9,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::slice;
 use crate::reference::slice::Slicer;
+use crate::render::Bounds;
 use crate::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A small stack of layers.
@@ -62,10 +63,10 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
     let (mesh, host) = (&twin.mesh, built.tree());
-    let corner = |v: [f32; 4]| [v[0], v[1], v[2]];
+    let Bounds { lo, hi } = (&host.grid).into();
     let settings = SliceSettings { plane, layers, size, ..SliceSettings::default() };
     // A mesh without extent, or as large as numbers go, has no slices.
-    let voxels = settings.voxels(corner(host.grid.lo), corner(host.grid.hi), mesh.origin);
+    let voxels = settings.voxels(lo, hi, mesh.origin);
     let Some(voxels) = voxels.ok().filter(|v| v.plan(&host.grid).is_ok()) else { return Ok(()) };
     let field = case.stack.field.map(|on| field(mesh, on));
     let slicer = Slicer::new(mesh, &twin.topology, host, field.as_ref(), voxels, extrapolate)?;

@@ -199,7 +199,7 @@ impl Buffer {
         self.allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
     }
 
-    /// The bytes, where the memory is visible to the host.
+    /// The bytes, where the host sees them as the device does: nothing here flushes a cache.
     pub(crate) fn mapped(&self) -> Option<&[u8]> {
         self.coherent(vk::MemoryPropertyFlags::empty())?.mapped_slice()?.get(..self.size as usize)
     }

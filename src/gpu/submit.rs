@@ -25,6 +25,13 @@ pub struct StageTime {
     pub milliseconds: f64,
 }
 
+impl StageTime {
+    /// Milliseconds of these stages together.
+    pub fn sum<'a>(stages: impl IntoIterator<Item = &'a Self>) -> f64 {
+        stages.into_iter().map(|s| s.milliseconds).sum()
+    }
+}
+
 /// What a submission brings back.
 #[derive(Clone, Debug, Default)]
 pub struct Readback {
@@ -35,7 +42,7 @@ pub struct Readback {
 impl Readback {
     /// Milliseconds of all stages of that name.
     pub fn milliseconds(&self, name: &str) -> f64 {
-        self.stages.iter().filter(|s| s.name == name).map(|s| s.milliseconds).sum()
+        StageTime::sum(self.stages.iter().filter(|s| s.name == name))
     }
 }
 
@@ -162,8 +169,11 @@ impl Gpu {
     /// Reads a part of a buffer back.
     ///
     /// # Errors
-    /// A failed Vulkan call, or no memory for the transfer.
+    /// [`Error::Invalid`] for a part of another buffer, a failed Vulkan call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
+        if part.buffer != buffer.all().buffer {
+            return Err(Error::Invalid(format!("a part to be read of another buffer than {}", buffer.name())));
+        }
         let count = part.size as usize / size_of::<T>();
         let mut data = vec![T::zeroed(); count];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);

@@ -6,8 +6,8 @@
 //! registers are few or subgroups narrow. `olbvh tune` finds out what is better on the device at hand.
 
 use super::target::{Room, SortTarget, Target, TileTarget};
-use crate::error::{Error, Result};
 use crate::gpu::DeviceReport;
+use crate::options::named;
 use ash::vk::DriverId;
 use std::borrow::Cow;
 
@@ -32,6 +32,21 @@ pub enum Row {
     Qualcomm,
 }
 
+named!(
+    Row,
+    "target",
+    [
+        Portable = "portable",
+        Cpu = "cpu",
+        Nvidia = "nvidia",
+        Amd = "amd",
+        Intel = "intel",
+        Apple = "apple",
+        Arm = "arm",
+        Qualcomm = "qualcomm",
+    ]
+);
+
 /// One row as numbers; workgroups are rounded up to whole subgroups.
 struct Numbers {
     /// Workgroup and items per invocation of scans.
@@ -46,23 +61,6 @@ struct Numbers {
 }
 
 impl Row {
-    /// Every row.
-    pub const ALL: [Self; 8] = [Self::Portable, Self::Cpu, Self::Nvidia, Self::Amd, Self::Intel, Self::Apple, Self::Arm, Self::Qualcomm];
-
-    /// The name used on the command line and in reports.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Cpu => "cpu",
-            Self::Nvidia => "nvidia",
-            Self::Amd => "amd",
-            Self::Intel => "intel",
-            Self::Apple => "apple",
-            Self::Arm => "arm",
-            Self::Qualcomm => "qualcomm",
-        }
-    }
-
     #[rustfmt::skip]
     fn numbers(self) -> Numbers {
         let (cpu, simt) = (true, false);
@@ -110,15 +108,6 @@ impl Row {
     }
 }
 
-impl std::str::FromStr for Row {
-    type Err = Error;
-
-    fn from_str(name: &str) -> Result<Self> {
-        let found = Self::ALL.into_iter().find(|row| row.name().eq_ignore_ascii_case(name));
-        found.ok_or_else(|| Error::Invalid(format!("unknown target `{name}`; known are {}", Self::ALL.map(Self::name).join(", "))))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -139,7 +128,7 @@ mod tests {
 
     #[test]
     fn every_row_fits_the_least_device() {
-        for row in Row::ALL {
+        for row in Row::EVERY {
             assert_eq!(row.name().parse::<Row>().unwrap(), row);
             for subgroup in [4, 8, 16, 32, 64, 128] {
                 let room = Room::least(subgroup);

@@ -3,8 +3,8 @@
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
-/// Most iterations of a loop in a kernel: some drivers silently end longer ones.
-const LONGEST_LOOP: u32 = 32_768;
+/// Most iterations of a loop in a kernel, which the self-test runs: some drivers silently end longer ones.
+pub(crate) const LONGEST_LOOP: u32 = 32_768;
 /// Shared memory of the portable floor, of which rows of the table leave an eighth to the driver.
 const SHARED_BYTES: u32 = 16 << 10;
 

@@ -77,7 +77,7 @@ fn jet_value(p: [f32; 3], cells: [u32; 3]) -> f32 {
 }
 
 /// A well-mixed 32-bit permutation (Wellons' lowbias32 construction).
-fn hash(mut h: u32) -> u32 {
+pub(crate) fn hash(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x7feb_352d);
     h ^= h >> 15;

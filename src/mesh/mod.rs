@@ -3,6 +3,7 @@
 pub mod cases;
 mod kuhn;
 mod procedural;
+pub(crate) use kuhn::hash;
 pub use kuhn::{kuhn, kuhn_jittered};
 pub use procedural::{graded, shell, slivers};
 

@@ -3,12 +3,10 @@
 use super::{Arena, Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Groups};
-use crate::kernels::{SelfTest, SelfTestSpec};
+use crate::kernels::{LONGEST_LOOP, SelfTest, SelfTestSpec};
 
 /// Pairs of the sort, values of the scan: some tiles and a ragged end.
 const ITEMS: u32 = 9_001;
-/// Iterations of the loop test; the longest loop of any kernel.
-pub(crate) const LONGEST_LOOP: u32 = 32_768;
 
 fn wrong(device: &str, test: &'static str, at: usize, expected: u32, found: u32) -> Error {
     Error::SelfTest { device: device.into(), test, detail: format!("at {at}: expected {expected}, found {found}") }

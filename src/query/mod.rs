@@ -11,7 +11,6 @@ mod volume;
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
 pub use order::{PointOrder, cmd_sort_points};
-pub(crate) use overlap::set_bits;
 pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
@@ -123,7 +122,7 @@ pub struct Searched {
 impl Searched {
     /// A mesh in memory of our own.
     pub fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
-        Self { mesh: MeshView { input: *mesh.input(), arrays: *mesh.arrays() }, structure: structure.into() }
+        Self { mesh: mesh.view(), structure: structure.into() }
     }
 
     /// The same with other flags for the nodes of an octree.
@@ -164,8 +163,7 @@ fn slices(longest: u32) -> (u32, u32) {
 impl Scene {
     /// A mesh and its tree in memory of our own.
     pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Self {
-        let view = MeshView { input: *mesh.input(), arrays: *mesh.arrays() };
-        Self { mesh: view, tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
+        Self { mesh: mesh.view(), tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
     }
 }
 

@@ -20,8 +20,9 @@ use super::{Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Recorder, StageTime};
-use crate::layout::OverlapStatus;
+use crate::layout::{OverlapStatus, wide};
 use crate::primitives::Arena;
+use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{Effort, Overlap, members};
 
 /// Rounds of the search in one submission.
@@ -47,22 +48,10 @@ pub struct Overlapped {
     pub submissions: u32,
 }
 
-/// Numbers of the bits that are set, ascending.
-pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
-    let of_word = |(w, mut bits): (u32, u32)| {
-        std::iter::from_fn(move || {
-            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
-            bits &= bits - 1;
-            Some(32 * w + bit)
-        })
-    };
-    (0..).zip(words).flat_map(of_word).collect()
-}
-
 /// What a direction took.
 fn effort(status: &OverlapStatus) -> Effort {
-    let narrow = u64::from(status.narrow[0]) | u64::from(status.narrow[1]) << 32;
-    Effort { by_vertex: status.by_vertex, by_node: status.by_node, searched: status.waiting, located: status.located, narrow }
+    let OverlapStatus { by_vertex, by_node, waiting: searched, located, narrow, .. } = *status;
+    Effort { by_vertex, by_node, searched, located, narrow: wide(narrow) }
 }
 
 /// Two meshes on one device, and how far their overlap is.
@@ -134,8 +123,7 @@ impl Job<'_> {
         };
         self.done.overlap.effort[0] = effort(&status);
         if status.pairs[1] != 0 {
-            let pairs = u64::from(status.pairs[0]) | u64::from(status.pairs[1]) << 32;
-            return Err(Error::TooLarge(format!("{pairs} intersecting pairs; 32 bits count {} at most", u32::MAX)));
+            return Err(Error::TooLarge(format!("{} intersecting pairs; 32 bits count {} at most", wide(status.pairs), u32::MAX)));
         }
         let found = self.gpu.buffer("olbvh.query.overlap_found", 8 * u64::from(status.pairs[0]))?;
         let mut rounds = Rounds::begin(1);

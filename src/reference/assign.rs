@@ -19,19 +19,9 @@
 //! of the bounding box) may lie outside an edge's shadow by 3ε/|V| of its width, V being six times the volume. So the limits of edges
 //! get `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
 
-use super::grid::{Grid, reciprocal};
-use super::tet::{Tet, Vec3, cross, dot, sub};
+use super::grid::{Grid, reciprocal, two_to};
+use super::tet::{EDGES, FACES, Tet, Vec3, abs, cross, cross_bound, dot, sub};
 use crate::options::Assign;
-
-/// 2^n for |n| ≤ 126.
-const fn two_to(n: i32) -> f32 {
-    f32::from_bits(((n + 127) as u32) << 23)
-}
-
-/// The vertices of the face opposite to vertex i, in ascending global index.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
-/// Edges, and the two vertices that are not on them.
-const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
 
 /// A face plane: a box is outside if `dot(normal, centre − at) > limit`.
 #[derive(Clone, Copy, Debug, Default)]
@@ -74,16 +64,6 @@ pub fn inflated(grid: &Grid, h: Vec3) -> Vec3 {
 /// Centre of the box of a cell with half size `h`.
 pub fn cell_centre(h: Vec3, cell: [u32; 3]) -> Vec3 {
     [0, 1, 2].map(|c| (((2 * cell[c] + 1) as f32 * h[c]) * two_to(42)).floor() * two_to(-42))
-}
-
-/// Sums of the absolute products in `cross(a, b)`.
-fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
-    let [a, b] = [abs(a), abs(b)];
-    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
-}
-
-fn abs(a: Vec3) -> Vec3 {
-    a.map(f32::abs)
 }
 
 impl Filter {

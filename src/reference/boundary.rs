@@ -1,4 +1,4 @@
-//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/*boundary*`.
+//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/0*`.
 
 use super::grid::{COORDINATE_LIMIT, Grid, canonical};
 use super::tet::Tet;
@@ -69,6 +69,18 @@ pub fn bit(words: &[u32], i: u32) -> bool {
     words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
 }
 
+/// Numbers of the bits of packed words that are set, ascending.
+pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
+    let of_word = |(w, mut bits): (u32, u32)| {
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
+            bits &= bits - 1;
+            Some(32 * w + bit)
+        })
+    };
+    (0..).zip(words).flat_map(of_word).collect()
+}
+
 impl Topology {
     /// Bad cells, bounds and their grid alone: no neighbours, nothing marked as boundary.
     ///
@@ -99,18 +111,6 @@ impl Topology {
     /// Number of cells in the structure.
     pub fn valid_cells(&self) -> u32 {
         self.counts.cells - self.counts.bad
-    }
-
-    /// Refuses a mesh with bad cells (the policy `Reject`), naming the first five.
-    ///
-    /// # Errors
-    /// [`Error::BadCells`].
-    pub fn reject_bad(&self) -> Result<()> {
-        if self.bad.is_empty() {
-            return Ok(());
-        }
-        let first: Vec<String> = self.bad.iter().take(5).map(|(tet, fault)| format!("cell {tet}: {fault}")).collect();
-        Err(Error::BadCells { count: self.bad.len() as u64, first: first.join(", ") })
     }
 }
 

@@ -1,4 +1,4 @@
-//! Stage 1: the depth of the tree from the size of the primitives (SPEC 2.4, the paper's Eq. 11–12). Twin of `glsl/build/10_depth`.
+//! Stage 1: the depth of the tree from the size of the primitives (SPEC 2.4, the paper's Eq. 11–12). Twin of `glsl/build/1*`.
 
 use super::boundary::Topology;
 use super::grid::{Grid, MAX_LEVEL, canonical};

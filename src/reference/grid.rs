@@ -5,16 +5,21 @@
 
 pub use crate::layout::Grid;
 
+/// 2^n for |n| ≤ 126.
+pub(crate) const fn two_to(n: i32) -> f32 {
+    f32::from_bits(((n + 127) as u32) << 23)
+}
+
 /// Bits per axis of the finest grid (32-bit codes).
 pub const MAX_LEVEL: u32 = 10;
 /// Coordinates of this magnitude and beyond count as infinite: differences and scales stay in the range of normal numbers.
-pub const COORDINATE_LIMIT: f32 = f32::from_bits((125 + 127) << 23);
+pub const COORDINATE_LIMIT: f32 = two_to(125);
 /// An axis shorter than this (2^-103) is flat.
-pub const MIN_EXTENT: f32 = f32::from_bits((127 - 103) << 23);
+pub const MIN_EXTENT: f32 = two_to(-103);
 /// Normalised coordinates are multiples of 2^-42 and below 2^41, so that products of three differences neither overflow nor become
 /// denormal (devices may flush those).
-const GRID_UP: f32 = f32::from_bits((82 + 127) << 23);
-const GRID_DOWN: f32 = f32::from_bits((127 - 42) << 23);
+const GRID_UP: f32 = two_to(82);
+const GRID_DOWN: f32 = two_to(-42);
 
 /// `x` without denormals.
 pub fn canonical(x: f32) -> f32 {
@@ -29,7 +34,7 @@ impl Grid {
         let extent = [0, 1, 2].map(|c| canonical(hi[c] - lo[c]));
         let largest = extent.into_iter().fold(MIN_EXTENT, f32::max);
         let exponent = (largest.to_bits() >> 23) as i32 - 127;
-        let scale = f32::from_bits(((127 - exponent) as u32) << 23);
+        let scale = two_to(-exponent);
         let inv = extent.map(|e| if e < MIN_EXTENT { 0.0 } else { 1024.0 / e });
         let mut grid =
             Self { lo: pad(lo), hi: pad(hi), inv: pad(inv), extent: [0.0; 4], scale, level: MAX_LEVEL, ids: u32::MAX, ..Self::default() };

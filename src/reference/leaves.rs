@@ -1,8 +1,9 @@
-//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_leaves`.
+//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_flag_leaves` and
+//! `41_finish_leaves`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{Topology, bit};
-use super::grid::{Grid, canonical, unmorton};
+use super::grid::{Grid, canonical, two_to, unmorton};
 use super::quarters::{ALL_OCTANTS, octants_near};
 use super::separate::box_touches;
 use super::splits::Splits;
@@ -32,7 +33,7 @@ pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
     } else if k == 1 << level || grid.inv[c] == 0.0 {
         grid.hi[c]
     } else {
-        let size = f32::from_bits((127 - level) << 23);
+        let size = two_to(-(level as i32));
         canonical(grid.lo[c] + canonical(grid.hi[c] - grid.lo[c]) * (k as f32 * size))
     }
 }

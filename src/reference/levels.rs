@@ -1,4 +1,4 @@
-//! Stage 4, second part: internal nodes from their children, level by level upwards (the paper's Alg. 2). Twin of `glsl/build/50_levels`.
+//! Stage 4, second part: internal nodes from their children, level by level upwards (the paper's Alg. 2). Twin of `glsl/build/50_merge_level`.
 
 use super::leaves::Box6;
 use super::splits::Splits;

@@ -10,13 +10,10 @@ use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
 use super::walk::{HINTED, Room, STRIDE, Walked, Walker, weighed};
 use crate::mesh::{Field, Mesh, On};
-use crate::options::{Lists, RUN};
+use crate::options::{Lists, RUN, TOLERANCE};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
-
-/// Default tolerance: how far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
-pub const TOLERANCE: f32 = 1e-5;
 
 /// Entries of a list that one dispatch searches.
 pub const SLICE: u32 = 16_384;

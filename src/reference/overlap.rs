@@ -19,7 +19,7 @@
 //! primitives in pairs then.
 
 use super::boundary::{Topology, bit};
-use super::grid::{Grid, MAX_LEVEL, canonical, unmorton};
+use super::grid::{Grid, MAX_LEVEL, canonical, two_to, unmorton};
 use super::leaf_walk::{meets, walk_leaves};
 use super::separate::{box_touches, tets_touch};
 use super::tet::{Tet, Vec3, sub};
@@ -86,7 +86,7 @@ pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
 /// The cells of the tree with grid `grid` in normalised coordinates of the joint grid.
 pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
     let corner = joint.normalise([grid.lo[0], grid.lo[1], grid.lo[2]]);
-    let half = [0, 1, 2].map(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * f32::from_bits((39 + 127) << 23));
+    let half = [0, 1, 2].map(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * two_to(39));
     let flat = [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { 1.0 } else { 0.0 });
     let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     NodeFrame {
@@ -101,7 +101,6 @@ pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
 
 /// Centre and half size, allowance included, of the box of a node.
 fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
-    let two_to = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
     let cell = unmorton(node.code);
     let half =
         [0, 1, 2].map(|c| if frame.flat_axis[c] == 0.0 { frame.half_size[c] * two_to(-(node.level as i32)) } else { frame.half_size[c] });
@@ -253,7 +252,7 @@ impl Direction<'_> {
     }
 }
 
-/// Step 1 of one direction: the places of the vertices of used by valid cells.
+/// Step 1 of one direction: the places of the vertices that valid cells use.
 fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
     let Side { mesh, topology, .. } = direction.own;
     let mut used = vec![false; mesh.points.len()];
@@ -298,7 +297,8 @@ fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Ef
 }
 
 impl Effort {
-    fn add(&mut self, other: &Self) {
+    /// Sums up.
+    pub(crate) fn add(&mut self, other: &Self) {
         self.by_vertex += other.by_vertex;
         self.by_node += other.by_node;
         self.searched += other.searched;

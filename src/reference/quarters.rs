@@ -8,7 +8,7 @@
 //! are, so that a point outside may be found under one α and not under another, as at the border of a leaf. On an axis so short beside the largest that
 //! normalised coordinates cannot tell its finest cells apart, everything is near.
 
-use super::grid::{Grid, MAX_LEVEL, unmorton};
+use super::grid::{Grid, MAX_LEVEL, two_to, unmorton};
 use super::vertices::{CellRange, Vertices};
 use crate::mesh::Mesh;
 use crate::options::Lists;
@@ -18,7 +18,7 @@ use rayon::prelude::*;
 pub const ALL_OCTANTS: u32 = 0xff;
 
 /// An axis of less than this in normalised coordinates has finest cells of less than four of their steps.
-const COARSE: f32 = f32::from_bits((127 - 30) << 23);
+const COARSE: f32 = two_to(-30);
 
 /// The bits of an entry's word that are its primitive; quarters or halves stand above. All bits where entries have none: in the paper's lists, and in meshes that
 /// need the bits for their ids.

@@ -6,7 +6,7 @@
 //! the deepest level where they are no more: its range reaches a little far, and its work is bounded. Other nodes have the union of their children's.
 
 use super::boundary::Topology;
-use super::grid::{canonical, morton};
+use super::grid::{canonical, morton, two_to};
 use super::vertices::Vertices;
 use crate::mesh::{Field, Mesh, On};
 use crate::tree::TreeArrays;
@@ -65,7 +65,7 @@ pub fn ranges(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, field: &Field
 /// Which nodes have something to see: a value within one of the ranges `drawn` (ascending, apart), which is assumed where interpolation might round into one.
 /// One bit per node. Twin of `glsl/query/visible`.
 pub fn visible(ranges: &[[f32; 2]], drawn: &[[f32; 2]]) -> Vec<u32> {
-    let rounding = f32::from_bits((127 - 19) << 23);
+    let rounding = two_to(-19);
     let one = |&[lo, hi]: &[f32; 2]| {
         let rounding = canonical(lo.abs().max(hi.abs()) * rounding);
         let (a, b) = (canonical(canonical(lo) - rounding), canonical(canonical(hi) + rounding));

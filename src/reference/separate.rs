@@ -11,26 +11,8 @@
 //! **Two tetrahedra**, [`tets_touch`]: 8 face normals and 36 crosses of edges, no allowance: touching counts. The answer for (a, b) is that for
 //! (b, a) to the bit, because every difference and cross product changes nothing but its sign.
 
-use super::grid::{canonical, reciprocal};
-use super::tet::{Vec3, cross, dot, sub};
-
-const fn two_to(n: i32) -> f32 {
-    f32::from_bits(((n + 127) as u32) << 23)
-}
-
-/// The vertices of the face opposite to vertex i.
-const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
-/// Edges, and the two vertices that are not on them.
-const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
-
-fn abs(a: Vec3) -> Vec3 {
-    a.map(f32::abs)
-}
-
-fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
-    let [a, b] = [abs(a), abs(b)];
-    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
-}
+use super::grid::{canonical, reciprocal, two_to};
+use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
 
 /// Smallest and largest of four.
 fn range4(x: [f32; 4]) -> (f32, f32) {

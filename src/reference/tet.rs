@@ -4,7 +4,7 @@
 //! A tetrahedron is looked at with its vertices in ascending global index, so that two neighbours evaluate their common face
 //! bit-identically.
 
-use super::grid::reciprocal;
+use super::grid::{reciprocal, two_to};
 
 /// A point in normalised coordinates.
 pub type Vec3 = [f32; 3];
@@ -19,6 +19,21 @@ pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
 
 pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
+}
+
+/// The vertices of the face opposite to vertex i, in ascending global index.
+pub(super) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
+/// Edges, and the two vertices that are not on them.
+pub(super) const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
+
+pub(super) fn abs(a: Vec3) -> Vec3 {
+    a.map(f32::abs)
+}
+
+/// Sums of the absolute products in `cross(a, b)`.
+pub(super) fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
+    let [a, b] = [abs(a), abs(b)];
+    [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
 }
 
 /// Six times the signed volume of (a, b, c, p).
@@ -68,7 +83,7 @@ impl Bounds {
         let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
         let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
         let size = sub(hi, lo);
-        Self { lo, hi, margin: ((size[0] * size[1]) * size[2]) * f32::from_bits((127 - 16) << 23) }
+        Self { lo, hi, margin: ((size[0] * size[1]) * size[2]) * two_to(-16) }
     }
 
     fn hold(&self, p: Vec3) -> bool {

@@ -14,7 +14,7 @@
 
 use super::boundary::NONE;
 use super::candidates::Best;
-use super::grid::reciprocal;
+use super::grid::{reciprocal, two_to};
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::mesh::{Field, Mesh, On};
 
@@ -33,7 +33,7 @@ pub const DETOURS: u32 = 8;
 /// Stars that part 1 looks at: the second is that of the same gap between faces, or x is not there.
 const ARRIVALS: u32 = 2;
 /// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap of rounding between cells, and the nearest owns it.
-const GAP: f32 = -f32::from_bits((127 - 17) << 23);
+const GAP: f32 = -two_to(-17);
 
 /// Cell of a leaf in normalised coordinates.
 #[derive(Clone, Copy, Debug)]
@@ -272,10 +272,10 @@ impl Room {
     fn point(&self, k: u32) -> Vec3 {
         [0, 1, 2].map(|c| {
             // Anywhere in the cell, by Fibonacci hashing.
-            let part = ((3 * k + c as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 * f32::from_bits((127 - 23) << 23) - 1.0;
+            let part = ((3 * k + c as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 * two_to(-23) - 1.0;
             let away = if k == 0 { 0.0 } else { part };
             let at = self.centre[c] + self.half[c] * away;
-            (at * f32::from_bits((127 + 42) << 23)).floor() * f32::from_bits((127 - 42) << 23)
+            (at * two_to(42)).floor() * two_to(-42)
         })
     }
 }

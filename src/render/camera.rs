@@ -3,6 +3,7 @@
 mod spec;
 
 use crate::error::{Error, Result};
+use crate::layout::Grid;
 use crate::reference::grid::MIN_EXTENT;
 use glam::DVec3;
 
@@ -15,6 +16,13 @@ pub struct Bounds {
     pub lo: [f32; 3],
     /// Upper corner.
     pub hi: [f32; 3],
+}
+
+impl From<&Grid> for Bounds {
+    fn from(grid: &Grid) -> Self {
+        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
+        Self { lo: corner(grid.lo), hi: corner(grid.hi) }
+    }
 }
 
 impl Bounds {
@@ -84,12 +92,6 @@ impl Camera {
         let side = |up: DVec3| up.try_normalize().map(|up| forward.cross(up)).filter(|s| s.length_squared() > 1e-12);
         let right = side(up).or_else(|| side(DVec3::Z)).or_else(|| side(DVec3::Y)).unwrap_or(DVec3::X).normalize();
         Ok(Self { eye, forward, right, up: right.cross(forward), projection })
-    }
-
-    /// The default camera: a three-quarter view from the front, z upwards, that shows the larger sides of the box more frontally and
-    /// just holds all of it. `aspect` is width over height.
-    pub fn frame(bounds: &Bounds, aspect: f64) -> Self {
-        Self::frame_from(bounds, &bounds.corners(), aspect, three_quarter(bounds), DVec3::Z, Some(DEFAULT_FOV))
     }
 
     /// A camera on the side `from` (a direction, of any length) of the box that just holds all `points` in it; perspective with that

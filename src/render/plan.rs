@@ -6,7 +6,7 @@ use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderS
 use crate::error::{Error, Result};
 use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
-use crate::reference::grid::canonical;
+use crate::reference::grid::{canonical, two_to};
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.
@@ -146,6 +146,13 @@ impl Plan {
         }
     }
 
+    /// The picture of colours as [`crate::query::Drawn`] and the kernels have them, over the background: four bytes per pixel, straight alpha.
+    pub fn pixels(&self, colors: &[[f32; 4]]) -> Vec<u8> {
+        let [width, height] = self.size;
+        let rows = colors.chunks(width.max(1) as usize).zip(0..height);
+        rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| self.background.pixel(color, y, height))).collect()
+    }
+
     /// The reciprocal of the step.
     pub fn inverse_step(&self) -> f32 {
         1.0 / self.step
@@ -173,8 +180,7 @@ impl Plan {
 pub fn interval_slack(grid: &Grid) -> [f32; 3] {
     let (lo, hi) = (grid.lo, grid.hi);
     let largest = (0..3).map(|c| canonical(hi[c] - lo[c])).fold(0.0, f32::max);
-    let power = |n: u32| f32::from_bits((127 - n) << 23);
-    [0, 1, 2].map(|c| canonical(largest * power(18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * power(21)))
+    [0, 1, 2].map(|c| canonical(largest * two_to(-18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * two_to(-21)))
 }
 
 /// A plan and the normals that its light needs.
@@ -210,7 +216,7 @@ impl Prepared {
         settings.check()?;
         if !settings.iso.is_empty() && field.on == On::Cells {
             return Err(Error::Invalid(format!(
-                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or --opacity to show some values only",
+                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or an opacity that shows some values only",
                 field.name
             )));
         }

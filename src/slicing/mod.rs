@@ -16,7 +16,7 @@ pub use settings::{Plane, SliceSettings};
 
 use crate::error::{Error, Result};
 use crate::layout::{Grid, SlicePlan};
-use crate::reference::grid::canonical;
+use crate::reference::grid::{canonical, two_to};
 use crate::reference::vertices::CellRange;
 use glam::DVec3;
 
@@ -128,7 +128,6 @@ impl VoxelGrid {
 
     /// What the kernels and the reference need of these voxels over the mesh with grid `grid`. Twin of `glsl/query/slice_plan`.
     pub fn over(&self, grid: &Grid) -> SlicePlan {
-        let two_to = |n: i32| f32::from_bits(((n + 127) as u32) << 23);
         // Twice the mesh; what is larger need not be scaled, which could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
         let beyond = self.half.iter().flatten().any(|x| x.abs() > most);

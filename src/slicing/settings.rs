@@ -144,8 +144,7 @@ impl SliceSettings {
         let side = length(flat.across);
         let differs = |given: Option<f64>| given.is_some_and(|t| (t - side).abs() > 1e-3 * side);
         if differs(self.thickness) || differs(self.spacing) || self.size[1] != 0 {
-            let text =
-                format!("voxels of this package are cubes, here of {side}; leave --thickness, --spacing and the height of --size out");
+            let text = format!("voxels of this package are cubes, here of {side}; leave thickness, spacing and the height out");
             return Err(Error::Invalid(text));
         }
         (cubes.thickness, cubes.spacing) = (Some(side), Some(side));

@@ -13,6 +13,6 @@ mod tunables;
 mod workload;
 
 pub use profile::{Gain, Profile, Search, folder};
-pub use search::{Event, Limits, Tuned, Work, tune};
+pub use search::{Event, Tuned, Work, tune};
 pub use tunables::{TUNABLES, Tunable};
 pub use workload::Workload;

@@ -72,14 +72,16 @@ impl Profile {
     /// Reads a profile.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::File`] if it cannot be read, or is none.
+    /// [`Error::Io`] and [`Error::File`] if it cannot be read, is none, or has shapes that do not serve meshes of every size.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
-        serde_json::from_str(&text).map_err(|e| Error::File {
-            path: path.into(),
-            place: format!("line {}: ", e.line()),
-            message: format!("{e}; it is no profile of this version of `olbvh tune`: remove it, or tune again"),
-        })
+        let wrong = |place: String, e: &dyn std::fmt::Display| {
+            let message = format!("{e}; it is no profile of this version of `olbvh tune`: remove it, or tune again");
+            Error::File { path: path.into(), place, message }
+        };
+        let profile: Self = serde_json::from_str(&text).map_err(|e| wrong(format!("line {}: ", e.line()), &e))?;
+        profile.target.check_scale().map_err(|e| wrong(String::new(), &e))?;
+        Ok(profile)
     }
 
     /// The profile of a device in a folder. One that is broken, or of another device, or does not fit this one is ignored: it costs speed only.

@@ -29,13 +29,6 @@ pub trait Work {
     fn run(&self, target: &Target, stages: &[&str]) -> Result<Vec<StageTime>>;
 }
 
-/// How long the search goes on.
-#[derive(Clone, Copy, Debug)]
-pub struct Limits {
-    /// After this time no further candidate is tried.
-    pub time: Duration,
-}
-
 /// What the search has done.
 #[derive(Clone, Debug)]
 pub enum Event {
@@ -81,13 +74,13 @@ struct Searcher<'a> {
     tried: usize,
     refused: usize,
     begin: Instant,
-    limits: Limits,
+    time: Duration,
     report: &'a dyn Fn(&Event, f64),
 }
 
 /// Milliseconds of the stages with these beginnings.
 fn sum(stages: &[StageTime], beginnings: &[&str]) -> f64 {
-    stages.iter().filter(|s| beginnings.iter().any(|b| s.name.starts_with(b))).map(|s| s.milliseconds).sum()
+    StageTime::sum(stages.iter().filter(|s| beginnings.iter().any(|b| s.name.starts_with(b))))
 }
 
 /// Lower and upper quartile.
@@ -104,7 +97,7 @@ fn median(times: &[f64]) -> f64 {
 
 impl Searcher<'_> {
     fn is_over(&self) -> bool {
-        self.begin.elapsed() >= self.limits.time
+        self.begin.elapsed() >= self.time
     }
 
     /// Tries a candidate; whether it is the best now. Errors of the candidate refuse it; those of the best so far end the search.
@@ -126,7 +119,7 @@ impl Searcher<'_> {
                 Event::Refused { change, why: error.to_string() }
             }
         };
-        (self.report)(&event, self.begin.elapsed().as_secs_f64() / self.limits.time.as_secs_f64());
+        (self.report)(&event, self.begin.elapsed().as_secs_f64() / self.time.as_secs_f64());
         Ok(matches!(event, Event::Tried { kept: true, .. }))
     }
 
@@ -183,14 +176,14 @@ impl Searcher<'_> {
     }
 }
 
-/// Searches from `start` on; `report` is told of every candidate, and which part of the time is over.
+/// Searches from `start` on, and tries no further candidate after that time; `report` is told of every one, and which part of the time is over.
 ///
 /// # Errors
 /// If `start` itself gives wrong answers or does not run, or the device is lost.
-pub fn tune(work: &dyn Work, room: &Room, start: &Target, limits: Limits, report: &dyn Fn(&Event, f64)) -> Result<Tuned> {
+pub fn tune(work: &dyn Work, room: &Room, start: &Target, time: Duration, report: &dyn Fn(&Event, f64)) -> Result<Tuned> {
     work.verify(start)?;
     let begin = Instant::now();
-    let mut searcher = Searcher { work, best: start.clone(), kept: 0, tried: 0, refused: 0, begin, limits, report };
+    let mut searcher = Searcher { work, best: start.clone(), kept: 0, tried: 0, refused: 0, begin, time, report };
     let kind = |serial| if serial { "serial" } else { "ballot" };
     let other = other_sort(start, room);
     if !searcher.is_over() {
@@ -221,7 +214,7 @@ fn gains(work: &dyn Work, start: &Target, best: &Target) -> Result<Vec<Gain>> {
         }
     }
     let of = |runs: &[Vec<StageTime>], chosen: &dyn Fn(&StageTime) -> bool| {
-        median(&runs.iter().map(|run| run.iter().filter(|s| chosen(s)).map(|s| s.milliseconds).sum()).collect::<Vec<f64>>())
+        median(&runs.iter().map(|run| StageTime::sum(run.iter().filter(|s| chosen(s)))).collect::<Vec<f64>>())
     };
     let gain = |stage: &str, chosen: &dyn Fn(&StageTime) -> bool| Gain {
         stage: stage.into(),
@@ -272,7 +265,7 @@ mod tests {
         let fake = Fake { noise, calls: Cell::new(0), verified: RefCell::default() };
         let events = RefCell::new(Vec::new());
         let report = |event: &Event, _: f64| events.borrow_mut().push(event.clone());
-        let tuned = tune(&fake, &room, &Row::Portable.target(&room), Limits { time }, &report).unwrap();
+        let tuned = tune(&fake, &room, &Row::Portable.target(&room), time, &report).unwrap();
         (tuned, events.into_inner())
     }
 

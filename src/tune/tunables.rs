@@ -143,7 +143,7 @@ mod tests {
     fn steps_stay_within_the_room() {
         for subgroup in [4, 8, 32, 64, 128] {
             let room = Room::least(subgroup);
-            for row in Row::ALL {
+            for row in Row::EVERY {
                 let target = row.target(&room);
                 for tunable in &TUNABLES {
                     for up in [false, true] {

@@ -65,15 +65,15 @@ impl<'a> Workload<'a> {
     /// [`Error::Mismatch`] if the device gives other answers than the reference, [`Error::Memory`] and the like if it cannot hold the mesh.
     pub fn new(gpu: &Gpu, mesh: &'a Mesh) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
-        let grid = *device.grid();
-        let [lo, hi] = [grid.lo, grid.hi].map(|c| [c[0], c[1], c[2]]);
+        let bounds = Bounds::from(device.grid());
+        let Bounds { lo, hi } = bounds;
         // Fractions of multiples of the golden ratio and its kin: in no order, and spread evenly.
         let at = |i: u32, share: f64, c: usize| lo[c] + (hi[c] - lo[c]) * (f64::from(i) * share).fract() as f32;
         let points = (0..POINTS).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();
         let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
         let field = mesh.fields.iter().find(|f| f.on == On::Points).cloned().unwrap_or_else(along_x);
         let picture = RenderSettings { size: [PIXELS; 2], shading: false, ..RenderSettings::default() };
-        let plan = Plan::new(&picture, &Bounds { lo, hi }, mesh.origin, field.range())?;
+        let plan = Plan::new(&picture, &bounds, mesh.origin, field.range())?;
         let voxels = SliceSettings { size: [PIXELS, 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3])?;
         let gpu = gpu.clone();
         let (expected, prepared) = (Answers::default(), RefCell::default());
@@ -105,7 +105,7 @@ impl<'a> Workload<'a> {
         let mesh = DeviceMesh::upload(&gpu, self.mesh, BadCells::Skip)?;
         let tree = |lists| Tree::build(&gpu, &mesh, &BuildOptions { lists, ..BuildOptions::default() });
         let (whole, boundary) = (tree(Lists::All)?, tree(Lists::Boundary)?);
-        let stages = mesh.time().stages.iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
+        let stages = mesh.stages().iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
         Ok((Prepared { target: target.clone(), mesh, whole, boundary }, stages))
     }
 

@@ -1,7 +1,7 @@
 //! The baselines' construction and location, recorded.
 
 use olbvh::baseline::{LbvhScratch, RayMethod, Rays, cmd_build_lbvh, cmd_locate_lbvh};
-use olbvh::build::{BadCells, DeviceMesh, MeshView};
+use olbvh::build::{BadCells, DeviceMesh};
 use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::Mesh;
 use olbvh::primitives::Arena;
@@ -41,7 +41,7 @@ impl Baseline {
     }
 
     pub fn record_lbvh(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
-        let view = MeshView { input: *self.mesh.input(), arrays: *self.mesh.arrays() };
+        let view = self.mesh.view();
         cmd_build_lbvh(r, &view, &self.tree, &self.scratch)?;
         let asked = (self.points.all(), self.mesh.input().points);
         cmd_locate_lbvh(r, (&view, &self.tree), asked, &self.output, self.unfinished, 0.0, Rounds::begin(2))

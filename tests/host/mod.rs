@@ -167,7 +167,6 @@ pub struct Frame {
     pub mesh_scratch: MeshScratch,
     pub tree: TreeMemory,
     pub build_scratch: BuildScratch,
-    pub capacity: Capacity,
     pub points: PointInput,
     pub output: LocateOutput,
     pub memory: Buffer,
@@ -193,14 +192,14 @@ impl Frame {
         let (arrays, mesh_scratch, tree, build_scratch, output) = carve(&mut Arena::new(memory.all())).unwrap();
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None, order: None };
-        Self { input, arrays, mesh_scratch, tree, build_scratch, capacity, points: asked, output, memory, held: [cells, positions] }
+        Self { input, arrays, mesh_scratch, tree, build_scratch, points: asked, output, memory, held: [cells, positions] }
     }
 
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         cmd_prepare_mesh(r, &self.input, &self.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
         let mesh = MeshView { input: self.input, arrays: self.arrays };
-        cmd_build(r, &mesh, &self.tree, &self.capacity, &BuildOptions::default(), &self.build_scratch)?;
+        cmd_build(r, &mesh, &self.tree, &BuildOptions::default(), &self.build_scratch)?;
         let scene = Scene { mesh, tree: self.tree, longest_leaf: self.input.tets };
         cmd_locate(r, &scene, &self.points, &self.output, &LocateOptions::default())
     }

@@ -67,8 +67,8 @@ impl Queries {
             let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
-            let picture = RenderMemory::carve(a, plan.size, Some(&frame.capacity))?;
-            let (ranges, values) = (a.take(range_bytes(frame.capacity.nodes))?, a.words(u64::from(frame.points.count))?);
+            let picture = RenderMemory::carve(a, plan.size, Some(&frame.tree.capacity))?;
+            let (ranges, values) = (a.take(range_bytes(frame.tree.capacity.nodes))?, a.words(u64::from(frame.points.count))?);
             let order = PointOrder::carve(gpu, a, frame.points.count)?;
             Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, (ranges, values, order)))
         };

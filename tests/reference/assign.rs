@@ -138,7 +138,7 @@ fn check_point(stage: &Stage, t: usize, cell: [u32; 3], x: [f32; 3], name: &str)
     for level in 0..=MAX_LEVEL {
         let cell = cell.map(|q| q >> (MAX_LEVEL - level));
         assert!(stage.vertices.cells(ids, level).contains(cell), "{name}: cell {cell:?} of level {level} is no candidate of {ids:?}");
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let kept = Filter::new(&tet, stage.grid(), level, assign).touches(cell);
             assert!(kept, "{name}: {ids:?} loses cell {cell:?} of level {level} under {assign}, which holds {x:?}");
         }

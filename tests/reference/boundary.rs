@@ -142,10 +142,6 @@ fn bad_cells_are_named_and_left_out() {
     assert_eq!(topology.valid, [0b1_0000_0001]);
     assert_eq!((topology.grid.lo, topology.grid.hi), ([0.0; 4], [1.0, 1.0, 1.0, 0.0]));
     assert_eq!(topology.neighbours[0], [8, NONE, NONE, NONE]);
-    let message = topology.reject_bad().unwrap_err().to_string();
-    assert!(message.starts_with("8 bad cells"), "{message}");
-    assert!(message.contains("cell 1: vertex 8 does not exist, cell 2:"), "{message}");
-    assert!(named("kuhn").1.reject_bad().is_ok());
     let (_, all) = named("bad-all");
     assert_eq!((all.valid_cells(), all.counts.boundary), (0, 0));
 }

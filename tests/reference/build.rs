@@ -13,7 +13,7 @@ fn every_case_builds_a_valid_tree_at_every_alpha_and_assignment() {
         let (mesh, topology) = prepared(case.mesh);
         for alpha in ALPHAS {
             let mut entries = u64::MAX;
-            for assign in Assign::ALL {
+            for assign in Assign::EVERY {
                 let tree = tree(&mesh, &topology, alpha, assign);
                 let stats = tree.validate(&mesh, &topology).unwrap_or_else(|e| panic!("{} α {alpha} {assign}: {e}", case.name));
                 assert!(stats.entries <= entries, "{} α {alpha}: {assign} has more entries", case.name);
@@ -72,7 +72,7 @@ fn a_capacity_makes_the_tree_coarser_and_is_never_exceeded() {
     let full = tree(&mesh, &topology, 0.0, Assign::Aabb);
     let mut levels = Vec::new();
     for capacity in [full.p.len() as u32, full.p.len() as u32 - 1, 30_000, 10_368] {
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let tree = build(&mesh, &topology, &BuildOptions { capacity: Some(capacity), ..options(0.0, assign) }).unwrap();
             assert!(tree.p.len() <= capacity as usize);
             tree.validate(&mesh, &topology).unwrap();
@@ -143,7 +143,7 @@ fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
 fn leaves_without_the_flag_are_inside_the_mesh() {
     let (mesh, topology) = prepared(kuhn_jittered([12; 3], 0.2, 7).unwrap());
     for alpha in [0.0, 1.0, 2.0] {
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let tree = tree(&mesh, &topology, alpha, assign);
             let stats = tree.validate(&mesh, &topology).unwrap();
             let boxes = tree.boxes.as_ref().unwrap();

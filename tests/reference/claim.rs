@@ -15,7 +15,7 @@ fn unflagged_leaves_are_inside() {
         *p = [a[0], s * (a[1] - a[2]), s * (a[1] + a[2])];
     });
     let (mesh, topology) = prepared(mesh);
-    for assign in Assign::ALL {
+    for assign in Assign::EVERY {
         for alpha in [0.0, 1.0, 2.0] {
             let tree = tree(&mesh, &topology, alpha, assign);
             let locator = Locator::new(&mesh, &topology, &tree);

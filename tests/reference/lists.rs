@@ -21,7 +21,7 @@ fn trees_keep_every_rule() {
     for case in cases().unwrap() {
         let (mesh, topology) = prepared(case.mesh);
         for alpha in [0.0, 1.0, 3.0] {
-            for assign in Assign::ALL {
+            for assign in Assign::EVERY {
                 let [all, tree] = both(&mesh, &topology, alpha, assign);
                 let stats = tree.validate(&mesh, &topology).unwrap_or_else(|e| panic!("{} α {alpha} {assign}: {e}", case.name));
                 assert_eq!(all.grid.level, tree.grid.level);

@@ -32,7 +32,7 @@ fn owners_are_those_of_brute_force() {
         let points = points(&mesh, &topology, if mesh.tets.len() > 400 { 300 } else { 1000 }, 17);
         let expected: Vec<Vec<u32>> = points.par_iter().map(|&p| brute::owners(&mesh, &topology, &normalised, p)).collect();
         for alpha in [0.0, 1.0, 2.0, 4.0] {
-            for assign in Assign::ALL {
+            for assign in Assign::EVERY {
                 let tree = tree(&mesh, &topology, alpha, assign);
                 let locator = Locator::new(&mesh, &topology, &tree);
                 points.par_iter().zip(&expected).for_each(|(&p, expected)| {
@@ -76,7 +76,7 @@ fn no_point_of_a_mesh_is_lost() {
         .collect();
     let mut expected: Option<Vec<Location>> = None;
     for (alpha, part) in [(0.0, 1), (1.0, 1), (2.0, 8), (4.0, 250)] {
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let tree = tree(&mesh, &topology, alpha, assign);
             let some: Vec<[f32; 3]> = points.iter().copied().step_by(part).collect();
             let found = Locator::new(&mesh, &topology, &tree).locate_all(&some);

@@ -83,7 +83,7 @@ fn two_hundred_poses() {
         let a = prepared(meshes[random.below(3)].clone());
         let b = prepared(posed(&meshes[random.below(3)], &mut random, 5.0));
         let name = format!("pose {pose}");
-        let assign = Assign::ALL[pose % 3];
+        let assign = Assign::EVERY[pose % 3];
         let found = run(&a, &b, 0.0, assign, false);
         check(&name, &a, &b, &found);
         let back = run(&b, &a, 0.0, assign, false);
@@ -92,7 +92,7 @@ fn two_hundred_poses() {
         if pose % 4 == 0 {
             let pairs = run(&a, &b, 0.0, assign, true);
             check(&name, &a, &b, &pairs);
-            let other = run(&a, &b, 1.0, Assign::ALL[(pose + 1) % 3], true);
+            let other = run(&a, &b, 1.0, Assign::EVERY[(pose + 1) % 3], true);
             assert_eq!((&pairs.a, &pairs.b, &pairs.pairs), (&other.a, &other.b, &other.pairs), "{name}");
             let mut back = run(&b, &a, 0.0, assign, true).pairs.unwrap();
             for pair in &mut back {
@@ -116,7 +116,7 @@ fn contained_touching_identical_apart() {
     let big = cube(4, [0.0; 3], 1.0);
     let all = |m: &Prepared| (0..m.0.tets.len() as u32).collect::<Vec<_>>();
     for pairs in [false, true] {
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let identical = run(&big, &big, 0.0, assign, pairs);
             assert_eq!((&identical.a, &identical.b), (&all(&big), &all(&big)));
             let inner = cube(2, [1.6, 1.7, 1.55], 0.2);

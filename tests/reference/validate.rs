@@ -95,7 +95,7 @@ fn offsets() {
 
 #[test]
 fn lists() {
-    for assign in Assign::ALL {
+    for assign in Assign::EVERY {
         breaks(assign, "no valid cell", |t| t.p[10] = 1_000_000);
         breaks(assign, "not above", |t| {
             let at = t.entries(leaf(t, 3)).start;
@@ -156,7 +156,7 @@ type Pick = fn(&mut TreeArrays) -> &mut Vec<u32>;
 fn no_change_of_a_word_goes_unnoticed() {
     let (mesh, topology) = prepared(kuhn_jittered([2, 3, 2], 0.2, 4).unwrap());
     for alpha in [0.0, 2.0, 10.0] {
-        for assign in Assign::ALL {
+        for assign in Assign::EVERY {
             let tree = tree(&mesh, &topology, alpha, assign);
             let arrays: [Pick; 6] = [|t| &mut t.p, |t| &mut t.po, |t| &mut t.co, |t| &mut t.no, |t| &mut t.boundary, |t| &mut t.mask];
             for pick in arrays {

@@ -24,7 +24,6 @@ pub struct Body {
     scene: Scene,
     mesh_scratch: MeshScratch,
     build_scratch: BuildScratch,
-    capacity: Capacity,
     options: BuildOptions,
     input: PointInput,
     output: LocateOutput,
@@ -81,7 +80,6 @@ impl Body {
             scene,
             mesh_scratch,
             build_scratch,
-            capacity,
             options,
             input,
             output,
@@ -96,7 +94,7 @@ impl Body {
         r.barrier("frame.before → frame.mesh");
         cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
-        cmd_build(r, &scene.mesh, &scene.tree, &self.capacity, &self.options, &self.build_scratch)?;
+        cmd_build(r, &scene.mesh, &scene.tree, &self.options, &self.build_scratch)?;
         cmd_locate(r, scene, input, output, &LocateOptions::default())?;
         r.barrier("frame.owners → frame.values");
         cmd_interpolate(r, scene, self.held[0].all(), On::Points, output, self.values.all(), input.count)

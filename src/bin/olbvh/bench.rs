@@ -4,8 +4,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::{engine, input, output};
 use olbvh::bench::{Report, Settings, Suite, compare, markdown, plots, run as measure, text};
 use olbvh::error::Error;
-use olbvh::formats::{OutputFile, OutputFormat};
-use std::io::Write as _;
+use olbvh::formats::OutputFormat;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -101,12 +100,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 
 /// Compares two files; the result goes to a file as well, if one is named.
 fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outcome {
-    let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[])).transpose()?;
+    let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[a, b])).transpose()?;
     let comparison = compare([a, b]).map_err(Failure::input)?;
     let json = serde_json::to_value(&comparison).map_err(|e| Failure::Failed(e.to_string()))?;
     if let (Some(path), Some(format)) = (out, format) {
         let content = if format == OutputFormat::Md { comparison.markdown() } else { format!("{json:#}\n") };
-        write_file(path, &content)?;
+        output::write_text(path, &content)?;
     }
     output::summary(common, &json, &comparison.text())
 }
@@ -131,13 +130,7 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
             plots.chain(tables).map(|(name, content)| (path.join(name), content)).collect()
         }
     };
-    files.iter().try_for_each(|(path, content)| write_file(path, content))
-}
-
-fn write_file(path: &Path, content: &str) -> Outcome {
-    let mut file = OutputFile::create(path)?;
-    file.write_all(content.as_bytes()).map_err(|source| Error::Io { path: path.into(), source })?;
-    Ok(file.commit()?)
+    files.iter().try_for_each(|(path, content)| output::write_text(path, content))
 }
 
 /// The commit that the sources of this program are at now, if they are still there and under Git; `-dirty` with changes that are not committed.

@@ -82,6 +82,7 @@ impl From<Error> for Failure {
                     "{error}; `locate`, `render`, `slice` and `overlap` take meshes that do not fit in blocks, smaller ones with a smaller --memory"
                 )
             }
+            Error::NoVulkan(_) => format!("{error}, or use the CPU (--device cpu)"),
             _ => error.to_string(),
         };
         match error {

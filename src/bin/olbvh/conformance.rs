@@ -72,8 +72,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let lines = chosen.iter().fold(String::new(), |lines, c| format!("{lines}{:<6} {}\n", c.group.name(), c.name));
         return output::result(common, &json!({ "cases": list }), &lines);
     }
-    if common.device.as_deref().is_some_and(|d| d.eq_ignore_ascii_case("cpu")) {
+    if common.means_cpu() {
         return Err(Failure::Usage("the cases compare a Vulkan device with `cpu`; name another device".into()));
+    }
+    if let Some(file) = &args.junit {
+        output::announce_file(file, &[])?;
     }
     let (device, runs) = run_cases(args, common, &chosen)?;
     finish(args, common, &device, &runs)
@@ -183,7 +186,10 @@ fn entry((binding, report): &(Binding, Report)) -> Value {
 
 /// Writes the report that CI systems read.
 fn write_junit(file: &Path, runs: &[(Binding, Report)]) -> Outcome {
-    let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;");
+    // XML has no control characters.
+    let escape = |text: &str| {
+        text.replace(char::is_control, " ").replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
+    };
     let failures = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Failed(_))).count();
     let skipped = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Skipped(_))).count();
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
@@ -198,5 +204,5 @@ fn write_junit(file: &Path, runs: &[(Binding, Report)]) -> Outcome {
         };
     }
     text.push_str("</testsuite>\n");
-    std::fs::write(file, text).map_err(|e| Failure::Failed(format!("{}: {e}", file.display())))
+    output::write_text(file, &text)
 }

@@ -1,4 +1,4 @@
-//! The seam between the subcommands and what computes: build a tree, locate points, draw.
+//! The seam between the subcommands and what computes.
 
 mod cpu;
 mod gpu;
@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, Points, Stack, View};
+use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
@@ -25,52 +25,24 @@ pub type Report<'a> = &'a (dyn Fn(u64, u64) + Sync);
 /// Takes the bands of a stack of slices.
 pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;
 
-/// Where two meshes overlap, and how long that took.
-pub struct Overlapped {
-    /// What intersects what.
-    pub overlap: Overlap,
-    /// Seconds for both trees.
-    pub build_seconds: f64,
-    /// Seconds for the overlap.
-    pub seconds: f64,
-    /// Trees that were built: two, or more where meshes are cut into blocks.
-    pub trees: u32,
-}
-
 /// Something that builds trees. Bytes of device memory, where a question takes them, are the most that may be used; without, all there are.
 pub trait Engine {
     /// What it is called in results.
     fn name(&self) -> String;
     /// The shapes of its kernels, and where they come from; nothing without kernels.
     fn target(&self) -> Option<&Shapes>;
-    /// Marks the boundary and builds the tree.
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>>;
+    /// Marks the boundary, builds the tree, and tells what they are like.
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds owner, barycentric coordinates and value of each point.
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>>;
     /// The same, but finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds out where they overlap.
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped>;
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks>;
-}
-
-/// Two meshes, and what is asked of them.
-pub struct Question<'a> {
-    /// A and B.
-    pub meshes: [&'a Mesh; 2],
-    /// How their trees are built.
-    pub options: BuildOptions,
-    /// Whether all pairs are found.
-    pub pairs: bool,
-}
-
-/// A mesh with its tree.
-pub trait Built {
-    /// What they are like.
-    fn summary(&self) -> &Summary;
 }
 
 /// A picture and what was found out for it.
@@ -117,6 +89,8 @@ pub struct Summary {
     pub memory: Memory,
     /// Bytes as the paper counts them.
     pub paper_bytes: u64,
+    /// Bytes of the neighbour table, which is the mesh's, not the tree's.
+    pub neighbour_bytes: u64,
     /// Milliseconds for neighbours and boundary.
     pub topology_ms: f64,
     /// Milliseconds for the tree.

@@ -42,10 +42,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(true)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
-    let built = engine.build(&loaded.mesh, &options)?;
-    let summary = built.summary();
-    let json = json(args, engine.as_ref(), &loaded, summary);
-    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, summary, common.verbose).to_string())
+    let summary = engine.summary(&loaded.mesh, &options)?;
+    let json = json(args, engine.as_ref(), &loaded, &summary);
+    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, &summary, common.verbose).to_string())
 }
 
 /// Lower and upper corner in the coordinates of the source.
@@ -73,6 +72,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "boundary_cells": s.counts.boundary,
         "negative_cells": s.counts.negative,
         "flat_cells": s.counts.flat,
+        "tangled_cells": loaded.report.tangled,
         "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
         "bounds": { "min": lo, "max": hi },
         "warnings": loaded.report.warnings,
@@ -80,6 +80,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "target": engine.target().map(|shapes| shapes.target.name.clone()),
         "load_ms": loaded.report.seconds * 1e3,
         "topology_ms": s.topology_ms,
+        "neighbour_bytes": s.neighbour_bytes,
         "tree": {
             "l": s.level, "l_wanted": s.wanted, "alpha": args.tree.level.is_none().then_some(args.tree.alpha), "level": args.tree.level, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
             "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
@@ -124,6 +125,9 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("boundary cells", grouped(counts.boundary));
     page.row("negative cells", grouped(counts.negative));
     page.row("flat cells", grouped(counts.flat));
+    if report.tangled > 0 {
+        page.row("tangled cells", format_args!("{}, whose pieces overlap", grouped(report.tangled)));
+    }
     let [lo, hi] = bounds(mesh, s);
     page.row("bounds", format_args!("({}) to ({})", joined(&lo, ", "), joined(&hi, ", ")));
     page.row("extent", joined(&[0, 1, 2].map(|c| s.bounds.hi[c] - s.bounds.lo[c]), " × "));
@@ -163,7 +167,8 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     }
     page.row("total", bytes(s.memory.total()));
     page.row("as the paper counts", format_args!("{} (4 n_m + 25 n_n + 4 n_ni, without PO)", bytes(s.paper_bytes)));
-    page.row("neighbours, boundary", format_args!("found in {}", milliseconds(s.topology_ms)));
+    let neighbours = bytes(s.neighbour_bytes);
+    page.row("neighbours, boundary", format_args!("found in {}; {neighbours} of neighbours beside the tree", milliseconds(s.topology_ms)));
     if verbose {
         if let Some(shapes) = shapes {
             page.row("kernels", shapes);

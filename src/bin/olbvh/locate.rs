@@ -43,7 +43,7 @@ pub struct Args {
     #[arg(long, conflicts_with = "field")]
     all: bool,
     /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
-    #[arg(long, default_value_t = olbvh::reference::locate::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
+    #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
     /// Each point lies near the one before, as samples of a line or a scan do; without, no order is assumed.
     #[arg(long, conflicts_with = "all")]
@@ -75,7 +75,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let points = load_points(&args.points).map_err(Failure::input)?;
     // The difference in double precision: that is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
-    let path = if args.all { query::Path::Descent } else { query::Path::suited(local.len(), mesh.tets.len(), args.coherent) };
+    let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
     let asked = Points { mesh, options, points: &local, how: LocateOptions { path, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);

@@ -2,7 +2,8 @@
 
 use crate::common::{Common, Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
-use olbvh::formats::OutputFormat;
+use olbvh::error::Error;
+use olbvh::formats::{OutputFile, OutputFormat};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -53,12 +54,17 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
-/// Announces a result, before long work: its ending must be one of `formats`, its folder must exist, and it must not be one of the `inputs`.
+/// Announces a result, before long work: as [`announce_file`], and its ending must be one of `formats`.
 pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outcome<OutputFormat> {
+    announce_file(path, inputs)?;
+    Ok(OutputFormat::of(path, formats)?)
+}
+
+/// Announces a result of any ending: its folder must exist, and it must not be one of the `inputs`.
+pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     if path == Path::new("-") || path.starts_with("/dev") {
         return Err(Failure::Usage(format!("{}: results go to files, not to streams or devices", path.display())));
     }
-    let format = OutputFormat::of(path, formats)?;
     let place = std::fs::canonicalize(path).ok();
     if place.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == place) {
         return Err(Failure::Usage(format!("{}: the result would replace what it is made of; choose another name", path.display())));
@@ -67,7 +73,14 @@ pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outc
         return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(path).display())));
     }
     PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
-    Ok(format)
+    Ok(())
+}
+
+/// Writes a file of text, complete or not at all.
+pub fn write_text(path: &Path, text: &str) -> Outcome {
+    let mut file = OutputFile::create(path)?;
+    file.write_all(text.as_bytes()).map_err(|source| Error::Io { path: path.into(), source })?;
+    Ok(file.commit()?)
 }
 
 /// A progress bar on standard error, if that is a terminal; it appears once work takes long.

@@ -2,17 +2,19 @@
 
 use crate::arguments::vector;
 use crate::common::{Common, Outcome};
-use crate::engine::{self, Question};
+use crate::engine;
 use crate::input::{MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
+use olbvh::blocks::Meshes;
 use olbvh::error::Error;
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::{Assign, Lists};
 use serde_json::json;
 use std::path::PathBuf;
+use std::time::Instant;
 
 /// Find the cells of two meshes that intersect the other mesh.
 #[derive(clap::Args)]
@@ -61,10 +63,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut b = args.tree.mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;
     let progress = Progress::new(common, "overlap");
-    let asked = Question { meshes: [&a, &b], options, pairs: args.pairs };
-    let found = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?;
+    let asked = Meshes { meshes: [&a, &b], options, pairs: args.pairs };
+    let start = Instant::now();
+    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.apart();
+    let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
-    let overlap = &found.overlap;
     let cells = |mesh: &Mesh, tets: &[u32]| {
         let mut ids: Vec<u32> = tets.iter().map(|&t| mesh.cell_id(t)).collect();
         ids.sort_unstable();
@@ -93,7 +96,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
     let json = json!({
         "file": args.output.display().to_string(), "a": ids_a.len(), "b": ids_b.len(), "pairs": pairs.as_ref().map(Vec::len),
-        "narrow_tests": narrow, "narrow_share": share, "seconds": found.seconds, "build_seconds": found.build_seconds, "trees": found.trees,
+        "narrow_tests": narrow, "narrow_share": share, "seconds": seconds, "build_seconds": took.build_seconds, "trees": took.trees, "peak_bytes": took.peak,
         "a_effort": effort(&overlap.effort[0]), "b_effort": effort(&overlap.effort[1]), "device": engine.name(),
     });
     let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
@@ -104,9 +107,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         grouped(ids_b.len() as u64),
         grouped(narrow),
         share,
-        found.trees,
-        milliseconds(found.build_seconds * 1e3),
-        milliseconds(found.seconds * 1e3),
+        took.trees,
+        milliseconds(took.build_seconds * 1e3),
+        milliseconds(seconds * 1e3),
         engine.name()
     );
     output::summary(common, &json, &text)

@@ -9,9 +9,9 @@ use crate::slice_output::{Layers, Look, materials};
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
-use olbvh::mesh::{Field, Mesh, On};
+use olbvh::mesh::{Field, On};
 use olbvh::reference::boundary::valid_grid;
-use olbvh::render::{TransferFunction, transfer};
+use olbvh::render::{Bounds, TransferFunction, transfer};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 use serde_json::json;
 use std::path::PathBuf;
@@ -104,7 +104,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
-    let (lo, hi) = bounds(mesh);
+    let Bounds { lo, hi } = (&valid_grid(mesh)).into();
     let mut settings = SliceSettings {
         plane: args.normal.map_or(Plane::Axis(args.axis), Plane::Normal),
         at: args.at,
@@ -169,12 +169,6 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         in_blocks(&took)
     );
     output::summary(common, &json, &text)
-}
-
-/// The corners of the box around the cells that are not bad.
-fn bounds(mesh: &Mesh) -> ([f32; 3], [f32; 3]) {
-    let (grid, corner) = (valid_grid(mesh), |c: [f32; 4]| [c[0], c[1], c[2]]);
-    (corner(grid.lo), corner(grid.hi))
 }
 
 fn axis(text: &str) -> Result<usize, String> {

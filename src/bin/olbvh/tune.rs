@@ -7,7 +7,7 @@ use crate::output::{self, Progress};
 use crate::text::{Page, milliseconds};
 use olbvh::formats::OutputFormat;
 use olbvh::gpu::Gpu;
-use olbvh::tune::{Event, Gain, Limits, Profile, TUNABLES, Tuned, Workload, folder, tune};
+use olbvh::tune::{Event, Gain, Profile, TUNABLES, Tuned, Workload, folder, tune};
 use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -62,8 +62,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         tell(event, common);
         progress.set((part.min(1.0) * 1000.0) as u64, 1000);
     };
-    let limits = Limits { time: Duration::from_secs_f64(args.seconds) };
-    let tuned = tune(&work, &gpu.report().room, gpu.target(), limits, &report)?;
+    let tuned = tune(&work, &gpu.report().room, gpu.target(), Duration::from_secs_f64(args.seconds), &report)?;
     drop(progress);
     // Without a gain there is nothing to keep, unless a file was asked for.
     let saved = (tuned.kept > 0 || args.output.is_some()).then(|| save(&gpu, args, &tuned, &file)).transpose()?;

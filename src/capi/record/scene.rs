@@ -51,7 +51,7 @@ pub struct OlbvhPlanSizes {
 pub struct OlbvhScene {
     pub(super) gpu: Gpu,
     pub(super) scene: Scene,
-    planned: Planned,
+    options: BuildOptions,
     mesh_scratch: MeshScratch,
     build_scratch: BuildScratch,
 }
@@ -143,7 +143,7 @@ pub extern "C" fn olbvh_scene_place(
         let input = MeshInput { positions, stride, points, cells, tets };
         let longest_leaf = if plan.longest_leaf == 0 { tets } else { plan.longest_leaf };
         let scene = Scene { mesh: MeshView { input, arrays }, tree, longest_leaf };
-        give(out, OlbvhScene { gpu: gpu.clone(), scene, planned, mesh_scratch, build_scratch })
+        give(out, OlbvhScene { gpu: gpu.clone(), scene, options: planned.options, mesh_scratch, build_scratch })
     })
 }
 
@@ -170,9 +170,9 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
     recorded(recording, |r| {
-        let OlbvhScene { scene, planned, mesh_scratch, build_scratch, .. } = handle(scene, "scene")?;
+        let OlbvhScene { scene, options, mesh_scratch, build_scratch, .. } = handle(scene, "scene")?;
         cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, mesh_scratch)?;
         r.barrier("scene.mesh → scene.tree");
-        cmd_build(r, &scene.mesh, &scene.tree, &planned.capacity, &planned.options, build_scratch)
+        cmd_build(r, &scene.mesh, &scene.tree, options, build_scratch)
     })
 }

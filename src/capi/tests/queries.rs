@@ -4,6 +4,7 @@ use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
 use crate::mesh::Field;
+use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
 use crate::render::{Bounds, Plan, Prepared};
 use crate::slicing::{Band, Extrapolate};
@@ -73,7 +74,7 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
         sliced,
         hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
         pairs: pairs.pairs.unwrap(),
-        owners: locate_all(&mesh, &tree, points, &LocateOptions::default(), &|_, _| {}).unwrap(),
+        owners: locate_all(&mesh, &tree, points, TOLERANCE, &|_, _| {}).unwrap(),
         located: locate(&mesh, &tree, points, field, &LocateOptions::default(), &|_, _| {}).unwrap().values,
     }
 }
@@ -260,8 +261,7 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     let [mesh, other] = meshes();
     let settings = OlbvhPictureSettings { shading: 0, ..settings() };
     let plan = |gpu: &OlbvhTree| {
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let bounds = Bounds { lo: corner(gpu.tree.grid().lo), hi: corner(gpu.tree.grid().hi) };
+        let bounds = Bounds::from(gpu.tree.grid());
         let (neighbours, field) =
             (gpu.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
         Prepared::new(&settings.read().unwrap(), &mesh, &bounds, &neighbours, |_| true, &field).unwrap().plan

@@ -4,7 +4,7 @@ use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Shown, cmd_render};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu};
-use crate::layout::{RayState, RenderStatus};
+use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Searched, Structure};
@@ -151,7 +151,6 @@ impl<'a> Canvas<'a> {
                 break status;
             }
         };
-        let wide = |w: [u32; 2]| u64::from(w[0]) | u64::from(w[1]) << 32;
         drawn.samples += wide(status.samples);
         drawn.skipped_samples += wide(status.skipped);
         drawn.found_samples += wide(status.found);

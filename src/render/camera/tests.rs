@@ -54,7 +54,7 @@ fn rays_pass_through_their_pixels() {
 
 #[test]
 fn rays_start_before_the_box() {
-    let camera = Camera::frame(&BOX, 1.0);
+    let camera = CameraSpec::default().resolve(&BOX, [0.0; 3], 1.0).unwrap();
     let rays = camera.rays([8, 8], &BOX);
     for p in BOX.corners() {
         let [o, d] = {

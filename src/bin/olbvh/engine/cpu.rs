@@ -1,7 +1,7 @@
 //! The reference implementation as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Sink, Summary};
-use olbvh::blocks::{InBlocks, Points, Stack, View};
+use super::{Drawn, Engine, Located, Report, Sink, Summary};
+use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
@@ -9,11 +9,10 @@ use olbvh::query::{self, LocateOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::{self, Location, Locator, order_of};
-use olbvh::reference::overlap::{Side, overlap};
+use olbvh::reference::overlap::{Overlap, Side, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
-use olbvh::render::Bounds;
 use olbvh::slicing::bands;
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
@@ -27,7 +26,8 @@ struct CpuTree<'a> {
     mesh: &'a Mesh,
     topology: Topology,
     tree: TreeArrays,
-    summary: Summary,
+    topology_ms: f64,
+    build_ms: f64,
 }
 
 impl Engine for Cpu {
@@ -39,8 +39,28 @@ impl Engine for Cpu {
         None
     }
 
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
-        Ok(Box::new(CpuTree::new(mesh, options)?))
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary> {
+        let CpuTree { topology, tree, topology_ms, build_ms, .. } = CpuTree::new(mesh, options)?;
+        let wanted = match options.level {
+            Some(level) => level,
+            None => measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
+        };
+        Ok(Summary {
+            counts: topology.counts,
+            bad: topology.bad,
+            bounds: (&tree.grid).into(),
+            level: tree.grid.level,
+            wanted,
+            entries: tree.p.len() as u64,
+            nodes: u64::from(tree.nodes()),
+            leaves: tree.leaves().len() as u64,
+            memory: tree.memory(),
+            paper_bytes: tree.memory().paper(),
+            neighbour_bytes: size_of_val(&topology.neighbours[..]) as u64,
+            topology_ms,
+            build_ms,
+            stages: Vec::new(),
+        })
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
@@ -54,7 +74,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
         no_memory(memory)?;
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
@@ -62,11 +82,10 @@ impl Engine for Cpu {
         let build = olbvh::reference::build::build;
         let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
         let build_seconds = start.elapsed().as_secs_f64();
-        let start = Instant::now();
         let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
-        let overlap = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        let answer = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
         report(1, 1);
-        Ok(Overlapped { overlap, build_seconds, seconds: start.elapsed().as_secs_f64(), trees: 2 })
+        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds })
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
@@ -107,7 +126,7 @@ fn on_host<T>(
 ) -> Result<InBlocks<T>> {
     no_memory(memory)?;
     let tree = CpuTree::new(mesh, options)?;
-    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.summary.build_ms / 1e3 })
+    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3 })
 }
 
 impl<'a> CpuTree<'a> {
@@ -118,26 +137,7 @@ impl<'a> CpuTree<'a> {
         let start = Instant::now();
         let tree = olbvh::reference::build::build(mesh, &topology, options)?;
         let build_ms = start.elapsed().as_secs_f64() * 1e3;
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
-        let summary = Summary {
-            counts: topology.counts,
-            bad: topology.bad.clone(),
-            bounds: Bounds { lo: corner(tree.grid.lo), hi: corner(tree.grid.hi) },
-            level: tree.grid.level,
-            wanted: match options.level {
-                Some(level) => level,
-                None => measure(mesh, &topology, &Vertices::new(mesh, &topology.grid)).heuristic(options.alpha_fixed()?),
-            },
-            entries: tree.p.len() as u64,
-            nodes: u64::from(tree.nodes()),
-            leaves: tree.leaves().len() as u64,
-            memory: tree.memory(),
-            paper_bytes: tree.memory().paper(),
-            topology_ms,
-            build_ms,
-            stages: Vec::new(),
-        };
-        Ok(Self { mesh, topology, tree, summary })
+        Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
     fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Vec<Located> {
@@ -155,12 +155,6 @@ impl<'a> CpuTree<'a> {
             report(all.len() as u64, points.len() as u64);
         }
         all
-    }
-}
-
-impl Built for CpuTree<'_> {
-    fn summary(&self) -> &Summary {
-        &self.summary
     }
 }
 

@@ -1,19 +1,18 @@
 //! A Vulkan device as an engine.
 
-use super::{Built, Drawn, Engine, Located, Overlapped, Question, Report, Shapes, Sink, Summary};
+use super::{Drawn, Engine, Located, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, Points, Stack, View};
+use olbvh::blocks::{self, InBlocks, Meshes, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
-use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::gpu::{Gpu, GpuOptions, StageTime};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::query;
 use olbvh::reference::boundary::{Counts, fault_of};
+use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
-use olbvh::render::Bounds;
 use std::path::PathBuf;
-use std::time::Instant;
 
 /// An opened device, and where the shapes of its kernels come from.
 pub struct Device(Gpu, Shapes);
@@ -48,9 +47,6 @@ fn cache_file() -> Option<PathBuf> {
     Some(folder.join("olbvh").join(concat!("pipelines-", env!("CARGO_PKG_VERSION"), ".bin")))
 }
 
-/// A mesh and its tree, measured.
-struct Measured(Summary);
-
 impl Engine for Device {
     fn name(&self) -> String {
         self.0.report().name.clone()
@@ -60,13 +56,12 @@ impl Engine for Device {
         Some(&self.1)
     }
 
-    fn build<'a>(&'a self, mesh: &'a Mesh, options: &BuildOptions) -> Result<Box<dyn Built + 'a>> {
+    fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary> {
         let device = DeviceMesh::upload(&self.0, mesh, BadCells::Skip)?;
         let tree = Tree::build(&self.0, &device, options)?;
         let (cells, built) = (device.status(), tree.status());
-        let corner = |c: [f32; 4]| [c[0], c[1], c[2]];
         let bad = if cells.bad == 0 { Vec::new() } else { device.bad_cells()? };
-        let summary = Summary {
+        Ok(Summary {
             counts: Counts {
                 cells: device.input().tets,
                 bad: cells.bad,
@@ -75,7 +70,7 @@ impl Engine for Device {
                 flat: cells.zero_volume,
             },
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
-            bounds: Bounds { lo: corner(tree.grid().lo), hi: corner(tree.grid().hi) },
+            bounds: tree.grid().into(),
             level: built.level,
             wanted: options.level.unwrap_or(built.heuristic_level),
             entries: u64::from(built.entries),
@@ -83,11 +78,11 @@ impl Engine for Device {
             leaves: u64::from(built.leaves),
             memory: tree.sizes(),
             paper_bytes: tree.sizes().paper(),
-            topology_ms: device.time().stages.iter().map(|s| s.milliseconds).sum(),
-            build_ms: tree.stages().iter().map(|s| s.milliseconds).sum(),
-            stages: device.time().stages.iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
-        };
-        Ok(Box::new(Measured(summary)))
+            neighbour_bytes: device.neighbour_bytes(),
+            topology_ms: StageTime::sum(device.stages()),
+            build_ms: StageTime::sum(tree.stages()),
+            stages: device.stages().iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
+        })
     }
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
@@ -102,18 +97,14 @@ impl Engine for Device {
         blocks::locate_all(&self.0, self.memory(memory), asked, report)
     }
 
-    fn overlap(&self, asked: &Question<'_>, memory: Option<u64>, report: Report<'_>) -> Result<Overlapped> {
-        let start = Instant::now();
-        let found = blocks::overlap(&self.0, self.memory(memory), asked.meshes, &asked.options, asked.pairs, report)?;
-        let seconds = start.elapsed().as_secs_f64() - found.build_seconds;
-        Ok(Overlapped { overlap: found.answer.overlap, build_seconds: found.build_seconds, seconds, trees: found.trees })
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
+        let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.apart();
+        Ok(took.with(found.overlap))
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
         let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.apart();
-        let [width, height] = plan.size;
-        let rows = drawn.colors.chunks(width.max(1) as usize).zip(0..height);
-        let pixels = rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| plan.background.pixel(color, y, height))).collect();
+        let pixels = plan.pixels(&drawn.colors);
         let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
         let picture = Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms };
         Ok(took.with(Drawn { picture, range, step: plan.step }))
@@ -121,11 +112,5 @@ impl Engine for Device {
 
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
         Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.apart().1)
-    }
-}
-
-impl Built for Measured {
-    fn summary(&self) -> &Summary {
-        &self.0
     }
 }
