@@ -117,7 +117,8 @@ fn frames(binding: Binding) {
     other.points.iter_mut().for_each(|p| *p = p.map(|x| x - 1.3));
     let frame = Frame::new(&gpu, &mesh);
     let queries = Queries::new(&gpu, &frame, &values, &other, ROOM as u64);
-    let (other_topology, other_tree) = (topology(&other).unwrap(), queries.other_tree.download().unwrap());
+    let other_topology = topology(&other).unwrap();
+    let other_tree = build(&other, &other_topology, queries.other_tree.options()).unwrap();
     let (mut listed, mut touched, mut met, mut cut, mut drawn) = (0, 0, 0, 0, [0; 2]);
     for i in 0..6 {
         let shown = moved(&mesh, i);

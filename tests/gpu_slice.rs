@@ -6,6 +6,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::slice;
+use olbvh::reference::build::build;
 use olbvh::reference::slice::Slicer;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, VoxelGrid};
 
@@ -18,8 +19,9 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh, trees: &[(f32, Assign)], settings: 
     ];
     let mut touched = 0;
     for &(alpha, assign) in trees {
-        let tree = Tree::build(gpu, &device, &BuildOptions { alpha, assign, ..BuildOptions::default() }).unwrap();
-        let host = tree.download().unwrap();
+        let options = BuildOptions { alpha, assign, ..BuildOptions::default() };
+        let tree = Tree::build(gpu, &device, &options).unwrap();
+        let host = build(mesh, &topology, &options).unwrap();
         let three = |v: [f32; 4]| [v[0], v[1], v[2]];
         let (lo, hi) = (three(host.grid.lo), three(host.grid.hi));
         for (i, settings) in settings.iter().enumerate() {

@@ -253,7 +253,8 @@ impl SortedScratch {
             )));
         }
         let runs = capacity.entries.div_ceil(gpu.target().run.rows);
-        let table = runs * (capacity.level + 1);
+        let table = u32::try_from(u64::from(runs) * u64::from(capacity.level + 1))
+            .map_err(|_| Error::TooLarge(format!("{runs} runs of entries on {} levels; 32 bits number less", capacity.level + 1)))?;
         Ok(Self {
             codes: arena.words(u64::from(capacity.entries))?,
             sort: SortScratch::carve(gpu, arena, capacity.entries, 3 * capacity.level)?,

@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh};
-use crate::query::{LocateOptions, Party, locate, overlap, render, slice};
+use crate::query::{LocateOptions, Party, Path, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Prepared, RenderSettings, TransferFunction};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -149,7 +149,8 @@ pub extern "C" fn olbvh_locate(
         let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
         let points = array(points.cast::<[f32; 3]>(), count, "points")?;
         let owners = array_mut(owners, count, "owners")?;
-        let options = LocateOptions { tolerance: self::tolerance(tolerance), ..LocateOptions::default() };
+        let path = Path::suited(count, mesh.device.input().tets as usize, false);
+        let options = LocateOptions { tolerance: self::tolerance(tolerance), path };
         let found = locate(&mesh.device, tree, points, None, &options, &|_, _| {})?;
         owners.iter_mut().zip(found.owners).for_each(|(to, owner)| *to = mesh.cell(owner));
         if !barycentrics.is_null() {

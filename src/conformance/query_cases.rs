@@ -15,6 +15,8 @@ use crate::options::{Assign, Lists};
 const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
 /// Meshes so small that voxels have denormal centres, which devices may flush to 0.
 const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
+/// Meshes in which there is nothing to slice.
+const WITHOUT_EXTENT: [&str; 4] = ["no-points", "no-cells", "one-place", "only-bad-cells"];
 /// A mesh whose overlap keeps the reference busy for minutes.
 const LARGE: &str = "jitter-24x24x24";
 /// Ranges of a field: mesh, α, assignment, lists, where the values are.
@@ -125,7 +127,7 @@ fn values(on: On) -> &'static str {
 }
 
 fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    if NEAR_DENORMAL.contains(&mesh.name) {
+    if NEAR_DENORMAL.contains(&mesh.name) || WITHOUT_EXTENT.contains(&mesh.name) {
         return;
     }
     for (i, stack) in STACKS.into_iter().enumerate() {

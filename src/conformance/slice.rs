@@ -4,6 +4,7 @@ use super::failure::{Stop, Verdict, compare_one, fail};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
+use crate::error::Error;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
@@ -65,9 +66,14 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
     let (mesh, host) = (&twin.mesh, built.tree());
     let Bounds { lo, hi } = (&host.grid).into();
     let settings = SliceSettings { plane, layers, size, ..SliceSettings::default() };
-    // A mesh without extent, or as large as numbers go, has no slices.
-    let voxels = settings.voxels(lo, hi, mesh.origin);
-    let Some(voxels) = voxels.ok().filter(|v| v.plan(&host.grid).is_ok()) else { return Ok(()) };
+    let Ok(voxels) = settings.voxels(lo, hi, mesh.origin) else {
+        return compare_one("query.slice", "extent, if there is nothing to slice", &lo, &hi);
+    };
+    if voxels.plan(&host.grid).is_err() {
+        // As large as numbers go: the device must refuse them too.
+        let refused = slice(device, &tree, None, &voxels, extrapolate, &|_, _| {}, &mut |_| Ok(()));
+        return compare_one("query.slice", "refusal", &true, &matches!(refused, Err(Error::Invalid(_))));
+    }
     let field = case.stack.field.map(|on| field(mesh, on));
     let slicer = Slicer::new(mesh, &twin.topology, host, field.as_ref(), voxels, extrapolate)?;
     let mut verdict = Ok(());

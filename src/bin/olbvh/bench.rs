@@ -130,6 +130,7 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
             plots.chain(tables).map(|(name, content)| (path.join(name), content)).collect()
         }
     };
+    files.iter().for_each(|(path, _)| output::begin(path));
     files.iter().try_for_each(|(path, content)| output::write_text(path, content))
 }
 

@@ -72,8 +72,13 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     if !folder(path).is_dir() {
         return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(path).display())));
     }
-    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
+    begin(path);
     Ok(())
+}
+
+/// Notes a file of a result that is of several, before it is written.
+pub fn begin(path: &Path) {
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
 }
 
 /// Writes a file of text, complete or not at all.

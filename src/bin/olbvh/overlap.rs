@@ -96,7 +96,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
     let json = json!({
         "file": args.output.display().to_string(), "a": ids_a.len(), "b": ids_b.len(), "pairs": pairs.as_ref().map(Vec::len),
-        "narrow_tests": narrow, "narrow_share": share, "seconds": seconds, "build_seconds": took.build_seconds, "trees": took.trees, "peak_bytes": took.peak,
+        "narrow_tests": narrow, "narrow_share": share, "seconds": seconds, "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak,
         "a_effort": effort(&overlap.effort[0]), "b_effort": effort(&overlap.effort[1]), "device": engine.name(),
     });
     let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));

@@ -1,5 +1,6 @@
 //! Where the layers of `olbvh slice` go: arrays, an image for `ParaView`, pictures, a package of voxels.
 
+use super::output;
 use olbvh::error::{Error, Result};
 use olbvh::formats::{Channel, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, write_png};
 use olbvh::mesh::{Field, Mesh, On};
@@ -135,6 +136,7 @@ impl<'a> Layers<'a> {
                 };
                 let (w, h) = (w as usize, h as usize);
                 let pixels: Vec<u8> = (0..h).rev().flat_map(|y| (0..w).flat_map(move |x| pixel(y * w + x))).collect();
+                output::begin(&path);
                 write_png(path, w as u32, h as u32, &pixels)?;
             }
             Target::Package(writer) => {
