@@ -5,6 +5,24 @@
 use std::fs;
 use std::path::{Path, PathBuf};
 
+/// What benchmarks and cases ask: all that computes.
+const MEASURED: &[&str] = &[
+    "baseline",
+    "build",
+    "error",
+    "gpu",
+    "kernels",
+    "layout",
+    "mesh",
+    "options",
+    "primitives",
+    "query",
+    "reference",
+    "render",
+    "slicing",
+    "tree",
+];
+
 /// What each module may use, itself aside (DESIGN §3: dependencies point one way). `error` and `lib.rs` are everybody's.
 const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
@@ -26,48 +44,12 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("query", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing", "tree"]),
     ("blocks", &["build", "error", "gpu", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "tree"]),
-    (
-        "bench",
-        &[
-            "baseline",
-            "build",
-            "error",
-            "gpu",
-            "kernels",
-            "layout",
-            "mesh",
-            "options",
-            "primitives",
-            "query",
-            "reference",
-            "render",
-            "slicing",
-            "tree",
-        ],
-    ),
+    ("bench", MEASURED),
     (
         "tune",
         &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "tree"],
     ),
-    (
-        "conformance",
-        &[
-            "baseline",
-            "build",
-            "error",
-            "gpu",
-            "kernels",
-            "layout",
-            "mesh",
-            "options",
-            "primitives",
-            "query",
-            "reference",
-            "render",
-            "slicing",
-            "tree",
-        ],
-    ),
+    ("conformance", MEASURED),
 ];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {

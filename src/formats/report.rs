@@ -66,6 +66,20 @@ pub struct Report {
     pub warnings: Vec<String>,
 }
 
+/// What became of them, in words.
+impl fmt::Display for CellCount {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self.fate {
+            Fate::Kept => write!(f, "taken as they are"),
+            Fate::Straightened => write!(f, "taken by their corners, with straight edges"),
+            Fate::Split => write!(f, "split into {} tetrahedra that keep the id of their cell", self.tetrahedra),
+            Fate::Boundary => write!(f, "left out, no volume"),
+            Fate::Ghost => write!(f, "left out, ghost copies"),
+            Fate::Unsupported => write!(f, "NOT READ, so the mesh has holes there; tetrahedralise them first"),
+        }
+    }
+}
+
 impl Report {
     /// Number of cells with that fate.
     pub fn count(&self, fate: Fate) -> u64 {
@@ -82,15 +96,7 @@ impl fmt::Display for Report {
         }
         writeln!(f, ", {} tetrahedra", self.tetrahedra)?;
         for c in &self.cells {
-            write!(f, "  {} {}: ", c.count, c.name)?;
-            match c.fate {
-                Fate::Kept => writeln!(f, "taken as they are")?,
-                Fate::Straightened => writeln!(f, "taken by their corners, with straight edges")?,
-                Fate::Split => writeln!(f, "split into {} tetrahedra that keep the id of their cell", c.tetrahedra)?,
-                Fate::Boundary => writeln!(f, "left out (no volume)")?,
-                Fate::Ghost => writeln!(f, "left out (ghost copies)")?,
-                Fate::Unsupported => writeln!(f, "NOT READ, so the mesh has holes there; tetrahedralise them first")?,
-            }
+            writeln!(f, "  {} {}: {c}", c.count, c.name)?;
         }
         if self.negative > 0 {
             writeln!(f, "  {} tetrahedra are numbered the other way round (harmless)", self.negative)?;

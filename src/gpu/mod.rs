@@ -25,7 +25,7 @@ pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
 pub use requirements::{DeviceReport, RayTracing, Requirements};
-pub use submit::{Readback, StageTime};
+pub use submit::{StageTime, StageTimes};
 
 use crate::error::Error;
 use ash::vk;

@@ -32,14 +32,14 @@ impl StageTime {
     }
 }
 
-/// What a submission brings back.
+/// How long the stages of a submission took.
 #[derive(Clone, Debug, Default)]
-pub struct Readback {
+pub struct StageTimes {
     /// Stages in the order in which they ended; empty where the queue has no timestamps.
     pub stages: Vec<StageTime>,
 }
 
-impl Readback {
+impl StageTimes {
     /// Milliseconds of all stages of that name.
     pub fn milliseconds(&self, name: &str) -> f64 {
         StageTime::sum(self.stages.iter().filter(|s| s.name == name))
@@ -71,7 +71,7 @@ impl Gpu {
     ///
     /// # Errors
     /// Those of `record`, a missing barrier, or a failed Vulkan call.
-    pub fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, Readback)> {
+    pub fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
         let device = self.device();
         let timed = self.timestamp_bits() > 0;
         let mut submission =
@@ -109,7 +109,7 @@ impl Gpu {
             }
             device.wait_for_fences(&[submission.fence], true, u64::MAX).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
             let stages = if timed { self.read_timestamps(submission.queries, &recorder.stages)? } else { Vec::new() };
-            Ok((value, Readback { stages }))
+            Ok((value, StageTimes { stages }))
         }
     }
 

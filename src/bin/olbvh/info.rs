@@ -102,16 +102,8 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
     page.row("points", grouped(mesh.points.len() as u64));
     page.row("tetrahedra", grouped(mesh.tets.len() as u64));
-    for cells in &report.cells {
-        let fate = match cells.fate {
-            Fate::Kept => continue,
-            Fate::Straightened => "taken by their corners".into(),
-            Fate::Split => format!("split into {} tetrahedra", grouped(cells.tetrahedra)),
-            Fate::Boundary => "left out, no volume".into(),
-            Fate::Ghost => "left out, ghost copies".into(),
-            Fate::Unsupported => "NOT READ: the mesh has holes there".into(),
-        };
-        page.row(&cells.name, format_args!("{}, {fate}", grouped(cells.count)));
+    for cells in report.cells.iter().filter(|cells| cells.fate != Fate::Kept) {
+        page.row(&cells.name, format_args!("{}, {cells}", grouped(cells.count)));
     }
     let counts = &s.counts;
     page.row(
