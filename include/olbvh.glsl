@@ -81,7 +81,7 @@ struct olbvh_BuildStatus {
     uint sum[2];           // Sum of the estimates of Eq. 11, low word first.
     uint total[22];        // Entries of `Aabb` on every level, low word first.
     uint levels[11];       // NO: nodes on levels 0 to k.
-    uint overflow;         // Not 0: a capacity was exceeded; never happens with a planned one.
+    uint overflow;         // Not 0: a capacity was exceeded, which a planned one never is, or a budget is below the root alone.
 };
 
 // What is seen and how, besides mesh, tree and field; see src/render.
