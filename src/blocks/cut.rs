@@ -17,6 +17,7 @@ use crate::reference::vertices::{CellRange, Vertices};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::rc::Rc;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// A mesh to be cut.
 pub(super) struct Source<'a> {
@@ -34,11 +35,16 @@ struct Marks(Vec<u32>);
 
 impl Marks {
     fn of(mesh: &Mesh, tets: &[u32]) -> Self {
-        let mut words = vec![0u32; mesh.points.len().div_ceil(32)];
-        for v in tets.iter().flat_map(|&t| mesh.tets[t as usize]) {
-            words[v as usize / 32] |= 1 << (v % 32);
-        }
-        Self(words)
+        let words: Vec<AtomicU32> = (0..mesh.points.len().div_ceil(32)).map(|_| AtomicU32::new(0)).collect();
+        let mark = |v: u32| {
+            let (word, bit) = (&words[v as usize / 32], 1 << (v % 32));
+            // Most are marked already.
+            if word.load(Relaxed) & bit == 0 {
+                word.fetch_or(bit, Relaxed);
+            }
+        };
+        tets.par_iter().for_each(|&t| mesh.tets[t as usize].into_iter().for_each(mark));
+        Self(words.into_iter().map(AtomicU32::into_inner).collect())
     }
 
     fn holds(&self, v: u32) -> bool {
@@ -92,18 +98,9 @@ impl<'a> Source<'a> {
         // Whoever shares a face has three of its corners; the core has four.
         let beside = |t: &u32| self.mesh.tets[*t as usize].into_iter().filter(|&v| marks.holds(v)).count() >= 3;
         let tets: Vec<u32> = among.par_iter().copied().filter(beside).collect();
-        let union = |a: CellRange, b: CellRange| CellRange {
-            lo: [0, 1, 2].map(|c| a.lo[c].min(b.lo[c])),
-            hi: [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])),
-        };
-        let span = core.par_iter().filter_map(|&t| cells.common(&self.cells_of(t))).reduce_with(union);
-        let reach = tets.par_iter().map(|&t| self.cells_of(t)).reduce_with(union);
-        let count = |t: &u32| {
-            let own = self.cells_of(*t);
-            let crosses = cells.common(&own) != Some(own);
-            [u64::from(own.count()), if crosses { u64::from(own.count()) } else { 0 }]
-        };
-        let [candidates, crossing] = tets.par_iter().map(count).reduce(|| [0; 2], |a, b| [a[0] + b[0], a[1] + b[1]]);
+        let extent =
+            tets.par_iter().fold(Extent::default, |sum, &t| sum.with(cells, self.cells_of(t))).reduce(Extent::default, Extent::and);
+        let Extent { span, reach, candidates, crossing } = extent;
         let size = Size {
             points: marks.count() + (tets.len() - core.len()) as u32,
             tets: tets.len(),
@@ -131,10 +128,15 @@ impl<'a> Source<'a> {
         let span = block.span?;
         let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
         let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;
-        let mut numbers = vec![0usize; span.size()[axis] as usize];
-        for cells in block.tets.iter().filter_map(|&t| span.common(&self.cells_of(t))) {
-            numbers[(cells.lo[axis].midpoint(cells.hi[axis]) - span.lo[axis]) as usize] += 1;
-        }
+        let none = || vec![0usize; span.size()[axis] as usize];
+        let count = |mut numbers: Vec<usize>, &t: &u32| {
+            if let Some(cells) = span.common(&self.cells_of(t)) {
+                numbers[(cells.lo[axis].midpoint(cells.hi[axis]) - span.lo[axis]) as usize] += 1;
+            }
+            numbers
+        };
+        let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
+        let numbers = block.tets.par_iter().fold(none, count).reduce(none, add);
         let half = numbers.iter().sum::<usize>() / 2;
         let mut sum = 0;
         let below = numbers.iter().take_while(|n| {
@@ -166,6 +168,42 @@ pub(super) struct Block {
 /// One in so many entries of a tree with all lists is taken to be left with lists where the surface is; Jets has one in 11 at α = 0, smaller meshes have
 /// more.
 const SURFACE: u64 = 4;
+
+/// Where the tetrahedra of a block are.
+#[derive(Clone, Copy, Default)]
+struct Extent {
+    /// The cells of the block that they meet.
+    span: Option<CellRange>,
+    /// All cells that they meet.
+    reach: Option<CellRange>,
+    /// How many those are, taken one by one.
+    candidates: u64,
+    /// The same for tetrahedra that leave the block.
+    crossing: u64,
+}
+
+impl Extent {
+    /// With a tetrahedron of these cells.
+    fn with(self, block: CellRange, own: CellRange) -> Self {
+        let (span, candidates) = (block.common(&own), u64::from(own.count()));
+        let crossing = if span == Some(own) { 0 } else { candidates };
+        self.and(Self { span, reach: Some(own), candidates, crossing })
+    }
+
+    fn and(self, other: Self) -> Self {
+        let union = |a: CellRange, b: CellRange| CellRange {
+            lo: [0, 1, 2].map(|c| a.lo[c].min(b.lo[c])),
+            hi: [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])),
+        };
+        let either = |a: Option<CellRange>, b| a.zip(b).map(|(a, b)| union(a, b)).or(a).or(b);
+        Self {
+            span: either(self.span, other.span),
+            reach: either(self.reach, other.reach),
+            candidates: self.candidates + other.candidates,
+            crossing: self.crossing + other.crossing,
+        }
+    }
+}
 
 /// What the memory of a mesh and its tree depends on.
 #[derive(Clone, Copy, Default)]
