@@ -1,11 +1,15 @@
 //! Reduce, scan and sort in elements per second of device time, verified before they are timed. `cargo bench --bench primitives`.
 
+#[path = "../tests/submit/mod.rs"]
+mod submit;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use olbvh::gpu::{Buffer, Gpu, GpuOptions, Recorder};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
 use std::time::Duration;
+use submit::submit;
 
 const SIZES: [u32; 2] = [1 << 16, 1 << 22];
 const SORT_BITS: u32 = 21;
@@ -17,7 +21,7 @@ fn keys(n: u32) -> Vec<u32> {
 /// Device time of `iterations` runs; `before` each, its input is made anew.
 fn timed(gpu: &Gpu, iterations: u64, mut record: impl FnMut(&mut Recorder<'_>) -> olbvh::Result<()>) -> Duration {
     let once = |_| {
-        let ((), time) = gpu.run("olbvh.bench", |r| r.stage("bench", &mut record)).expect("the device runs");
+        let ((), time) = submit(gpu, "olbvh.bench", |r| r.stage("bench", &mut record)).expect("the device runs");
         Duration::from_secs_f64(time.milliseconds("bench") * 1e-3)
     };
     (0..iterations).map(once).sum()
@@ -82,7 +86,7 @@ fn sort(c: &mut Criterion) {
                     r.barrier("copy → sort");
                     r.stage("sort", |r| cmd_sort_pairs(r, sorted.all(), sorted_ids.all(), SORT_BITS, Count::host(n), &scratch))
                 };
-                let ((), time) = gpu.run("olbvh.bench", record).expect("the device runs");
+                let ((), time) = submit(&gpu, "olbvh.bench", record).expect("the device runs");
                 Duration::from_secs_f64(time.milliseconds("sort") * 1e-3)
             };
             (0..iterations).map(once).sum()

@@ -1,6 +1,9 @@
 //! Point location and volume rendering in points and samples per second of device time, verified before they are timed.
 //! `cargo bench --bench query`.
 
+#[path = "../tests/submit/mod.rs"]
+mod submit;
+
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -11,6 +14,7 @@ use olbvh::query::{self, LocateOptions, LocateOutput, Path, PointInput, Scene};
 use olbvh::reference::boundary::topology;
 use olbvh::render::{Bounds, Prepared, RenderSettings};
 use std::time::Duration;
+use submit::submit;
 
 const POINTS: u32 = 1 << 17;
 const CELLS: u32 = 32;
@@ -39,12 +43,13 @@ fn location(c: &mut Criterion) {
     let mut expected: Option<Vec<u32>> = None;
     for assign in Assign::EVERY {
         let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).expect("a tree");
-        let scene = Scene::new(&on_device, &tree);
+        let scene = Scene::new(&on_device, &tree).expect("its mesh");
         for (name, path) in [("descent", Path::Descent), ("traversal", Path::Traversal(8))] {
             let options = LocateOptions { path, ..LocateOptions::default() };
             let run = |iterations: u64| -> Duration {
                 let record = |_| {
-                    let ((), time) = gpu.run("olbvh.bench", |r| query::cmd_locate(r, &scene, &input, &output, &options)).expect("it runs");
+                    let ((), time) =
+                        submit(&gpu, "olbvh.bench", |r| query::cmd_locate(r, &scene, &input, &output, &options)).expect("it runs");
                     Duration::from_secs_f64(time.milliseconds("query.locate") * 1e-3)
                 };
                 (0..iterations).map(record).sum()

@@ -1,6 +1,8 @@
 //! A budget in bytes: trees within it, as deep as it allows, equal to the reference's, and refused with figures where not even the root fits.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod submit;
+
 use olbvh::Error;
 use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
@@ -16,6 +18,7 @@ use olbvh::reference::locate::Locator;
 use olbvh::reference::quarters::taken_apart;
 use olbvh::reference::vertices::Vertices;
 use olbvh::tree::{Memory, TreeArrays};
+use submit::submit;
 
 /// A mesh that fills little of its bounds, so that a level has far fewer nodes than cells.
 fn diagonal() -> Mesh {
@@ -129,7 +132,7 @@ fn memory_of_a_recorded_build() {
             |a: &mut Arena| Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?));
         let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
         let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
-        gpu.run("olbvh.test.build", |r| cmd_build(r, &view, &tree, &options, &scratch)).unwrap();
+        submit(&gpu, "olbvh.test.build", |r| cmd_build(r, &view, &tree, &options, &scratch)).unwrap();
         let status = gpu.download::<BuildStatus>(&memory, tree.status.part(0, size_of::<BuildStatus>() as u64)).unwrap()[0];
         assert!(status.overflow == 0 && status.entries <= capacity.entries && status.nodes <= capacity.nodes);
         levels.push(status.level);
@@ -220,7 +223,7 @@ fn every_capacity() {
             let scratch = gpu
                 .buffer("olbvh.test.scratch", rooms.iter().map(|&room| Arena::measure(|a| plan(a, room)).unwrap()).max().unwrap())
                 .unwrap();
-            gpu.run("olbvh.test.sweep", |r| {
+            submit(&gpu, "olbvh.test.sweep", |r| {
                 built.iter().zip(rooms).try_for_each(|(Built { tree, owners }, &room)| {
                     cmd_build(r, &view, tree, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
                     let scene = Scene { mesh: view, tree: *tree, longest_leaf: tets };

@@ -2,6 +2,8 @@
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
+mod submit;
+
 use ash::vk;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
@@ -9,6 +11,7 @@ use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::mesh::kuhn_jittered;
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{LocateOptions, locate, locate_all};
+use submit::submit;
 
 /// A host's kernel: five words per point.
 const KERNEL: &str = r#"
@@ -111,7 +114,7 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
         let pipeline = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).unwrap()[0];
         let address = addresses.all().address();
         let push = [address as u32, (address >> 32) as u32, points.len() as u32];
-        gpu.run("olbvh.test.host", |r| {
+        submit(gpu, "olbvh.test.host", |r| {
             let commands = r.commands();
             device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
             device.cmd_bind_descriptor_sets(commands, vk::PipelineBindPoint::COMPUTE, layout, 0, &handles, &[]);

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
+mod submit;
 
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
@@ -19,6 +20,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, locate};
 use std::ffi::c_char;
 use std::sync::{Arc, Barrier, Mutex, OnceLock};
+use submit::submit;
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
@@ -61,7 +63,7 @@ fn without_a_queue_only_recording_works() {
     let host = Host::new();
     // SAFETY: as above.
     let gpu = unsafe { Gpu::from_raw(HostDevice { queue: None, ..host.lend() }, &GpuOptions::default()) }.unwrap();
-    let error = gpu.run("olbvh.test.run", |_| Ok(())).unwrap_err();
+    let error = submit(&gpu, "olbvh.test.run", |_| Ok(())).unwrap_err();
     assert!(error.to_string().contains("lent no queue"), "{error}");
 }
 
@@ -227,7 +229,7 @@ fn nothing_is_made(binding: Binding) {
 
     let before = CALLS.get();
     for _ in 0..3 {
-        gpu.run("olbvh.test.frame", |r| {
+        submit(&gpu, "olbvh.test.frame", |r| {
             // SAFETY: the commands of `r`, which records nothing meanwhile; the pools are kept until `run` has waited for them.
             let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
             ARMED.set(true);
@@ -274,7 +276,7 @@ fn pools_grow_as_they_are_used() {
     let mut pools = DescriptorPools::new(&gpu);
     pools.reserve(DescriptorRoom { sets: 3, buffers: 20 }).unwrap();
     for _ in 0..3 {
-        gpu.run("olbvh.test.frame", |r| {
+        submit(&gpu, "olbvh.test.frame", |r| {
             // SAFETY: as above.
             let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
             frame.record(&mut recorder)?;

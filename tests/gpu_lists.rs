@@ -1,6 +1,8 @@
 //! `Lists::Boundary` on the device: trees and answers are the reference's to the bit, and the answers those of `Lists::All`.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod submit;
+
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
@@ -15,6 +17,7 @@ use olbvh::reference::volume;
 use olbvh::render::RenderSettings;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 use olbvh::tree::TreeArrays;
+use submit::submit;
 
 const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
@@ -95,8 +98,8 @@ impl Subject {
         let barycentrics = gpu.buffer("olbvh.test.barycentrics", 16 * count).unwrap();
         let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()), order: None };
         let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
-        let scene = Scene::new(&self.device, &tree);
-        gpu.run("olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
+        let scene = Scene::new(&self.device, &tree).unwrap();
+        submit(gpu, "olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
         let found: Vec<u32> = gpu.download(&owners, owners.all()).unwrap();
         for (i, owner) in found.into_iter().enumerate() {
             assert_eq!(locator.locate_near(points[i], hints[i]).owner, owner, "hint: {}", what(i));

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod host;
+mod submit;
 
 use bytemuck::Pod;
 use host::Frame;
@@ -25,6 +26,7 @@ use olbvh::reference::overlap::{Side, overlap as reference};
 use olbvh::reference::slice::Slicer;
 use olbvh::render::{Bounds, Plan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
+use submit::submit;
 
 /// Pairs that the frames have room for.
 const ROOM: usize = 1300;
@@ -123,7 +125,7 @@ fn frames(binding: Binding) {
     for i in 0..6 {
         let shown = moved(&mesh, i);
         let staging = gpu.upload("olbvh.test.staging", &shown.points).unwrap();
-        gpu.run("olbvh.test.frame", |r| {
+        submit(&gpu, "olbvh.test.frame", |r| {
             r.copy(staging.all(), frame.input.positions);
             r.barrier("frame.positions → frame.mesh");
             frame.record(r)?;
@@ -199,7 +201,7 @@ fn rounds_go_on_where_they_ended() {
         layers: 1,
     };
     let rows = Rows { layer: 0, first: 0, count: 5 };
-    let searched = Searched::new(&device, &tree);
+    let searched = Searched::new(&device, &tree).unwrap();
     let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
     let carve = |a: &mut Arena| SliceMemory::carve(a, 5, 5);
     let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
@@ -207,11 +209,11 @@ fn rounds_go_on_where_they_ended() {
     // As many voxels, but more side by side.
     let wide = olbvh::slicing::VoxelGrid { size: [25, 1], ..voxels };
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
-    let refused = gpu.run("olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
+    let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
     assert!(refused.is_err_and(|e| e.to_string().contains("1 rows of 25 voxels in memory for 25 voxels, 5 side by side")));
     let (mut rounds, mut submissions) = (Rounds::begin(1), 0);
     let status = loop {
-        gpu.run("olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();
+        submit(&gpu, "olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();
         rounds = Rounds::resume(1);
         submissions += 1;
         let status = gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0];
@@ -226,19 +228,19 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(status.inside + status.touched + status.empty, 25);
     let answers: Vec<u32> = gpu.download(&buffer, memory.answers.part(0, 100)).unwrap();
     // All rounds in one recording.
-    gpu.run("olbvh.test.rounds", |r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(40))).unwrap();
+    submit(&gpu, "olbvh.test.rounds", |r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(40))).unwrap();
     assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
     assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
 
     let lbvh = Lbvh::build(&gpu, &device).unwrap();
     picture_goes_on(&gpu, &searched, &mesh.points, false);
     let surface = picture_goes_on(&gpu, &searched, &mesh.points, true);
-    assert!(surface == picture_goes_on(&gpu, &Searched::new(&device, &lbvh), &mesh.points, true), "a surface by either structure");
+    assert!(surface == picture_goes_on(&gpu, &Searched::new(&device, &lbvh).unwrap(), &mesh.points, true), "a surface by either structure");
 
-    let scene = Scene::new(&device, &tree);
+    let scene = Scene::new(&device, &tree).unwrap();
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
-    let few_scene = Scene::new(&few, &few_tree);
+    let few_scene = Scene::new(&few, &few_tree).unwrap();
     let expected = overlap(Party { mesh: &few, tree: &few_tree }, Party { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
@@ -246,18 +248,18 @@ fn rounds_go_on_where_they_ended() {
     let (memory, found) = carve(&mut Arena::new(buffer.all())).unwrap();
     let status = || gpu.download::<OverlapStatus>(&buffer, memory.status).unwrap()[0];
     // Too few rounds to count: nothing is written, and it says so.
-    gpu.run("olbvh.test.rounds", |r| {
+    submit(&gpu, "olbvh.test.rounds", |r| {
         cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::begin(1))?;
         cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))
     })
     .unwrap();
     assert!(status().unfinished > 0 && status().unfilled > 0);
     while status().unfinished > 0 {
-        gpu.run("olbvh.test.rounds", |r| cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::resume(2))).unwrap();
+        submit(&gpu, "olbvh.test.rounds", |r| cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::resume(2))).unwrap();
     }
-    gpu.run("olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))).unwrap();
+    submit(&gpu, "olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))).unwrap();
     while status().unfilled > 0 {
-        gpu.run("olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::resume(2))).unwrap();
+        submit(&gpu, "olbvh.test.rounds", |r| cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::resume(2))).unwrap();
     }
     assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
 }
@@ -277,7 +279,7 @@ fn picture_goes_on(gpu: &Gpu, searched: &Searched, points: &[[f32; 3]], iso: boo
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
     let draw = |rounds: Rounds| {
-        gpu.run("olbvh.test.round", |r| cmd_render(r, searched, &input, &memory, rounds)).unwrap();
+        submit(gpu, "olbvh.test.round", |r| cmd_render(r, searched, &input, &memory, rounds)).unwrap();
         let colors: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 12 * 16)).unwrap();
         (colors, RenderStatus { pad: 0, ..gpu.download::<RenderStatus>(&buffer, memory.status).unwrap()[0] })
     };
@@ -300,7 +302,8 @@ fn picture_goes_on(gpu: &Gpu, searched: &Searched, points: &[[f32; 3]], iso: boo
     if rounds > 1 {
         assert!(draw(Rounds::begin(rounds - 1)).1.unfinished > 0, "a round less");
     }
-    let more = gpu.run("olbvh.test.round", |r| cmd_render(r, searched, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
+    let more =
+        submit(gpu, "olbvh.test.round", |r| cmd_render(r, searched, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
     assert!(more.unwrap_err().to_string().contains("4×4 pixels"));
     colors
 }
@@ -316,7 +319,7 @@ fn what_cannot_be_asked_is_told() {
         queries.voxels.half[0] = half;
         let plan = queries.voxels.over(DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap().grid());
         assert_eq!(plan.refused, refused);
-        gpu.run("olbvh.test.frame", |r| {
+        submit(&gpu, "olbvh.test.frame", |r| {
             frame.record(r)?;
             queries.record(r)
         })
@@ -327,7 +330,7 @@ fn what_cannot_be_asked_is_told() {
     }
     let nothing = Mesh::new(mesh.points.clone(), vec![[0; 4]; mesh.tets.len()]);
     let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &nothing, 100);
-    gpu.run("olbvh.test.frame", |r| {
+    submit(&gpu, "olbvh.test.frame", |r| {
         frame.record(r)?;
         queries.record(r)
     })

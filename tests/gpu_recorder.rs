@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
+mod submit;
 
 use ash::vk;
 use host::Frame;
@@ -24,6 +25,7 @@ use olbvh::query::{
     LocateOptions, LocateOutput, Path, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible,
     visible_bytes,
 };
+use submit::submit;
 
 /// Copies each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
@@ -35,16 +37,15 @@ fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
 
 /// Records `work` once as it is, then once without each of its barriers: the first must pass, the others must be refused.
 fn every_barrier_counts(gpu: &Gpu, what: &str, work: impl Fn(&mut Recorder<'_>) -> olbvh::Result<()>) -> usize {
-    let labels = gpu
-        .run("olbvh.test.whole", |r| {
-            work(r)?;
-            Ok(r.barriers().to_vec())
-        })
-        .unwrap_or_else(|e| panic!("{what}: {e}"))
-        .0;
+    let labels = submit(gpu, "olbvh.test.whole", |r| {
+        work(r)?;
+        Ok(r.barriers().to_vec())
+    })
+    .unwrap_or_else(|e| panic!("{what}: {e}"))
+    .0;
     let mut wrong = Vec::new();
     for (n, label) in labels.iter().enumerate() {
-        let result = gpu.run("olbvh.test.dropped", |r| {
+        let result = submit(gpu, "olbvh.test.dropped", |r| {
             r.drop_barrier(Some(n as u32));
             work(r)
         });
@@ -107,7 +108,7 @@ fn queries() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let sink = gpu.buffer("olbvh.test.sink", 4096).unwrap();
     let frame = Frame::new(&gpu, &mesh);
-    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    submit(&gpu, "olbvh.test.frame", |r| frame.record(r)).unwrap();
     let queries = Queries::new(&gpu, &frame, &vec![0.0; mesh.points.len()], &mesh, 100);
     let barriers = every_barrier_counts(&gpu, "slice, picture, sets, pairs", |r| {
         queries.record(r)?;
@@ -141,7 +142,7 @@ fn location() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let mesh = kuhn_jittered([4, 3, 5], 0.3, 1).unwrap();
     let frame = Frame::new(&gpu, &mesh);
-    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    submit(&gpu, "olbvh.test.frame", |r| frame.record(r)).unwrap();
     let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: 40_000 };
     let field = gpu.upload("olbvh.test.field", &mesh.fields[0].values).unwrap();
     let (values, sink) = (gpu.buffer("olbvh.test.values", 4 * u64::from(frame.points.count)), gpu.buffer("olbvh.test.sink", 64));
@@ -161,7 +162,7 @@ fn location() {
         Ok(())
     });
     assert!(barriers >= 4 + 5, "{barriers}");
-    let unordered = gpu.run("olbvh.test.unordered", |r| {
+    let unordered = submit(&gpu, "olbvh.test.unordered", |r| {
         cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })
     });
     assert!(matches!(unordered, Err(Error::Invalid(_))));
@@ -202,7 +203,7 @@ fn addresses_of_a_host() {
         return;
     }
     let frame = Frame::new(&gpu, &kuhn_jittered([3; 3], 0.3, 1).unwrap());
-    gpu.run("olbvh.test.frame", |r| frame.record(r)).unwrap();
+    submit(&gpu, "olbvh.test.frame", |r| frame.record(r)).unwrap();
     let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
     let refused = |address: u64| {
         let all = frame.output.barycentrics;
@@ -211,7 +212,7 @@ fn addresses_of_a_host() {
         let output = LocateOutput { barycentrics, owners: frame.output.owners };
         let record = |r: &mut Recorder<'_>| cmd_locate(r, &scene, &frame.points, &output, &LocateOptions::default());
         record(&mut Recorder::rehearse(&gpu)).unwrap();
-        gpu.run("olbvh.test.address", record).unwrap_err().to_string()
+        submit(&gpu, "olbvh.test.address", record).unwrap_err().to_string()
     };
     let (none, odd) = (refused(0), refused(frame.output.barycentrics.address() + 8));
     assert!(none.contains("olbvh.query.locate is given `barycentrics`, which has no device address"), "{none}");

@@ -184,7 +184,7 @@ fn buffers_submissions_and_stages_are_named() {
                 wrong.push(format!("{}: stage `{name}`", file.display()));
             }
         }
-        for name in literals(text, "gpu.run(") {
+        for name in literals(text, "gpu.submit(") {
             n += 1;
             if !name.starts_with("olbvh.") {
                 wrong.push(format!("{}: submission `{name}`", file.display()));

@@ -6,7 +6,7 @@ use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
-use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Structure};
+use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Searched, Structure};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
 const CODE_BITS: u32 = 31;
@@ -17,6 +17,7 @@ const BUDGET: u32 = 16_384;
 #[derive(Debug)]
 pub struct Lbvh {
     pub(super) gpu: Gpu,
+    pub(super) mesh: MeshView,
     pub(super) tree: BinaryTree,
     pub(super) valid: u32,
     stages: Vec<StageTime>,
@@ -149,6 +150,7 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh) -> Result<Self> {
+        mesh.check_device(gpu)?;
         let view = mesh.view();
         let tets = view.input.tets;
         let carve = |a: &mut Arena| BinaryTree::carve(a, tets);
@@ -157,8 +159,8 @@ impl Lbvh {
         let carve = |a: &mut Arena| LbvhScratch::carve(gpu, a, tets);
         let buffer = gpu.buffer("olbvh.lbvh.scratch", Arena::measure(carve)?)?;
         let scratch = carve(&mut Arena::new(buffer.all()))?;
-        let ((), time) = gpu.run("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
-        Ok(Self { gpu: gpu.clone(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
+        let ((), time) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
+        Ok(Self { gpu: gpu.clone(), mesh: view, tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per primitive.
@@ -190,6 +192,7 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
+        mesh.check(&self.mesh)?;
         let gpu = &self.gpu;
         let n = points.len() as u64;
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
@@ -201,7 +204,7 @@ impl Lbvh {
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {
             let record = |r: &mut Recorder<'_>| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);
-            located.stages.extend(gpu.run("olbvh.lbvh.locate", record)?.1.stages);
+            located.stages.extend(gpu.submit("olbvh.lbvh.locate", record)?.1.stages);
             rounds = Rounds::resume(1);
             if gpu.download::<u32>(&memory, unfinished.part(0, 4))?.first() == Some(&0) {
                 break;
@@ -213,8 +216,8 @@ impl Lbvh {
     }
 }
 
-impl From<&Lbvh> for Structure {
+impl From<&Lbvh> for Searched {
     fn from(lbvh: &Lbvh) -> Self {
-        Self::Binary(lbvh.tree)
+        Self { mesh: lbvh.mesh, structure: Structure::Binary(lbvh.tree) }
     }
 }

@@ -60,6 +60,9 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+        mesh.check(&self.mesh)?;
+        other_mesh.check(&other.mesh)?;
+        other_mesh.check_device(mesh.gpu())?;
         let gpu = &self.gpu;
         let mut done = Overlapped::default();
         let valid = [self.valid > 0, other.valid > 0];
@@ -84,7 +87,7 @@ impl Lbvh {
         let ways = [way(mesh, (other_mesh, other), forth)?, way(other_mesh, (mesh, self), back)?];
         let all = u64::from(mesh.input().tets) + u64::from(other_mesh.input().tets);
         let statuses = loop {
-            let ((), time) = gpu.run("olbvh.lbvh.overlap", |r| {
+            let ((), time) = gpu.submit("olbvh.lbvh.overlap", |r| {
                 for way in &ways {
                     if done.submissions == 0 {
                         for part in [way.places, way.hits, way.status] {

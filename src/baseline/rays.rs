@@ -4,7 +4,7 @@
 //! It is **not watertight**: the device's intersections are rounded, so a ray may slip past an edge, or meet a face that is not the first. Every
 //! answer is verified and does hold its point; a point whose ray went wrong is lost. Points on faces get any of their cells.
 
-use crate::build::{DeviceMesh, MeshInput};
+use crate::build::{DeviceMesh, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
@@ -41,6 +41,7 @@ pub struct Rays {
     gpu: Gpu,
     /// None: ray queries.
     pipeline: Option<Box<RayPipeline>>,
+    mesh: MeshView,
     structure: AccelerationStructure,
     faces: u32,
     sides: Buffer,
@@ -55,6 +56,7 @@ impl Rays {
     /// # Errors
     /// [`crate::Error::Memory`], [`crate::Error::TooLarge`] for more faces than the device's structures hold, or a failed Vulkan call.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod) -> Result<Option<Self>> {
+        mesh.check_device(gpu)?;
         if !method.of(gpu) {
             return Ok(None);
         }
@@ -73,7 +75,7 @@ impl Rays {
             let spec = ListFacesSpec { workgroup, fill, ..Default::default() };
             r.stage("rays.faces", |r| r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup))))
         };
-        let ((), time) = gpu.run("olbvh.rays.count", |r| {
+        let ((), time) = gpu.submit("olbvh.rays.count", |r| {
             r.fill(longest, 0);
             r.barrier("clear → rays.faces");
             list(r, 0, gpu.nothing(), gpu.nothing())?;
@@ -83,7 +85,7 @@ impl Rays {
         let faces = gpu.download::<u32>(&counts, total.part(0, 4))?.first().copied().unwrap_or(0);
         let indices = gpu.buffer("olbvh.rays.indices", 12 * u64::from(faces))?;
         let sides = gpu.buffer("olbvh.rays.sides", 8 * u64::from(faces))?;
-        let ((), time) = gpu.run("olbvh.rays.list", |r| list(r, 1, indices.all(), sides.all()))?;
+        let ((), time) = gpu.submit("olbvh.rays.list", |r| list(r, 1, indices.all(), sides.all()))?;
         stages.extend(time.stages);
         let triangles = Triangles { vertices, points, indices: indices.all(), count: faces, scale: SCALE };
         let structure = AccelerationStructure::build(gpu, &triangles)?;
@@ -92,7 +94,7 @@ impl Rays {
             RayMethod::Query => None,
             RayMethod::Pipeline => Some(Box::new(RayPipeline::new::<LocateByPipeline, FaceMissed, FaceHit>(gpu)?)),
         };
-        Ok(Some(Self { gpu: gpu.clone(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
+        Ok(Some(Self { gpu: gpu.clone(), mesh: mesh.view(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
     }
 
     /// The acceleration structure.
@@ -144,6 +146,7 @@ impl Rays {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
+        mesh.check(&self.mesh)?;
         let n = points.len() as u64;
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
@@ -151,7 +154,7 @@ impl Rays {
         let (owners, barycentrics) = carve(&mut Arena::new(memory.all()))?;
         let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
         let output = LocateOutput { owners, barycentrics };
-        let ((), time) = self.gpu.run("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
+        let ((), time) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
         Ok(Located {
             owners: self.gpu.download(&memory, owners.part(0, 4 * n))?,
             barycentrics: self.gpu.download(&memory, barycentrics.part(0, 16 * n))?,

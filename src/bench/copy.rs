@@ -38,7 +38,7 @@ impl CopyRate {
         let to = gpu.buffer("olbvh.bench.copy", 4 * u64::from(WORDS))?;
         let run = |by_kernel: bool| {
             let begin = Instant::now();
-            let ((), time) = gpu.run("olbvh.bench.copy", |r| {
+            let ((), time) = gpu.submit("olbvh.bench.copy", |r| {
                 r.stage("bench.copy", |r| {
                     if by_kernel {
                         return cmd_copy(r, from.all(), to.all());
@@ -51,7 +51,7 @@ impl CopyRate {
             Ok::<_, Error>(Some(time.milliseconds("bench.copy")).filter(|ms| *ms > 0.0).unwrap_or(wall))
         };
         let times = |by_kernel: bool| {
-            gpu.run("olbvh.bench.clear", |r| {
+            gpu.submit("olbvh.bench.clear", |r| {
                 r.fill(to.all(), 0);
                 Ok(())
             })?;

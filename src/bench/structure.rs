@@ -96,7 +96,7 @@ impl Structure {
     }
 
     /// As pictures and slices take it; `None` for rays, which only locate.
-    pub(super) fn searched(&self) -> Option<query::Structure> {
+    pub(super) fn searched(&self) -> Option<query::Searched> {
         match self {
             Self::Octree(tree) => Some(tree.into()),
             Self::Lbvh(lbvh) => Some(lbvh.into()),

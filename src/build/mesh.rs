@@ -18,7 +18,7 @@ pub const MAX_TETS: u32 = (1 << 29) - 2;
 const SUMMING_GROUPS: u32 = 256;
 
 /// A mesh as it lies in device memory, the caller's or ours.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshInput {
     /// 32-bit floats; point i begins at float `i * stride`.
     pub positions: BufferRef,
@@ -33,7 +33,7 @@ pub struct MeshInput {
 }
 
 /// What stage 0 makes of a mesh: parts of one range of memory, kept as long as trees and queries use the mesh.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshArrays {
     /// Counters: [`MeshStatus`].
     pub status: BufferRef,
@@ -222,7 +222,7 @@ impl DeviceMesh {
         let carve = |a: &mut Arena| MeshScratch::carve(a, tets);
         let scratch_memory = gpu.buffer("olbvh.mesh.scratch", Arena::measure(carve)?)?;
         let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
-        let ((), time) = gpu.run("olbvh.mesh", |r| cmd_prepare(r, &input, &arrays, &scratch, given.as_ref().map(Buffer::all)))?;
+        let ((), time) = gpu.submit("olbvh.mesh", |r| cmd_prepare(r, &input, &arrays, &scratch, given.as_ref().map(Buffer::all)))?;
         let one = |v: Vec<MeshStatus>| v.first().copied().unwrap_or_default();
         let status = one(gpu.download(&memory, arrays.status.part(0, size_of::<MeshStatus>() as u64))?);
         let grid = gpu.download::<Grid>(&memory, arrays.grid.part(0, size_of::<Grid>() as u64))?.first().copied().unwrap_or_default();
@@ -289,6 +289,20 @@ impl DeviceMesh {
     /// Both of the following, as what is recorded takes them.
     pub fn view(&self) -> MeshView {
         MeshView { input: self.input, arrays: self.arrays }
+    }
+
+    /// Refuses what was built over another mesh.
+    pub(crate) fn check(&self, built_over: &MeshView) -> Result<()> {
+        if *built_over == self.view() {
+            Ok(())
+        } else {
+            Err(Error::Invalid("a tree that was built over another mesh; build one over this mesh".into()))
+        }
+    }
+
+    /// Refuses another device than the mesh's.
+    pub(crate) fn check_device(&self, gpu: &Gpu) -> Result<()> {
+        if self.gpu.is_same_device(gpu) { Ok(()) } else { Err(Error::Invalid("the mesh lies on another device".into())) }
     }
 
     /// Where points and cells lie.

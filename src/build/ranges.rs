@@ -81,13 +81,14 @@ impl FieldRanges {
     /// # Errors
     /// As [`FieldRanges::new`].
     pub fn update(&mut self, mesh: &DeviceMesh, tree: &Tree, (values, on): (&[f32], On)) -> Result<()> {
+        mesh.check(tree.mesh())?;
         on.check(values, mesh.sizes())?;
         if self.buffer.size() < range_bytes(tree.status().nodes) {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
         }
         let field = self.gpu.upload("olbvh.ranges.field", values)?;
         let ranges = self.memory();
-        self.stages = self.gpu.run("olbvh.ranges", |r| cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges))?.1.stages;
+        self.stages = self.gpu.submit("olbvh.ranges", |r| cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges))?.1.stages;
         Ok(())
     }
 

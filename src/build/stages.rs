@@ -16,7 +16,7 @@ use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::reference::quarters::id_mask;
 
 /// A mesh as the stages see it.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshView {
     /// Points and cells.
     pub input: MeshInput,

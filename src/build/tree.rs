@@ -2,7 +2,7 @@
 
 use super::mesh::DeviceMesh;
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
-use super::stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid, wide};
@@ -18,6 +18,7 @@ use bytemuck::Pod;
 #[derive(Debug)]
 pub struct Tree {
     gpu: Gpu,
+    mesh: MeshView,
     options: BuildOptions,
     memory: TreeMemory,
     status: BuildStatus,
@@ -44,9 +45,10 @@ impl Tree {
     /// candidates, entries and nodes are read back, so that exactly what is needed is allocated.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for α outside 0…10, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
+    /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
     /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
+        mesh.check_device(gpu)?;
         let view = mesh.view();
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
         let mut stages = Vec::new();
@@ -54,7 +56,7 @@ impl Tree {
         // Depth and counts: the level, and the number of candidates.
         let (head, (status, grid)) = reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
         let (counts_buffer, counts) = reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
-        let ((), time) = gpu.run("olbvh.build.counts", |r| {
+        let ((), time) = gpu.submit("olbvh.build.counts", |r| {
             cmd_depth(r, &view, status, grid, options, (u32::MAX, MAX_LEVEL), &counts)?;
             cmd_count(r, &view, grid, options, &counts)
         })?;
@@ -67,7 +69,7 @@ impl Tree {
         // Which candidates are entries.
         let (filter_buffer, filter) = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         if let Some(filter) = &filter {
-            let ((), time) = gpu.run("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
+            let ((), time) = gpu.submit("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
             stages.extend(time.stages);
             capacity.entries = first(gpu, &filter_buffer, filter.entries)?;
         }
@@ -91,7 +93,7 @@ impl Tree {
             boxes: None,
         };
         let entries = entries(&head_memory, &counts, filter.as_ref());
-        let ((), time) = gpu.run("olbvh.build.codes", |r| {
+        let ((), time) = gpu.submit("olbvh.build.codes", |r| {
             cmd_codes(r, &view, &head_memory, &counts, filter.as_ref(), &sorted)?;
             cmd_count_splits(r, &head_memory, entries, &sorted)
         })?;
@@ -119,7 +121,7 @@ impl Tree {
             })
         };
         let (node_buffer, memory) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
-        let ((), time) = gpu.run("olbvh.build.nodes", |r| {
+        let ((), time) = gpu.submit("olbvh.build.nodes", |r| {
             r.copy(status.part(0, size_of::<BuildStatus>() as u64), memory.status);
             r.copy(grid.part(0, size_of::<Grid>() as u64), memory.grid);
             r.barrier("head → splits");
@@ -132,7 +134,7 @@ impl Tree {
         refuse_overflow(&status, options)?;
         let grid: Grid = first(gpu, &node_buffer, memory.grid)?;
         let scratch_bytes = head.size() + counts_buffer.size() + filter_buffer.size() + sorted_buffer.size();
-        Ok(Self { gpu: gpu.clone(), options: *options, memory, status, grid, stages, scratch_bytes, entry_buffer, node_buffer })
+        Ok(Self { gpu: gpu.clone(), mesh: view, options: *options, memory, status, grid, stages, scratch_bytes, entry_buffer, node_buffer })
     }
 
     /// The arrays in host memory.
@@ -166,6 +168,11 @@ impl Tree {
     /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
+    }
+
+    /// The mesh it was built over.
+    pub(crate) fn mesh(&self) -> &MeshView {
+        &self.mesh
     }
 
     /// Where the arrays lie.

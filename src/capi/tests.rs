@@ -126,7 +126,7 @@ fn frames(gpu: *mut OlbvhGpu) {
             ok(status);
             Ok(())
         };
-        device.run("olbvh.test.frame", frame).unwrap();
+        device.submit("olbvh.test.frame", frame).unwrap();
     }
     assert_eq!(CALLS.get(), before, "calls made while recording");
     let (mut ticks, flags) = ([0u64; QUERIES as usize], vk::QueryResultFlags::TYPE_64);

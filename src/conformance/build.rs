@@ -132,7 +132,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let carve = |a: &mut Arena| BuildScratch::carve(gpu, a, view.input.tets, capacity, options);
     let scratch_memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
     let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
-    gpu.run("olbvh.conformance.build", |r| cmd_build(r, &view, &tree, options, &scratch))?;
+    gpu.submit("olbvh.conformance.build", |r| cmd_build(r, &view, &tree, options, &scratch))?;
 
     let content = tree_memory.read(gpu, "build")?;
     let scratch_content = scratch_memory.read(gpu, "build")?;

@@ -203,10 +203,10 @@ fn hints(gpu: &Gpu, mesh: &Mesh, device: &DeviceMesh, tree: &Tree, locator: &Loc
     let hint_buffer = gpu.upload("olbvh.conformance.hints", &hints)?;
     let owners = Guarded::new(gpu, "olbvh.conformance.owners", &[], n)?;
     let barycentrics = Guarded::new(gpu, "olbvh.conformance.barycentrics", &[], 4 * n)?;
-    let scene = Scene::new(device, tree);
+    let scene = Scene::new(device, tree)?;
     let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: Some(hint_buffer.all()), order: None };
     let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
-    gpu.run("olbvh.conformance.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default()))?;
+    gpu.submit("olbvh.conformance.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default()))?;
     let words = barycentrics.read(gpu, "query.locate")?;
     let found: Vec<_> = words.chunks_exact(4).map(|w| [0, 1, 2, 3].map(|i| f32::from_bits(w[i]))).collect();
     compare_locations(&expected, &owners.read(gpu, "query.locate")?, &found, points)

@@ -139,7 +139,7 @@ pub(crate) fn reduce(gpu: &Gpu, case: ReduceCase) -> Verdict {
     let values = Guarded::new(gpu, "olbvh.conformance.values", &data, 0)?;
     let result = Guarded::new(gpu, "olbvh.conformance.result", &[], 1)?;
     let scratch = Guarded::scratch(gpu, "olbvh.conformance.scratch", REDUCE_SCRATCH)?;
-    gpu.run("olbvh.conformance.reduce", |r| cmd_reduce(r, case.operation, values.all(), result.all(), count, scratch.all()))?;
+    gpu.submit("olbvh.conformance.reduce", |r| cmd_reduce(r, case.operation, values.all(), result.all(), count, scratch.all()))?;
     let live = data[..items].iter().copied();
     let expected = match case.operation {
         Reduction::Add => live.fold(0, u32::wrapping_add),
@@ -162,7 +162,7 @@ pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {
     let carve = |a: &mut Arena| ScanScratch::carve(gpu, a, case.n);
     let memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
     let scratch = carve(&mut Arena::new(memory.all()))?;
-    gpu.run("olbvh.conformance.scan", |r| cmd_exclusive_scan(r, values.all(), scanned.all(), total.all(), count, &scratch))?;
+    gpu.submit("olbvh.conformance.scan", |r| cmd_exclusive_scan(r, values.all(), scanned.all(), total.all(), count, &scratch))?;
     let mut sum = 0u32;
     let mut expected = Vec::with_capacity(data.len());
     for v in &data[..items] {
@@ -189,7 +189,7 @@ pub(crate) fn sort(gpu: &Gpu, case: SortCase) -> Verdict {
     let carve = |a: &mut Arena| SortScratch::carve(gpu, a, case.n, case.bits);
     let memory = Guarded::scratch(gpu, "olbvh.conformance.scratch", Arena::measure(carve)?)?;
     let scratch = carve(&mut Arena::new(memory.all()))?;
-    gpu.run("olbvh.conformance.sort", |r| cmd_sort_pairs(r, keys.all(), values.all(), case.bits, count, &scratch))?;
+    gpu.submit("olbvh.conformance.sort", |r| cmd_sort_pairs(r, keys.all(), values.all(), case.bits, count, &scratch))?;
     let mask = u32::MAX.checked_shr(32 - case.bits).unwrap_or(0);
     let mut order = ids;
     order.truncate(items);

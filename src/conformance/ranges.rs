@@ -55,14 +55,14 @@ pub(crate) fn check(gpu: &Gpu, case: &RangesCase, twin: &mut Twin, device: &Devi
         // Whatever the memory held before, and nothing behind it.
         let memory = Guarded::scratch(gpu, "olbvh.conformance.ranges", range_bytes(nodes))?;
         let values = gpu.upload("olbvh.conformance.field", &field.values)?;
-        gpu.run("olbvh.conformance.ranges", |r| cmd_ranges(r, &view, tree.memory(), (values.all(), field.on), memory.all()))?;
+        gpu.submit("olbvh.conformance.ranges", |r| cmd_ranges(r, &view, tree.memory(), (values.all(), field.on), memory.all()))?;
         let found: Vec<[u32; 2]> = memory.read(gpu, "build.ranges")?.chunks_exact(2).map(|r| [r[0], r[1]]).collect();
         compare("build.ranges", "recorded ranges", &bits(&expected), &found)?;
         for drawn in DRAWN {
             let marks = Guarded::scratch(gpu, "olbvh.conformance.marks", visible_bytes(nodes))?;
             let on_device = gpu.upload("olbvh.conformance.drawn", drawn)?;
             let drawn_ranges = (on_device.all(), drawn.len() as u32);
-            gpu.run("olbvh.conformance.visible", |r| cmd_visible(r, tree.memory(), memory.all(), drawn_ranges, marks.all()))?;
+            gpu.submit("olbvh.conformance.visible", |r| cmd_visible(r, tree.memory(), memory.all(), drawn_ranges, marks.all()))?;
             compare("query.visible", "visible", &visible(&expected, drawn), &marks.read(gpu, "query.visible")?)?;
         }
         holds(host, mesh, topology, &field, &expected)?;

@@ -138,7 +138,7 @@ fn build(
     info.dst_acceleration_structure = structure.handle;
     info.scratch_data.device_address = scratch.all().address.next_multiple_of(*scratch_alignment);
     let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
-    let ((), time) = gpu.run("olbvh.acceleration.build", |r| {
+    let ((), time) = gpu.submit("olbvh.acceleration.build", |r| {
         barrier_before(r);
         r.stage(names[1], |r| {
             // SAFETY: structure and scratch memory have the sizes that the device named; inputs are visible through the barrier.
@@ -158,7 +158,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     let info = vk::QueryPoolCreateInfo::default().query_type(kind).query_count(1);
     // SAFETY: plain creation; destroyed below on every path.
     let queries = unsafe { gpu.device().create_query_pool(&info, None) }.map_err(failed("vkCreateQueryPool"))?;
-    let asked = gpu.run("olbvh.acceleration.size", |r| {
+    let asked = gpu.submit("olbvh.acceleration.size", |r| {
         // SAFETY: the structure was built by a submission that has ended, behind a barrier.
         unsafe {
             gpu.device().cmd_reset_query_pool(r.commands, queries, 0, 1);
@@ -178,7 +178,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     read?;
     let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
     let smaller = Structure::new(gpu, "olbvh.acceleration.compacted", ty, bytes[0])?;
-    let ((), time) = gpu.run("olbvh.acceleration.compact", |r| {
+    let ((), time) = gpu.submit("olbvh.acceleration.compact", |r| {
         r.stage("acceleration.compact", |r| {
             let info = vk::CopyAccelerationStructureInfoKHR::default().src(structure.handle).dst(smaller.handle);
             // SAFETY: the copy has the size that the device named.

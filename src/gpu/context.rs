@@ -245,6 +245,11 @@ impl Gpu {
         Ok(Self { inner: self.inner.clone(), target: Arc::new(target), ledger: self.ledger.clone() })
     }
 
+    /// Whether both are handles of one opened device.
+    pub fn is_same_device(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.inner, &other.inner)
+    }
+
     /// The same device, where all buffers made from this handle and its clones take at most `bytes` together, transfers included: the next one is refused
     /// with [`Error::Memory`]. The allocator takes memory from the driver in blocks of 16 MiB, or as large as a larger buffer.
     #[must_use]

@@ -67,11 +67,19 @@ impl Drop for Submission<'_> {
 }
 
 impl Gpu {
-    /// Records work, submits it, and waits until it is done. What [`Recorder::new`] asks of recorded buffers is asked here, too.
+    /// Records work, submits it, and waits until it is done.
+    ///
+    /// # Safety
+    /// Of recorded buffers, what [`Recorder::new`] asks.
     ///
     /// # Errors
     /// Those of `record`, a missing barrier, or a failed Vulkan call.
-    pub fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
+    pub unsafe fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
+        self.submit(label, record)
+    }
+
+    /// The same for work of this crate: its buffers are made for what is recorded, and live where `record` is written.
+    pub(crate) fn submit<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
         let device = self.device();
         let timed = self.timestamp_bits() > 0;
         let mut submission =
@@ -158,7 +166,7 @@ impl Gpu {
             let mapped = staging.mapped_mut().ok_or_else(|| Error::Invalid("upload memory is not mapped".into()))?;
             mapped[..chunk.len()].copy_from_slice(chunk);
             let (from, to) = (staging.all().part(0, chunk.len() as u64), buffer.all().part(at + i as u64 * most, chunk.len() as u64));
-            self.run("olbvh.upload.staging", |r| {
+            self.submit("olbvh.upload.staging", |r| {
                 r.copy(from, to);
                 Ok(())
             })?;
@@ -192,7 +200,7 @@ impl Gpu {
         let staging = Buffer::staging(self, "olbvh.download.staging", most.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
         for (i, chunk) in bytes.chunks_mut(most as usize).enumerate() {
             let (from, to) = (part.part(i as u64 * most, chunk.len() as u64), staging.all());
-            self.run("olbvh.download.staging", |r| {
+            self.submit("olbvh.download.staging", |r| {
                 r.copy(from, to);
                 Ok(())
             })?;

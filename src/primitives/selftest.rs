@@ -32,7 +32,7 @@ pub(crate) fn self_test(gpu: &Gpu) -> Result<()> {
     let scratch = gpu.buffer("olbvh.selftest.scratch", Arena::measure(carve)?)?;
     let (scan, sort) = carve(&mut Arena::new(scratch.all()))?;
     let workgroup = 64u32.next_multiple_of(gpu.subgroup_size());
-    gpu.run("olbvh.selftest", |r| {
+    gpu.submit("olbvh.selftest", |r| {
         let arguments = SelfTest { lanes: lanes.all(), iterations: LONGEST_LOOP };
         r.dispatch(&arguments, SelfTestSpec { workgroup, ..Default::default() }, Groups::Count(1))?;
         cmd_exclusive_scan(r, key_buffer.all(), scanned.all(), total.all(), Count::host(ITEMS), &scan)?;

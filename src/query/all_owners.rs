@@ -118,7 +118,7 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
 /// As [`super::locate`].
 pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: &dyn Fn(u64, u64)) -> Result<Vec<Vec<u32>>> {
     let gpu = tree.gpu();
-    let (scene, options) = (Scene::new(mesh, tree), LocateOptions { tolerance, ..LocateOptions::default() });
+    let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
@@ -127,10 +127,10 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
         let carve = |a: &mut Arena| OwnersMemory::carve(gpu, a, count);
         let buffer = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
         let memory = carve(&mut Arena::new(buffer.all()))?;
-        gpu.run("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
+        gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
         let total = gpu.download::<u32>(&buffer, memory.total.part(0, 4))?.first().copied().unwrap_or(0);
         let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
-        gpu.run("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
+        gpu.submit("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
         let ends: Vec<u32> = gpu.download(&buffer, memory.ends.part(0, 4 * u64::from(count)))?;
         let found: Vec<u32> = gpu.download(&found, found.all())?;
         let mut begin = 0;

@@ -224,7 +224,7 @@ pub fn locate(
     report: &dyn Fn(u64, u64),
 ) -> Result<Located> {
     let gpu = tree.gpu();
-    let scene = Scene::new(mesh, tree);
+    let scene = Scene::new(mesh, tree)?;
     let field = match field {
         Some((values, on)) => {
             on.check(values, mesh.sizes())?;
@@ -247,7 +247,7 @@ pub fn locate(
         let n = u64::from(count);
         let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: memory.map(|m| m.order) };
         let output = LocateOutput { owners: owners.all().part(0, 4 * n), barycentrics: barycentrics.all().part(0, 16 * n) };
-        let ((), time) = gpu.run("olbvh.query.locate", |r| {
+        let ((), time) = gpu.submit("olbvh.query.locate", |r| {
             if let Some(memory) = &memory {
                 cmd_sort_points(r, scene.tree.grid, &input, memory)?;
                 r.barrier("sort_points → locate");

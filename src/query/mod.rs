@@ -19,6 +19,7 @@ pub(crate) use volume::{Canvas, Rays};
 pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
+use crate::error::Result;
 use crate::gpu::{BufferRef, Groups};
 use crate::reference::locate::SLICE;
 
@@ -40,12 +41,6 @@ pub enum Structure {
     Octree(TreeMemory),
     /// The binary tree.
     Binary(BinaryTree),
-}
-
-impl From<&Tree> for Structure {
-    fn from(tree: &Tree) -> Self {
-        Self::Octree(*tree.memory())
-    }
 }
 
 /// How many invocations a kernel needs: as many as items, or the workgroups that the device knows.
@@ -120,9 +115,14 @@ pub struct Searched {
 }
 
 impl Searched {
-    /// A mesh in memory of our own.
-    pub fn new(mesh: &DeviceMesh, structure: impl Into<Structure>) -> Self {
-        Self { mesh: mesh.view(), structure: structure.into() }
+    /// A mesh in memory of our own, and what was built over it.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if that was built over another mesh.
+    pub fn new(mesh: &DeviceMesh, built: impl Into<Self>) -> Result<Self> {
+        let searched = built.into();
+        mesh.check(&searched.mesh)?;
+        Ok(searched)
     }
 
     /// The same with other flags for the nodes of an octree.
@@ -136,6 +136,18 @@ impl Searched {
     /// Which lists an octree keeps, for its kernels.
     fn lists(&self) -> u32 {
         if let Structure::Octree(tree) = self.structure { tree.lists as u32 } else { 0 }
+    }
+}
+
+impl From<&Tree> for Searched {
+    fn from(tree: &Tree) -> Self {
+        Self { mesh: *tree.mesh(), structure: Structure::Octree(*tree.memory()) }
+    }
+}
+
+impl From<&Scene> for Searched {
+    fn from(scene: &Scene) -> Self {
+        Self { mesh: scene.mesh, structure: Structure::Octree(scene.tree) }
     }
 }
 
@@ -162,8 +174,12 @@ fn slices(longest: u32) -> (u32, u32) {
 
 impl Scene {
     /// A mesh and its tree in memory of our own.
-    pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Self {
-        Self { mesh: mesh.view(), tree: *tree.memory(), longest_leaf: tree.status().longest_leaf }
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if the tree was built over another mesh.
+    pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Result<Self> {
+        mesh.check(tree.mesh())?;
+        Ok(Self { mesh: mesh.view(), tree: *tree.memory(), longest_leaf: tree.status().longest_leaf })
     }
 }
 

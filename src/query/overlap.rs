@@ -70,7 +70,7 @@ impl Job<'_> {
         status: &[BufferRef],
         record: impl FnOnce(&mut Recorder<'_>, &[Scene; 2]) -> Result<()>,
     ) -> Result<Vec<OverlapStatus>> {
-        let ((), time) = self.gpu.run("olbvh.query.overlap", |r| record(r, &self.scenes))?;
+        let ((), time) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
         self.done.submissions += 1;
         self.done.stages.extend(time.stages);
         let size = size_of::<OverlapStatus>() as u64;
@@ -152,7 +152,8 @@ impl Job<'_> {
 /// [`Error::Memory`], [`Error::TooLarge`] for more pairs than 32 bits count, a failed Vulkan call, or [`Error::Invalid`] for pairs in a tree without
 /// the lists that they are found by.
 pub fn overlap(a: Party<'_>, b: Party<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
-    let scenes = [a, b].map(|p| Scene::new(p.mesh, p.tree));
+    b.mesh.check_device(a.mesh.gpu())?;
+    let scenes = [Scene::new(a.mesh, a.tree)?, Scene::new(b.mesh, b.tree)?];
     let mut job = Job { gpu: a.tree.gpu(), scenes, report, done: Overlapped::default() };
     if pairs {
         job.pairs()?;

@@ -39,11 +39,11 @@ impl Vertices {
     /// The cells of level `level` that the bounding box of the valid tetrahedron `ids` meets (Eq. 5–6). Quantization is monotone, so the
     /// cells of the vertices bound those of every point between them.
     pub fn cells(&self, ids: [u32; 4], level: u32) -> CellRange {
-        let q = ids.map(|id| self.cell[id as usize]);
+        let [a, b, c, d] = ids.map(|id| self.cell[id as usize]);
         let shift = MAX_LEVEL - level;
-        let corner =
-            |pick: fn(u16, u16) -> u16| [0, 1, 2].map(|c| u32::from(pick(pick(q[0][c], q[1][c]), pick(q[2][c], q[3][c]))) >> shift);
-        CellRange { lo: corner(u16::min), hi: corner(u16::max) }
+        let lo = [0, 1, 2].map(|k| u32::from(a[k].min(b[k]).min(c[k].min(d[k]))) >> shift);
+        let hi = [0, 1, 2].map(|k| u32::from(a[k].max(b[k]).max(c[k].max(d[k]))) >> shift);
+        CellRange { lo, hi }
     }
 }
 

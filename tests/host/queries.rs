@@ -8,8 +8,8 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
     LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, Path, PointInput, PointOrder, RenderInput, RenderMemory, Rounds,
-    Scene, Searched, Shown, SliceInput, SliceMemory, Structure, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
-    cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
+    Scene, Searched, Shown, SliceInput, SliceMemory, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners, cmd_list_pairs,
+    cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -64,7 +64,7 @@ impl Queries {
         let normals = vec![[0.6, 0.0, 0.7]; field.len()];
         let carve = |a: &mut Arena| {
             let slice = SliceMemory::carve(a, 37, rows.count)?;
-            let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree))?;
+            let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree)?)?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
             let picture = RenderMemory::carve(a, plan.size, Some(&frame.tree.capacity))?;
@@ -118,7 +118,7 @@ impl Queries {
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
         cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;
-        let searched = Searched { mesh: self.scene.mesh, structure: Structure::Octree(self.scene.tree) };
+        let searched = Searched::from(&self.scene);
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest, part: None };
         cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
@@ -128,7 +128,7 @@ impl Queries {
         let shown = Some(Shown { ranges: self.ranges, drawn, count: self.plan.drawn.len() as u32 + 1 });
         let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), shown, part: None };
         cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
-        let other = Scene::new(&self.other, &self.other_tree);
+        let other = Scene::new(&self.other, &self.other_tree)?;
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;
         cmd_count_pairs(r, &self.scene, &other, &self.pairs, Rounds::begin(8))?;
         cmd_list_pairs(r, &self.scene, &other, &self.pairs, self.found, Rounds::begin(8))

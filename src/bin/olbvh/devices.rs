@@ -17,6 +17,9 @@ pub struct Args {}
 
 /// Runs it.
 pub fn run(_: &Args, common: &Common) -> Outcome {
+    if common.device.is_some() {
+        common.remark("--device chooses for other commands; these are all devices");
+    }
     let devices = match list_devices() {
         Ok(devices) => devices,
         // No loader is no failure of a listing: there are no devices, and why is said.

@@ -67,15 +67,15 @@ pub struct Args {
     /// Also write each voxel's cell, NAME.owner.npy or an array of the .vti.
     #[arg(long)]
     owners: bool,
-    /// Colour map of pictures, as for `render`.
-    #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP")]
-    tf: String,
+    /// Colour map of pictures, as for `render`; by default viridis.
+    #[arg(long, value_name = "MAP")]
+    tf: Option<String>,
     /// Values at the two ends of the colour map (and of an .svx value channel); by default the field's.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Metres per unit of the mesh, for .svx.
-    #[arg(long, default_value_t = 0.001, value_name = "M", value_parser = unit)]
-    unit: f64,
+    /// Metres per unit of the mesh, for .svx; by default 0.001, millimetres.
+    #[arg(long, value_name = "M", value_parser = unit)]
+    unit: Option<f64>,
     #[command(flatten)]
     tree: TreeArgs,
     #[command(flatten)]
@@ -95,10 +95,17 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
             output::announce(&args.output.with_extension(beside), &FORMATS, &[&args.mesh])?;
         }
     }
-    if args.owners && !matches!(format, OutputFormat::Npy | OutputFormat::Vti) {
-        return Err(Failure::Usage("--owners goes with .npy and .vti".into()));
+    for (given, option, formats, endings) in [
+        (args.owners, "--owners", &[OutputFormat::Npy, OutputFormat::Vti][..], ".npy and .vti"),
+        (args.tf.is_some(), "--tf", &[OutputFormat::Png], ".png"),
+        (args.range.is_some(), "--range", &[OutputFormat::Png, OutputFormat::Svx], ".png and .svx"),
+        (args.unit.is_some(), "--unit", &[OutputFormat::Svx], ".svx"),
+    ] {
+        if given && !formats.contains(&format) {
+            return Err(Failure::Usage(format!("{option} goes with {endings}")));
+        }
     }
-    let colors = TransferFunction::named(&args.tf)?;
+    let colors = TransferFunction::named(args.tf.as_deref().unwrap_or(transfer::DEFAULT_MAP))?;
     let options = args.tree.options(false)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
@@ -131,7 +138,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
         common.remark(format_args!("{name} does not number materials from 1 to 255; the package has its values over {range:?}"));
     }
-    let look = Look { colors, range, unit: args.unit, field: field.map(|f| f.name.clone()), materials };
+    let look = Look { colors, range, unit: args.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials };
     let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let mut tally = Tally::default();

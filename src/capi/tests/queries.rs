@@ -218,7 +218,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
             ARMED.set(false);
             Ok(())
         };
-        device.run("olbvh.test.queries", frame).unwrap();
+        device.submit("olbvh.test.queries", frame).unwrap();
     }
     assert_eq!(CALLS.get(), before, "calls made while recording");
 

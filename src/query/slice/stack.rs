@@ -7,7 +7,7 @@ use crate::gpu::{Buffer, Gpu};
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Rounds, Searched, Structure};
+use crate::query::{Rounds, Searched};
 use crate::reference::vertices::CellRange;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
 
@@ -56,7 +56,7 @@ impl<'a> Slicing<'a> {
     /// As [`slice`].
     pub(crate) fn new(
         mesh: &'a DeviceMesh,
-        structure: impl Into<Structure>,
+        built: impl Into<Searched>,
         field: Option<(&[f32], On)>,
         (voxels, extrapolate): (&'a VoxelGrid, Extrapolate),
         part: Option<CellRange>,
@@ -74,7 +74,7 @@ impl<'a> Slicing<'a> {
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size[0], rows);
         let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
         let memory = carve(&mut Arena::new(buffer.all()))?;
-        let (searched, sliced) = (Searched::new(mesh, structure), Sliced::default());
+        let (searched, sliced) = (Searched::new(mesh, built)?, Sliced::default());
         Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
     }
 
@@ -88,7 +88,7 @@ impl<'a> Slicing<'a> {
         let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate, part: self.part };
         let mut rounds = Rounds::begin(1);
         let status = loop {
-            let ((), time) = self.gpu.run("olbvh.query.slice", |r| cmd_slice(r, &self.searched, &input, memory, rounds))?;
+            let ((), time) = self.gpu.submit("olbvh.query.slice", |r| cmd_slice(r, &self.searched, &input, memory, rounds))?;
             rounds = Rounds::resume(1);
             sliced.submissions += 1;
             sliced.locate_ms += time.milliseconds("query.slice_locate");
@@ -127,14 +127,14 @@ impl<'a> Slicing<'a> {
 /// `sink`.
 pub fn slice(
     mesh: &DeviceMesh,
-    structure: impl Into<Structure>,
+    built: impl Into<Searched>,
     field: Option<(&[f32], On)>,
     voxels: &VoxelGrid,
     extrapolate: Extrapolate,
     report: &dyn Fn(u64, u64),
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<Sliced> {
-    let mut slicing = Slicing::new(mesh, structure, field, (voxels, extrapolate), None)?;
+    let mut slicing = Slicing::new(mesh, built, field, (voxels, extrapolate), None)?;
     let mut done = 0;
     for rows in bands(voxels, u64::from(slicing.rows) * u64::from(voxels.size[0])) {
         let band = slicing.band(rows)?;

@@ -74,14 +74,14 @@ impl<'a> Canvas<'a> {
     /// As [`render`].
     pub(crate) fn new(
         mesh: &'a DeviceMesh,
-        structure: impl Into<Structure>,
+        built: impl Into<Searched>,
         plan: &'a Plan,
         (values, on): (&[f32], On),
         normals: Option<&[[f32; 3]]>,
         in_strips: bool,
     ) -> Result<Self> {
         let gpu = mesh.gpu();
-        let searched = Searched::new(mesh, structure);
+        let searched = Searched::new(mesh, built)?;
         on.check(values, mesh.sizes())?;
         if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
             return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));
@@ -117,7 +117,7 @@ impl<'a> Canvas<'a> {
     fn gather_ranges(&mut self) -> Result<()> {
         if let (Structure::Octree(tree), Some(ranges)) = (&self.searched.structure, self.ranges) {
             let field = (self.field.0.all(), self.field.1);
-            let ((), time) = self.gpu.run("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
+            let ((), time) = self.gpu.submit("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
             self.drawn.ranges_ms += time.milliseconds("build.ranges");
         }
         Ok(())
@@ -137,12 +137,12 @@ impl<'a> Canvas<'a> {
             shown: self.ranges.map(|ranges| Shown { ranges, drawn: shown, count: plan.drawn.len() as u32 }),
             part,
         };
-        let ((), time) = gpu.run("olbvh.query.intervals", |r| cmd_render(r, searched, &input, memory, Rounds::begin(0)))?;
+        let ((), time) = gpu.submit("olbvh.query.intervals", |r| cmd_render(r, searched, &input, memory, Rounds::begin(0)))?;
         drawn.ranges_ms += time.milliseconds("query.visible");
         drawn.interval_ms += time.milliseconds("query.intervals");
         let rays = u64::from(size[0]) * u64::from(size[1]);
         let status = loop {
-            let ((), time) = gpu.run("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
+            let ((), time) = gpu.submit("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
             drawn.march_ms += time.milliseconds("query.march");
             drawn.submissions += 1;
             let status = gpu.download::<RenderStatus>(&self.buffer, memory.status)?.first().copied().unwrap_or_default();
@@ -191,13 +191,13 @@ impl<'a> Canvas<'a> {
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field or normals have the wrong length.
 pub fn render(
     mesh: &DeviceMesh,
-    structure: impl Into<Structure>,
+    built: impl Into<Searched>,
     plan: &Plan,
     field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
     report: &dyn Fn(u64, u64),
 ) -> Result<Drawn> {
-    let mut canvas = Canvas::new(mesh, structure, plan, field, normals, false)?;
+    let mut canvas = Canvas::new(mesh, built, plan, field, normals, false)?;
     canvas.draw(plan.size, None, report)?;
     let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
     let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;

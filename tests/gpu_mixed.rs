@@ -1,0 +1,71 @@
+//! What was built over one mesh answers nothing about another, or about one on another device: refused, not read out of bounds.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::Error;
+use olbvh::baseline::{Lbvh, RayMethod, Rays};
+use olbvh::build::{BadCells, DeviceMesh, FieldRanges, Tree};
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::layout::Grid;
+use olbvh::mesh::{On, kuhn};
+use olbvh::options::BuildOptions;
+use olbvh::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
+use olbvh::render::{Bounds, Plan, RenderSettings};
+use olbvh::slicing::{Extrapolate, SliceSettings};
+use std::fmt::Debug;
+
+fn refused<T: Debug>(what: &str, words: &str, result: olbvh::Result<T>) {
+    match result {
+        Err(Error::Invalid(message)) => assert!(message.contains(words), "{what}: {message}"),
+        other => panic!("{what}: {other:?}"),
+    }
+}
+
+#[test]
+fn another_mesh_is_refused() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let [small, large] = [kuhn([2; 3]).unwrap(), kuhn([5; 3]).unwrap()];
+    let [mine, other] = [&small, &large].map(|mesh| DeviceMesh::upload(&gpu, mesh, BadCells::Skip).unwrap());
+    let tree = Tree::build(&gpu, &other, &BuildOptions::default()).unwrap();
+    let lbvh = Lbvh::build(&gpu, &other).unwrap();
+    let (none, quiet) = (LocateOptions::default(), |_, _| {});
+    let words = "over another mesh";
+    refused("locate", words, locate(&mine, &tree, &small.points, None, &none, &quiet));
+    refused("locate_all", words, locate_all(&mine, &tree, &small.points, 0.0, &quiet));
+    refused("lbvh.locate", words, lbvh.locate(&mine, &small.points, 0.0));
+    let [a, b] = [Party { mesh: &other, tree: &tree }, Party { mesh: &mine, tree: &tree }];
+    refused("overlap", words, overlap(a, b, false, &quiet));
+    refused("overlap", words, overlap(b, a, true, &quiet));
+    refused("lbvh.overlap", words, lbvh.overlap(&mine, &lbvh, &other, &quiet));
+    refused("lbvh.overlap", words, lbvh.overlap(&other, &lbvh, &mine, &quiet));
+    let values = vec![0.0; small.points.len()];
+    refused("ranges", words, FieldRanges::new(&mine, &tree, (&values, On::Points)));
+    let settings = RenderSettings { size: [16, 16], ..RenderSettings::default() };
+    let plan = Plan::new(&settings, &Bounds::from(mine.grid()), small.origin, Some([0.0, 1.0])).unwrap();
+    refused("render", words, render(&mine, &tree, &plan, (&values, On::Points), None, &quiet));
+    refused("render", words, render(&mine, &lbvh, &plan, (&values, On::Points), None, &quiet));
+    let Grid { lo: [x, y, z, _], hi: [x1, y1, z1, _], .. } = *mine.grid();
+    let voxels = SliceSettings::default().voxels([x, y, z], [x1, y1, z1], small.origin).unwrap();
+    let mut sink = |_| Ok(());
+    refused("slice", words, slice(&mine, &tree, None, &voxels, Extrapolate::Nearest, &quiet, &mut sink));
+    refused("slice", words, slice(&mine, &lbvh, None, &voxels, Extrapolate::Nearest, &quiet, &mut sink));
+    if let Some(rays) = Rays::build(&gpu, &other, RayMethod::Query).unwrap() {
+        refused("rays", words, rays.locate(&mine, &small.points));
+    }
+}
+
+/// Handles of one device are alike, whatever memory or kernels they allow.
+#[test]
+fn another_device_is_refused() {
+    let [gpu, elsewhere] = [(); 2].map(|()| Gpu::new(&GpuOptions::default()).unwrap());
+    let mesh = kuhn([2; 3]).unwrap();
+    let [here, there] = [&gpu, &elsewhere].map(|gpu| DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap());
+    let options = BuildOptions::default();
+    refused("tree", "on another device", Tree::build(&gpu, &there, &options));
+    refused("lbvh", "on another device", Lbvh::build(&gpu, &there).map(|_| ()));
+    let [a, b] = [(&gpu, &here), (&elsewhere, &there)].map(|(gpu, mesh)| Tree::build(gpu, mesh, &options).unwrap());
+    let [a, b] = [Party { mesh: &here, tree: &a }, Party { mesh: &there, tree: &b }];
+    refused("overlap", "on another device", overlap(a, b, false, &|_, _| {}));
+    let same = gpu.with_memory(1 << 20).with_target(gpu.target().clone()).unwrap();
+    Tree::build(&same, &here, &options).unwrap();
+}
