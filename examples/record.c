@@ -63,23 +63,31 @@ int main(int argc, char **argv) {
     VkInstanceCreateInfo instance_info = {.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO, .pApplicationInfo = &application};
     VkInstance instance;
     vk(vkCreateInstance(&instance_info, NULL, &instance), "vkCreateInstance");
-    uint32_t one = 1, count = 16, family = 0;
+    uint32_t one = 1;
     if (vkEnumeratePhysicalDevices(instance, &one, &physical) < 0 || one == 0) return 1;
-    VkQueueFamilyProperties families[16];
-    vkGetPhysicalDeviceQueueFamilyProperties(physical, &count, families);
-    while (!(families[family].queueFlags & VK_QUEUE_COMPUTE_BIT)) ++family;
+    olbvh_host_device host = {.get_instance_proc_addr = (void (*)(void))vkGetInstanceProcAddr, .instance = (uint64_t)(uintptr_t)instance};
+    host.physical_device = (uint64_t)(uintptr_t)physical;
+    olbvh_host_requirements needs;
+    check(olbvh_host_check(host.get_instance_proc_addr, host.instance, host.physical_device, &needs), "checking the device");
     float priority = 1.0f;
-    VkDeviceQueueCreateInfo queues = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, .queueFamilyIndex = family, .queueCount = 1};
+    VkDeviceQueueCreateInfo queues = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, .queueFamilyIndex = needs.queue_family, .queueCount = 1};
     queues.pQueuePriorities = &priority;
     VkPhysicalDeviceBufferDeviceAddressFeatures addresses = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES};
+    /* This program has buffers by address only; olbvh does without them, too. */
     addresses.bufferDeviceAddress = VK_TRUE;
-    VkDeviceCreateInfo device_info = {.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, .pNext = &addresses};
+    VkPhysicalDeviceSubgroupSizeControlFeatures control = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES};
+    control.subgroupSizeControl = control.computeFullSubgroups = VK_TRUE;
+    if (needs.subgroup_size_control) addresses.pNext = &control;
+    VkPhysicalDeviceFeatures core = {.shaderInt64 = needs.shader_int64};
+    VkDeviceCreateInfo device_info = {.sType = VK_STRUCTURE_TYPE_DEVICE_CREATE_INFO, .pNext = &addresses, .pEnabledFeatures = &core};
+    device_info.enabledExtensionCount = needs.extension_count;
+    device_info.ppEnabledExtensionNames = needs.extensions;
     device_info.queueCreateInfoCount = 1;
     device_info.pQueueCreateInfos = &queues;
     vk(vkCreateDevice(physical, &device_info, NULL, &device), "vkCreateDevice");
     VkQueue queue;
-    vkGetDeviceQueue(device, family, 0, &queue);
-    VkCommandPoolCreateInfo pool_info = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, .queueFamilyIndex = family};
+    vkGetDeviceQueue(device, needs.queue_family, 0, &queue);
+    VkCommandPoolCreateInfo pool_info = {.sType = VK_STRUCTURE_TYPE_COMMAND_POOL_CREATE_INFO, .queueFamilyIndex = needs.queue_family};
     VkCommandPool pool;
     vk(vkCreateCommandPool(device, &pool_info, NULL, &pool), "vkCreateCommandPool");
     VkCommandBufferAllocateInfo commands_info = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_ALLOCATE_INFO, .commandPool = pool};
@@ -88,12 +96,12 @@ int main(int argc, char **argv) {
     vk(vkAllocateCommandBuffers(device, &commands_info, &commands), "vkAllocateCommandBuffers");
 
     /* olbvh on it. */
-    olbvh_host_device host = {.get_instance_proc_addr = (void (*)(void))vkGetInstanceProcAddr, .instance = (uint64_t)(uintptr_t)instance};
-    host.physical_device = (uint64_t)(uintptr_t)physical;
     host.device = (uint64_t)(uintptr_t)device;
     host.queue = (uint64_t)(uintptr_t)queue;
-    host.queue_family = family;
+    host.queue_family = needs.queue_family;
     host.buffer_addresses = 1;
+    host.shader_int64 = needs.shader_int64;
+    host.subgroup_size_control = needs.subgroup_size_control;
     olbvh_gpu *gpu = NULL;
     check(olbvh_gpu_from_host(&host, &gpu), "lending the device");
 

@@ -159,6 +159,36 @@ typedef struct olbvh_tree_info_data {
 } olbvh_tree_info_data;
 
 /*
+ What a host enables when it makes a device for olbvh.
+ */
+typedef struct olbvh_host_requirements {
+  /*
+   The first queue family with compute; any other with compute will do.
+   */
+  uint32_t queue_family;
+  /*
+   Not 0: the device has the feature `bufferDeviceAddress`. Without it, buffers are bound by descriptors.
+   */
+  uint32_t buffer_addresses;
+  /*
+   Not 0: it has the feature `shaderInt64`.
+   */
+  uint32_t shader_int64;
+  /*
+   Not 0: it has the features `subgroupSizeControl` and `computeFullSubgroups`, and heeds them.
+   */
+  uint32_t subgroup_size_control;
+  /*
+   Number of names that follow.
+   */
+  uint32_t extension_count;
+  /*
+   Names of device extensions, which stay where they are.
+   */
+  const char *extensions[4];
+} olbvh_host_requirements;
+
+/*
  A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
  */
 typedef struct olbvh_host_device {
@@ -771,6 +801,15 @@ void olbvh_tree_free(struct olbvh_tree *tree);
  Tells what a tree is like.
  */
 enum olbvh_status olbvh_tree_info(const struct olbvh_tree *tree, struct olbvh_tree_info_data *out);
+
+/*
+ Tells what to enable on a physical device before a device is made from it. Handles are cast to `uint64_t`, `vkGetInstanceProcAddr` to a function without
+ arguments. Ends with `OLBVH_STATUS_DEVICE` where the device does not qualify; `olbvh_last_error` tells what it lacks.
+ */
+enum olbvh_status olbvh_host_check(void (*get_instance_proc_addr)(void),
+                                   uint64_t instance,
+                                   uint64_t physical_device,
+                                   struct olbvh_host_requirements *out);
 
 /*
  Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a

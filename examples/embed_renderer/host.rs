@@ -75,7 +75,7 @@ impl Host {
             }
             let (addresses, size_control) = (addresses && wanted.buffer_addresses, wanted.subgroup_size_control);
             let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-            let names: Vec<*const _> = if size_control { vec![CStr::as_ptr(ash::ext::subgroup_size_control::NAME)] } else { Vec::new() };
+            let names: Vec<_> = wanted.extensions_without_rays().map(CStr::as_ptr).collect();
             let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(addresses);
             let mut control =
                 vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);

@@ -1,10 +1,77 @@
 //! A host's Vulkan device, across the border to C.
 
-use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing};
+use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing, put};
 use crate::error::Error;
-use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice};
+use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice, Requirements};
 use ash::vk::{self, Handle};
+use std::ffi::c_char;
+use std::ptr::null;
 use std::sync::{Arc, Mutex};
+
+/// What a host enables when it makes a device for olbvh.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct OlbvhHostRequirements {
+    /// The first queue family with compute; any other with compute will do.
+    pub queue_family: u32,
+    /// Not 0: the device has the feature `bufferDeviceAddress`. Without it, buffers are bound by descriptors.
+    pub buffer_addresses: u32,
+    /// Not 0: it has the feature `shaderInt64`.
+    pub shader_int64: u32,
+    /// Not 0: it has the features `subgroupSizeControl` and `computeFullSubgroups`, and heeds them.
+    pub subgroup_size_control: u32,
+    /// Number of names that follow.
+    pub extension_count: u32,
+    /// Names of device extensions, which stay where they are.
+    pub extensions: [*const c_char; 4],
+}
+
+/// Tells what to enable on a physical device before a device is made from it. Handles are cast to `uint64_t`, `vkGetInstanceProcAddr` to a function without
+/// arguments. Ends with `OLBVH_STATUS_DEVICE` where the device does not qualify; `olbvh_last_error` tells what it lacks.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_host_check(
+    get_instance_proc_addr: Option<unsafe extern "C" fn()>,
+    instance: u64,
+    physical_device: u64,
+    out: *mut OlbvhHostRequirements,
+) -> OlbvhStatus {
+    border(|| {
+        let Some(get) = get_instance_proc_addr.filter(|_| instance != 0 && physical_device != 0) else {
+            return Err(missing("the loader's function or a handle"));
+        };
+        // SAFETY: the host passes the loader's function and handles of a living instance.
+        let instance = unsafe { load(get, instance) };
+        let found = Requirements::check(&instance, vk::PhysicalDevice::from_raw(physical_device));
+        if !found.missing.is_empty() {
+            return Err(Error::NoDevice(format!("the physical device lacks {}", found.missing.join(", "))));
+        }
+        let mut told = OlbvhHostRequirements {
+            queue_family: found.queue_family.unwrap_or_default().0,
+            buffer_addresses: found.buffer_addresses.into(),
+            shader_int64: found.shader_int64.into(),
+            subgroup_size_control: found.subgroup_size_control.into(),
+            extension_count: 0,
+            extensions: [null(); 4],
+        };
+        for (name, place) in found.extensions_without_rays().zip(&mut told.extensions) {
+            *place = name.as_ptr();
+            told.extension_count += 1;
+        }
+        put(out, told)
+    })
+}
+
+/// The functions of an instance.
+///
+/// # Safety
+/// The loader's function, cast, and a living instance.
+unsafe fn load(get: unsafe extern "C" fn(), instance: u64) -> ash::Instance {
+    // SAFETY: as promised.
+    unsafe {
+        let get = std::mem::transmute::<unsafe extern "C" fn(), vk::PFN_vkGetInstanceProcAddr>(get);
+        ash::Instance::load(&ash::StaticFn { get_instance_proc_addr: get }, vk::Instance::from_raw(instance))
+    }
+}
 
 /// A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
 #[repr(C)]
@@ -48,9 +115,7 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
         };
         // SAFETY: the host passes handles of one living device, and the loader's function.
         let gpu = unsafe {
-            let get = std::mem::transmute::<unsafe extern "C" fn(), vk::PFN_vkGetInstanceProcAddr>(get);
-            let functions = ash::StaticFn { get_instance_proc_addr: get };
-            let instance = ash::Instance::load(&functions, vk::Instance::from_raw(host.instance));
+            let instance = load(get, host.instance);
             let device = ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(host.device));
             let lent = HostDevice {
                 physical: vk::PhysicalDevice::from_raw(host.physical_device),

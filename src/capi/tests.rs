@@ -4,10 +4,10 @@
 mod host;
 mod queries;
 
-use super::host::{OlbvhHostDevice, olbvh_gpu_from_host};
+use super::host::{OlbvhHostDevice, OlbvhHostRequirements, olbvh_gpu_from_host, olbvh_host_check};
 use super::record::*;
 use super::*;
-use crate::gpu::{Binding, BufferRef, HostDevice, Recorder, USAGE};
+use crate::gpu::{Binding, BufferRef, HostDevice, Recorder, Requirements, USAGE};
 use crate::mesh::kuhn_jittered;
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
@@ -167,10 +167,18 @@ fn a_c_host_records_by_address_and_asks() {
     // SAFETY: a function pointer for another.
     let get =
         unsafe { std::mem::transmute::<*const (), unsafe extern "C" fn()>(host.entry.static_fn().get_instance_proc_addr as *const ()) };
+    let (instance, physical) = (host.instance.handle().as_raw(), host.physical.as_raw());
+    let needs: OlbvhHostRequirements = made(|out| olbvh_host_check(Some(get), instance, physical, out));
+    let told = [needs.buffer_addresses, needs.shader_int64, needs.subgroup_size_control].map(|told| told != 0);
+    assert_eq!((needs.queue_family, told), (host.family, [host.addresses, host.int64, host.control]));
+    // SAFETY: C strings that last, so many of them.
+    let names = needs.extensions[..needs.extension_count as usize].iter().map(|&name| unsafe { CStr::from_ptr(name) });
+    assert!(names.eq(Requirements::check(&host.instance, host.physical).extensions_without_rays()), "{needs:?}");
+    assert_eq!(olbvh_host_check(None, instance, physical, std::ptr::from_ref(&needs).cast_mut()), OlbvhStatus::Invalid);
     let mut lent = OlbvhHostDevice {
         get_instance_proc_addr: Some(get),
-        instance: host.instance.handle().as_raw(),
-        physical_device: host.physical.as_raw(),
+        instance,
+        physical_device: physical,
         device: host.device.handle().as_raw(),
         queue: host.queue().lock().unwrap().as_raw(),
         pipeline_cache: 0,

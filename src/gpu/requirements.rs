@@ -7,6 +7,9 @@ use std::ffi::{CStr, c_char};
 /// The vendor's number.
 pub(super) const INTEL: u32 = 0x8086;
 
+/// Extensions that are not for tracing rays. A device that is no whole Vulkan, such as MoltenVK's, must be told that this is known.
+const WITHOUT_RAYS: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
+
 /// How a device traces rays; a baseline uses that, nothing else does.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayTracing {
@@ -127,6 +130,11 @@ fn subgroup_of(vendor: u32, [least, usual, most]: [u32; 3], control: bool) -> u3
 }
 
 impl Requirements {
+    /// Device extensions to enable where no rays are to be traced, which only a baseline does.
+    pub fn extensions_without_rays(&self) -> impl Iterator<Item = &'static CStr> {
+        self.extensions.iter().copied().filter(|e| WITHOUT_RAYS.contains(e))
+    }
+
     /// A driver may choose the size of subgroups.
     pub(super) fn sizes_vary(&self) -> bool {
         self.subgroup_sizes[0] != self.subgroup_sizes[2]
@@ -187,9 +195,7 @@ impl Requirements {
         } else {
             [subgroup.subgroup_size; 3]
         };
-        // A device that is no whole Vulkan, such as MoltenVK's, must be told that this is known.
-        let always = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
-        let mut extensions: Vec<_> = always.into_iter().filter(|e| has(e)).collect();
+        let mut extensions: Vec<_> = WITHOUT_RAYS.into_iter().filter(|e| has(e)).collect();
         if ray_tracing.any() {
             extensions.extend(for_structures);
         }
