@@ -118,7 +118,7 @@ impl Searched {
     /// A mesh in memory of our own, and what was built over it.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if that was built over another mesh.
+    /// [`crate::Error::Invalid`] if that was built over another mesh.
     pub fn new(mesh: &DeviceMesh, built: impl Into<Self>) -> Result<Self> {
         let searched = built.into();
         mesh.check(&searched.mesh)?;
@@ -176,7 +176,7 @@ impl Scene {
     /// A mesh and its tree in memory of our own.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the tree was built over another mesh.
+    /// [`crate::Error::Invalid`] if the tree was built over another mesh.
     pub fn new(mesh: &DeviceMesh, tree: &Tree) -> Result<Self> {
         mesh.check(tree.mesh())?;
         Ok(Self { mesh: mesh.view(), tree: *tree.memory(), longest_leaf: tree.status().longest_leaf })
