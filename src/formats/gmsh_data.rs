@@ -2,7 +2,7 @@
 
 use super::assemble::Array;
 use super::budget::Budget;
-use super::gmsh::Reader;
+use super::gmsh_reader::Reader;
 use super::source::printable;
 use super::tags::Tags;
 use crate::error::Result;

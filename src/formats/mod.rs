@@ -17,6 +17,7 @@ mod detect;
 mod gmsh;
 mod gmsh_data;
 mod gmsh_elements;
+mod gmsh_reader;
 mod integers;
 mod medit;
 mod meditb;
