@@ -3,7 +3,8 @@
 use std::collections::{HashMap, HashSet};
 
 use super::LoadOptions;
-use super::assemble::{Array, Assembly};
+use super::array::Array;
+use super::assemble::Assembly;
 use super::budget::Budget;
 use super::gmsh_data::View;
 use super::gmsh_elements::Elements;

@@ -1,6 +1,6 @@
 //! `$NodeData` and `$ElementData` of Gmsh files.
 
-use super::assemble::Array;
+use super::array::Array;
 use super::budget::Budget;
 use super::gmsh_reader::Reader;
 use super::source::printable;
