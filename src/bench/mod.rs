@@ -2,25 +2,34 @@
 //! tracing. Every answer is verified before anything is timed.
 //!
 //! ```text
-//! subject    a mesh on the device, and the questions that all structures are asked
-//! structure  one structure: built, asked
-//! verify     its answers against those of the first structure, and of the reference
-//! measure    repetitions within a budget
-//! report     every figure, and the ratios to the LBVH     → table (text, Markdown), plot (SVG)
+//! subject           a mesh on the device, and the questions that all structures are asked
+//! structure         one structure: built, asked
+//! verify            its answers against those of the first structure, and of the reference
+//! measure           repetitions within a budget
+//! structure_report  the figures of one structure, by quantity
+//! mesh_report       those of all structures over a mesh, and the ratios to the LBVH
+//! report            every figure of a run     → report_tables (text, Markdown), report_plots (SVG)
 //!
-//! copy       how fast the device copies     traffic    what each stage must move at least, to compare with that
-//! scaling    time per item over the size of the mesh
-//! compare    two files of reports: ratios, and which of them are more than noise
+//! table, plot       what all tables and all plots have
+//! copy              how fast the device copies     traffic    what each stage must move at least, to compare with that
+//! scaling           time per item over the size of the mesh     → report_tables, scaling_plots
+//! compare           two files of reports: ratios, and which of them are more than noise
 //! ```
 
 mod compare;
 mod copy;
 mod measure;
+mod mesh_report;
 mod plot;
+mod quantity;
 mod report;
+mod report_plots;
+mod report_tables;
 mod scaling;
+mod scaling_plots;
 mod stored;
 mod structure;
+mod structure_report;
 mod subject;
 mod suite;
 mod table;
@@ -30,12 +39,15 @@ mod verify;
 pub use compare::{Compared, Comparison, Verdict, compare};
 pub use copy::CopyRate;
 pub use measure::{Budget, Spread, Timing};
-pub use plot::plots;
-pub use report::{DeviceFacts, Figure, Lost, MemoryFigures, MeshReport, Quality, Quantity, Report, StageFigure, StructureReport};
+pub use mesh_report::{MeshReport, Quality};
+pub use quantity::Quantity;
+pub use report::{DeviceFacts, Report};
+pub use report_plots::plots;
+pub use report_tables::{markdown, text};
 pub use scaling::Scale;
 pub use structure::Kind;
+pub use structure_report::{Figure, Lost, MemoryFigures, StageFigure, StructureReport};
 pub use suite::{Settings, Suite};
-pub use table::{markdown, text};
 
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, StageTime};

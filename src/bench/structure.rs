@@ -1,6 +1,6 @@
 //! One structure over one mesh, whichever it is.
 
-use super::Quantity;
+use super::quantity::Quantity;
 use crate::baseline::{Lbvh, RayMethod, Rays};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;

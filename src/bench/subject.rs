@@ -1,7 +1,8 @@
 //! A mesh on the device and the questions that all structures over it are asked.
 
+use super::quantity::Quantity;
 use super::structure::Structure;
-use super::{Quantity, Settings};
+use super::suite::Settings;
 use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::Gpu;

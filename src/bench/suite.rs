@@ -1,6 +1,7 @@
 //! What is measured: which meshes, how large the questions are, how long.
 
-use super::{Budget, Kind};
+use super::measure::Budget;
+use super::structure::Kind;
 use crate::options::{Assign, Lists, named};
 use serde::Serialize;
 

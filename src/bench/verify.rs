@@ -1,7 +1,7 @@
 //! The answers of a structure, and whether they are right.
 
-use super::Lost;
 use super::structure::{Built, Kind, Structure, overlap};
+use super::structure_report::Lost;
 use super::subject::Subject;
 use crate::build::Tree;
 use crate::error::{Error, Result};

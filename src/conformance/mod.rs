@@ -29,6 +29,7 @@ mod locate;
 mod meshes;
 mod overlap;
 mod picture;
+mod points;
 mod primitive_cases;
 mod primitives;
 mod query_cases;

@@ -2,8 +2,8 @@
 //! should find.
 
 use super::failure::Verdict;
-use super::locate::points;
 use super::meshes::MeshRecipe;
+use super::points::points;
 use crate::mesh::Mesh;
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::reference::boundary::{Topology, topology};

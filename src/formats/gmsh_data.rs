@@ -1,8 +1,8 @@
 //! `$NodeData` and `$ElementData` of Gmsh files.
 
-use super::assemble::Array;
+use super::array::Array;
 use super::budget::Budget;
-use super::gmsh::Reader;
+use super::gmsh_reader::Reader;
 use super::source::printable;
 use super::tags::Tags;
 use crate::error::Result;

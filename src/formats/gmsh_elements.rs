@@ -1,7 +1,7 @@
 //! `$Elements` of Gmsh files.
 
 use super::cells::{self, CellType};
-use super::gmsh::{Reader, Version};
+use super::gmsh_reader::{Reader, Version};
 use super::source::{Source, Tokens, parse_integer, printable};
 use crate::error::Result;
 

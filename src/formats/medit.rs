@@ -1,6 +1,7 @@
 //! Medit meshes as text (`.mesh`). Binary ones: `meditb`.
 
-use super::assemble::{Array, Assembly};
+use super::array::Array;
+use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
 use super::source::{Source, Tokens, printable};
 use crate::error::Result;

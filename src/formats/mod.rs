@@ -10,6 +10,7 @@
 //! So the readers here stand on quick-xml, base64, flate2, `lz4_flex` and lzma-rust2, and check every count against the size of
 //! the file before they allocate.
 
+mod array;
 mod assemble;
 mod budget;
 mod cells;
@@ -17,6 +18,7 @@ mod detect;
 mod gmsh;
 mod gmsh_data;
 mod gmsh_elements;
+mod gmsh_reader;
 mod integers;
 mod medit;
 mod meditb;

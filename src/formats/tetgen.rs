@@ -1,6 +1,7 @@
 //! TetGen's pairs of `.node` and `.ele`, numbered from 0, 1 or anything.
 
-use super::assemble::{Array, Assembly};
+use super::array::Array;
+use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
 use super::detect::ending;
 use super::source::{Source, Tokens, parse_float, parse_integer, printable};

@@ -2,7 +2,8 @@
 
 use std::ops::Range;
 
-use super::assemble::{Array, Assembly};
+use super::array::Array;
+use super::assemble::Assembly;
 use super::cells;
 use super::integers::Integers;
 use super::report::Fate;

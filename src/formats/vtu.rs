@@ -8,7 +8,8 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::LoadOptions;
-use super::assemble::{Array, Assembly};
+use super::array::Array;
+use super::assemble::Assembly;
 use super::budget::Budget;
 use super::cells::{self, CellType};
 use super::report::Fate;

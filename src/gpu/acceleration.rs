@@ -1,9 +1,10 @@
 //! Acceleration structures over triangles, where the device traces rays: built on the device, compacted, and put as its one instance into a scene
 //! that shaders trace rays in.
 
+use super::buffer_ref::BufferRef;
 use super::context::Gpu;
-use super::memory::{Buffer, BufferRef};
-use super::ray_pipeline::RayFunctions;
+use super::memory::Buffer;
+use super::ray_functions::Acceleration;
 use super::recorder::Recorder;
 use super::submit::StageTime;
 use super::{debug, failed};
@@ -13,31 +14,6 @@ use gpu_allocator::MemoryLocation;
 
 /// Bytes from one vertex to the next.
 const VERTEX_STRIDE: u64 = 16;
-
-/// Functions and limits of `VK_KHR_acceleration_structure`.
-pub(super) struct Acceleration {
-    functions: ash::khr::acceleration_structure::Device,
-    scratch_alignment: u64,
-    most_triangles: u64,
-    /// Those of ray-tracing pipelines, where they are enabled too.
-    pub(super) pipelines: Option<RayFunctions>,
-}
-
-impl Acceleration {
-    /// Of a device that was made with the extension, and perhaps with ray-tracing pipelines.
-    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device, pipelines: bool) -> Self {
-        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
-        // SAFETY: the handle is one of this instance; the structs live until the call returns.
-        unsafe { instance.get_physical_device_properties2(physical, &mut properties) };
-        Self {
-            functions: ash::khr::acceleration_structure::Device::new(instance, device),
-            scratch_alignment: u64::from(limits.min_acceleration_structure_scratch_offset_alignment.max(1)),
-            most_triangles: limits.max_primitive_count,
-            pipelines: pipelines.then(|| RayFunctions::new(instance, physical, device)),
-        }
-    }
-}
 
 /// Triangles in device memory, visible to everything.
 #[derive(Clone, Copy, Debug)]

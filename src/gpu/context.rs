@@ -1,19 +1,18 @@
 //! A device in use: its queue, allocator and pipelines. `open.rs` makes one of our own, `host.rs` takes one of the host's.
 
-use super::acceleration::Acceleration;
-use super::debug::DebugUtils;
-use super::failed;
-use super::kernel::{Kernel, Pipeline, Specialization, create_pipeline};
-use super::memory::{Buffer, BufferRef, Ledger};
+use super::buffer_ref::BufferRef;
+use super::constants::Constants;
+use super::foundation::Foundation;
+use super::ledger::Ledger;
+use super::pipelines::Pipelines;
+use super::ray_functions::Acceleration;
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
 use crate::kernels::{ALL, Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
-use std::collections::HashMap;
-use std::collections::hash_map::Entry;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError, RwLock};
+use std::sync::{Arc, Mutex, MutexGuard};
 
 /// How kernels get their buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -39,9 +38,6 @@ pub struct GpuOptions {
     pub trust: bool,
 }
 
-/// A kernel by name, and its specialization constants.
-type PipelineKey = (&'static str, Vec<(u32, u32)>);
-
 /// An opened device. Cheap to clone; everything made from it keeps it alive.
 #[derive(Clone)]
 pub struct Gpu {
@@ -50,71 +46,17 @@ pub struct Gpu {
     ledger: Option<Arc<Ledger>>,
 }
 
-/// What a [`Gpu`] stands on. Dropping it destroys device and instance, unless they are the host's.
-pub(super) struct Foundation {
-    pub instance: ash::Instance,
-    pub physical: vk::PhysicalDevice,
-    pub device: ash::Device,
-    /// What of the device is enabled.
-    pub report: DeviceReport,
-    pub family: u32,
-    /// Where the convenient layer submits; a host need not lend one.
-    pub queue: Option<Arc<Mutex<vk::Queue>>>,
-    /// `None`: one of our own.
-    pub allocator: Option<Arc<Mutex<Allocator>>>,
-    /// `None`: one of our own.
-    pub pipeline_cache: Option<vk::PipelineCache>,
-    /// The instance has debug-utils enabled.
-    pub debug_utils: bool,
-    /// `None`: the device is the host's.
-    pub ours: Option<Ours>,
-}
-
-/// What only a device of our own has.
-pub(super) struct Ours {
-    pub debug: Option<DebugUtils>,
-    pub _entry: ash::Entry,
-}
-
-impl Drop for Foundation {
-    fn drop(&mut self) {
-        let Some(ours) = &self.ours else { return };
-        // SAFETY: what was made from the device is gone; children go before parents.
-        unsafe {
-            self.device.destroy_device(None);
-            if let Some(debug) = &ours.debug {
-                debug.instance.destroy_debug_utils_messenger(debug.messenger, None);
-            }
-            self.instance.destroy_instance(None);
-        }
-    }
-}
-
 struct Inner {
     foundation: Foundation,
     // Held in an option so that it is gone before the device.
     allocator: Option<Arc<Mutex<Allocator>>>,
-    pipelines: RwLock<HashMap<PipelineKey, Pipeline>>,
-    cache: vk::PipelineCache,
-    cache_file: Option<PathBuf>,
+    pipelines: Pipelines,
     binding: Binding,
     limits: vk::PhysicalDeviceLimits,
     debug_device: Option<ash::ext::debug_utils::Device>,
     acceleration: Option<Acceleration>,
     constants: Constants,
 }
-
-/// A small buffer that is made before everything else and outlives every recording, in memory of its own: a word of ones, the device count of whoever
-/// knows the count on the host, and room to name where a kernel's optional array is not there.
-#[derive(Default)]
-struct Constants {
-    buffer: vk::Buffer,
-    memory: vk::DeviceMemory,
-    address: u64,
-}
-
-/// Its bytes.
-const CONSTANTS: u64 = 512;
 
 /// An allocator of our own.
 fn make_allocator(foundation: &Foundation) -> Result<Arc<Mutex<Allocator>>> {
@@ -167,20 +109,11 @@ impl Gpu {
         let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
         target.check(&report.room)?;
         let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(&foundation), Ok)?;
-        let cache = if let Some(cache) = foundation.pipeline_cache {
-            cache
-        } else {
-            let stored = options.pipeline_cache.as_ref().and_then(|f| std::fs::read(f).ok()).unwrap_or_default();
-            let info = vk::PipelineCacheCreateInfo::default().initial_data(&stored);
-            // SAFETY: drivers check the header of the data and ignore what is not theirs.
-            unsafe { device.create_pipeline_cache(&info, None) }.map_err(failed("vkCreatePipelineCache"))?
-        };
+        let pipelines = Pipelines::new(&foundation, options.pipeline_cache.clone())?;
         let traced = requirements.ray_tracing;
         let mut inner = Inner {
             allocator: Some(allocator),
-            pipelines: RwLock::default(),
-            cache,
-            cache_file: options.pipeline_cache.clone(),
+            pipelines,
             binding,
             limits,
             debug_device: foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device)),
@@ -188,29 +121,12 @@ impl Gpu {
             constants: Constants::default(),
             foundation,
         };
-        inner.make_constants()?;
+        inner.constants.make(&inner.foundation, inner.debug_device.as_ref())?;
         let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
         }
         Ok(gpu)
-    }
-
-    /// The pipeline of a kernel with these constants, compiled at first use.
-    pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
-        let key = (K::INFO.name, spec.values());
-        if let Some(found) = self.inner.pipelines.read().unwrap_or_else(PoisonError::into_inner).get(&key) {
-            return Ok(*found);
-        }
-        let made = create_pipeline(self, K::INFO, &key.1)?;
-        match self.inner.pipelines.write().unwrap_or_else(PoisonError::into_inner).entry(key) {
-            Entry::Vacant(place) => Ok(*place.insert(made)),
-            Entry::Occupied(first) => {
-                // SAFETY: another thread was first, and nobody has got this one.
-                unsafe { made.destroy(self.device()) };
-                Ok(*first.get())
-            }
-        }
     }
 
     /// What the device is.
@@ -334,8 +250,13 @@ impl Gpu {
         self.inner.acceleration.as_ref()
     }
 
+    /// The pipelines made so far.
+    pub(super) fn pipelines(&self) -> &Pipelines {
+        &self.inner.pipelines
+    }
+
     pub(crate) fn pipeline_cache(&self) -> vk::PipelineCache {
-        self.inner.cache
+        self.inner.pipelines.cache
     }
 
     pub(crate) fn debug_device(&self) -> Option<&ash::ext::debug_utils::Device> {
@@ -359,85 +280,12 @@ impl Gpu {
 
     /// A buffer whose first word is all ones.
     pub(crate) fn unbounded(&self) -> BufferRef {
-        self.constant_buffer().part(0, 16)
+        self.inner.constants.unbounded()
     }
 
     /// A buffer to name where a kernel's optional array is not there.
     pub(crate) fn nothing(&self) -> BufferRef {
-        self.constant_buffer().part(256, 16)
-    }
-
-    fn constant_buffer(&self) -> BufferRef {
-        let Constants { buffer, address, .. } = self.inner.constants;
-        BufferRef { buffer, offset: 0, size: CONSTANTS, address }
-    }
-
-    /// A device-local buffer; see [`Buffer::new`].
-    ///
-    /// # Errors
-    /// [`Error::Memory`].
-    pub fn buffer(&self, name: &str, size: u64) -> Result<Buffer> {
-        Buffer::new(self, name, size)
-    }
-}
-
-impl Inner {
-    /// Makes the constants; what there is of them when something fails goes with the rest.
-    fn make_constants(&mut self) -> Result<()> {
-        let Foundation { instance, physical, device, report, .. } = &self.foundation;
-        let addresses = report.requirements.buffer_addresses;
-        let mut usage = super::memory::USAGE;
-        let mut flags = vk::MemoryAllocateFlagsInfo::default();
-        if addresses {
-            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-            flags = flags.flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
-        }
-        let made = &mut self.constants;
-        // SAFETY: plain creation, binding and mapping of one small host-visible buffer; freed in `drop`.
-        unsafe {
-            let info = vk::BufferCreateInfo::default().size(CONSTANTS).usage(usage);
-            made.buffer = device.create_buffer(&info, None).map_err(failed("vkCreateBuffer"))?;
-            let needs = device.get_buffer_memory_requirements(made.buffer);
-            let memory = instance.get_physical_device_memory_properties(*physical);
-            let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-            let find = |wanted| {
-                (0..memory.memory_type_count)
-                    .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted))
-            };
-            // Every invocation reads the word: beside the device, if there is room, and not across a bus.
-            let mut allocated = Err(Error::NoDevice("no host-visible memory for buffers".into()));
-            for kind in [wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL, wanted].into_iter().filter_map(find) {
-                let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
-                allocated = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"));
-                if allocated.is_ok() {
-                    break;
-                }
-            }
-            made.memory = allocated?;
-            device.bind_buffer_memory(made.buffer, made.memory, 0).map_err(failed("vkBindBufferMemory"))?;
-            let mapped = device.map_memory(made.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).map_err(failed("vkMapMemory"))?;
-            mapped.cast::<u32>().write(u32::MAX);
-            device.unmap_memory(made.memory);
-            super::debug::name(self.debug_device.as_ref(), made.buffer, "olbvh.constants");
-            if addresses {
-                made.address = device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(made.buffer));
-            }
-        }
-        Ok(())
-    }
-
-    /// Writes the pipeline cache beside its file and renames it, so that readers never see half of it.
-    fn save_cache(&self) -> Option<()> {
-        let file = self.cache_file.as_ref()?;
-        // SAFETY: the cache belongs to this device, which is alive.
-        let data = unsafe { self.foundation.device.get_pipeline_cache_data(self.cache) }.ok()?;
-        if std::fs::read(file).is_ok_and(|stored| stored == data) {
-            return None;
-        }
-        std::fs::create_dir_all(file.parent()?).ok()?;
-        let temporary = file.with_extension(format!("{}.tmp", std::process::id()));
-        std::fs::write(&temporary, data).ok()?;
-        std::fs::rename(&temporary, file).ok()
+        self.inner.constants.nothing()
     }
 }
 
@@ -445,7 +293,7 @@ impl Drop for Inner {
     fn drop(&mut self) {
         let Foundation { device, pipeline_cache, ours, .. } = &self.foundation;
         if pipeline_cache.is_none() {
-            self.save_cache();
+            self.pipelines.save(device);
         }
         // SAFETY: whoever uses the device holds an `Arc` of it, and a host has waited for what it recorded (see `from_raw`), so nothing is in
         // use any more; children go before parents, and what is the host's stays.
@@ -453,14 +301,8 @@ impl Drop for Inner {
             if ours.is_some() {
                 let _ = device.device_wait_idle();
             }
-            for p in self.pipelines.get_mut().map(std::mem::take).unwrap_or_default().into_values() {
-                p.destroy(device);
-            }
-            if pipeline_cache.is_none() {
-                device.destroy_pipeline_cache(self.cache, None);
-            }
-            device.destroy_buffer(self.constants.buffer, None);
-            device.free_memory(self.constants.memory, None);
+            self.pipelines.destroy(&self.foundation);
+            self.constants.destroy(device);
         }
         drop(self.allocator.take());
     }

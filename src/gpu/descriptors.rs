@@ -1,8 +1,8 @@
 //! Descriptor sets of recordings, where kernels get their buffers by descriptors.
 
+use super::buffer_ref::BufferRef;
 use super::context::Gpu;
 use super::failed;
-use super::memory::BufferRef;
 use crate::error::{Error, Result};
 use ash::vk;
 

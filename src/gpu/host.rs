@@ -1,6 +1,7 @@
 //! A device of the host's: what it must have enabled, and what it lends.
 
-use super::context::{Foundation, Gpu, GpuOptions};
+use super::context::{Gpu, GpuOptions};
+use super::foundation::Foundation;
 use super::requirements::{DeviceReport, RayTracing, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;

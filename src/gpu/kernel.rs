@@ -1,7 +1,8 @@
 //! What is known of a kernel at build time, and its pipelines.
 
+use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
-use super::memory::BufferRef;
+use super::pipelines::Pipeline;
 use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -46,29 +47,6 @@ pub(crate) trait Kernel {
     fn buffers(&self) -> Vec<BufferRef>;
     /// Writes the scalars into the push-constant bytes, which begin at `base`.
     fn scalars(&self, base: usize, out: &mut [u8]);
-}
-
-/// A pipeline with its layouts.
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Pipeline {
-    pub handle: vk::Pipeline,
-    pub layout: vk::PipelineLayout,
-    pub set_layout: vk::DescriptorSetLayout,
-}
-
-impl Pipeline {
-    /// Destroys what there is of it.
-    ///
-    /// # Safety
-    /// It is of this device, and nothing uses it any more.
-    pub(super) unsafe fn destroy(self, device: &ash::Device) {
-        // SAFETY: as the caller vouches; null handles are passed over.
-        unsafe {
-            device.destroy_pipeline(self.handle, None);
-            device.destroy_pipeline_layout(self.layout, None);
-            device.destroy_descriptor_set_layout(self.set_layout, None);
-        }
-    }
 }
 
 impl KernelInfo {
@@ -120,8 +98,20 @@ pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
     arguments.buffers().into_iter().zip(K::INFO.buffers).map(|(b, i)| (b, i.access != Access::Read)).collect()
 }
 
+impl Gpu {
+    /// The pipeline of a kernel with these constants, compiled at first use.
+    pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
+        let key = (K::INFO.name, spec.values());
+        if let Some(found) = self.pipelines().find(&key) {
+            return Ok(found);
+        }
+        let made = create_pipeline(self, K::INFO, &key.1)?;
+        Ok(self.pipelines().keep(self.device(), key, made))
+    }
+}
+
 /// Compiles a kernel for a device.
-pub(crate) fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
+fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Result<Pipeline> {
     let mut made = Pipeline::default();
     let compiled = compile(gpu, info, constants, &mut made);
     if compiled.is_err() {

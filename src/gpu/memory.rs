@@ -1,83 +1,18 @@
-//! Buffers from gpu-allocator, and references to parts of buffers.
+//! Buffers from gpu-allocator.
 
+use super::buffer_ref::{BufferRef, USAGE};
 use super::context::Gpu;
 use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-/// Usage of every buffer that kernels touch, whatever the device; the host's need what [`Gpu::usage`] says.
-pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
-    vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
-        | vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
-        | vk::BufferUsageFlags::TRANSFER_DST.as_raw()
-        | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
-);
 
 /// Offsets of arrays within a buffer are multiples of this: enough for every device's storage-buffer offsets and 16-byte loads.
 pub const ALIGNMENT: u64 = 256;
 
 /// Addresses of buffers are multiples of this, whatever the device asks for: kernels load 16 bytes at once.
 const LEAST_ALIGNMENT: u64 = 16;
-
-/// A part of a buffer, ours or the host's: what kernels get as an argument. It does not keep the buffer: that must live until commands that were recorded
-/// with it have been executed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct BufferRef {
-    pub(crate) buffer: vk::Buffer,
-    pub(crate) offset: u64,
-    pub(crate) size: u64,
-    pub(crate) address: u64,
-}
-
-impl BufferRef {
-    /// A part of a buffer of the host's, `size` bytes from `offset` on. `address`: device address of the first byte, 0 where the device has no buffer addresses.
-    ///
-    /// # Safety
-    /// The buffer belongs to the device that the part is used on, has the usage of [`Gpu::usage`], and so many bytes, at
-    /// that address.
-    pub unsafe fn from_raw(buffer: vk::Buffer, offset: u64, size: u64, address: u64) -> Self {
-        Self { buffer, offset, size, address }
-    }
-
-    /// The buffer.
-    pub fn buffer(self) -> vk::Buffer {
-        self.buffer
-    }
-
-    /// Bytes from the buffer's start.
-    pub fn offset(self) -> u64 {
-        self.offset
-    }
-
-    /// Bytes.
-    pub fn size(self) -> u64 {
-        self.size
-    }
-
-    /// Device address of the first byte; 0 where the device has no buffer addresses.
-    pub fn address(self) -> u64 {
-        self.address
-    }
-
-    /// The part from `offset`, `size` bytes long, both within this part; what is not is cut off.
-    #[must_use]
-    pub fn part(self, offset: u64, size: u64) -> Self {
-        debug_assert!(offset + size <= self.size, "part {offset}+{size} of {}", self.size);
-        let offset = offset.min(self.size);
-        let size = size.min(self.size - offset);
-        let address = if self.address == 0 { 0 } else { self.address + offset };
-        Self { buffer: self.buffer, offset: self.offset + offset, size, address }
-    }
-
-    /// The 4-byte word at index `i`.
-    #[must_use]
-    pub fn word(self, i: u64) -> Self {
-        self.part(4 * i, 4)
-    }
-}
 
 /// A buffer with memory of its own, freed when dropped.
 pub struct Buffer {
@@ -89,40 +24,6 @@ pub struct Buffer {
     size: u64,
     address: u64,
     name: String,
-}
-
-/// What the buffers of a [`Gpu`] take together, and how much that may be.
-#[derive(Debug)]
-pub(super) struct Ledger {
-    limit: u64,
-    used: AtomicU64,
-    peak: AtomicU64,
-}
-
-impl Ledger {
-    pub(super) fn new(limit: u64) -> Self {
-        Self { limit, used: AtomicU64::new(0), peak: AtomicU64::new(0) }
-    }
-
-    pub(super) fn limit(&self) -> u64 {
-        self.limit
-    }
-
-    pub(super) fn left(&self) -> u64 {
-        self.limit - self.used.load(Ordering::Relaxed).min(self.limit)
-    }
-
-    pub(super) fn peak(&self) -> u64 {
-        self.peak.load(Ordering::Relaxed)
-    }
-
-    /// Counts so many bytes more, or says how many are in use.
-    fn claim(&self, bytes: u64) -> Result<(), u64> {
-        let more = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.limit);
-        let before = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more)?;
-        self.peak.fetch_max(before + bytes, Ordering::Relaxed);
-        Ok(())
-    }
 }
 
 impl Buffer {
@@ -160,7 +61,7 @@ impl Buffer {
             AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
         let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, claimed: 0, size, address: 0, name: name.into() };
         if let Some(ledger) = gpu.ledger() {
-            let full = |used: u64| memory_error(format!("{used} of the {} bytes that may be used are in use", ledger.limit));
+            let full = |used: u64| memory_error(format!("{used} of the {} bytes that may be used are in use", ledger.limit()));
             ledger.claim(requirements.size).map_err(full)?;
             buffer.claimed = requirements.size;
         }
@@ -216,6 +117,16 @@ impl Buffer {
     }
 }
 
+impl Gpu {
+    /// A device-local buffer; see [`Buffer::new`].
+    ///
+    /// # Errors
+    /// [`Error::Memory`].
+    pub fn buffer(&self, name: &str, size: u64) -> Result<Buffer> {
+        Buffer::new(self, name, size)
+    }
+}
+
 impl std::fmt::Debug for Buffer {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "Buffer({}, {} bytes)", self.name, self.size)
@@ -227,7 +138,7 @@ impl Drop for Buffer {
         // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
         unsafe { self.gpu.device().destroy_buffer(self.handle, None) };
         if let Some(ledger) = self.gpu.ledger() {
-            ledger.used.fetch_sub(self.claimed, Ordering::Relaxed);
+            ledger.release(self.claimed);
         }
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.gpu.allocator().lock())
             && let Err(e) = allocator.free(allocation)

@@ -2,24 +2,31 @@
 #![allow(unsafe_code)]
 
 mod acceleration;
+mod buffer_ref;
+mod constants;
 mod context;
 mod debug;
 mod descriptors;
+mod foundation;
 mod host;
 mod kernel;
+mod ledger;
 mod memory;
 mod open;
+mod pipelines;
+mod ray_functions;
 mod ray_pipeline;
 mod recorder;
 mod requirements;
 mod submit;
 
 pub use acceleration::{AccelerationStructure, Triangles};
+pub use buffer_ref::{BufferRef, USAGE};
 pub use context::{Binding, Gpu, GpuOptions};
 pub use descriptors::{DescriptorPools, DescriptorRoom};
 pub use host::{Enabled, HostDevice};
 pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
-pub use memory::{ALIGNMENT, Buffer, BufferRef, USAGE};
+pub use memory::{ALIGNMENT, Buffer};
 pub use open::list_devices;
 pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;

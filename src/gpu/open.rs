@@ -1,8 +1,9 @@
 //! A device of our own: chosen, checked, opened.
 
-use super::context::{Foundation, Gpu, GpuOptions, Ours};
+use super::context::{Gpu, GpuOptions};
 use super::debug::DebugUtils;
 use super::failed;
+use super::foundation::{Foundation, Ours};
 use super::requirements::{DeviceReport, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;

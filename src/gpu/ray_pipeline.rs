@@ -4,6 +4,7 @@
 use super::context::{Binding, Gpu};
 use super::kernel::{Kernel, KernelInfo, push_constants, uses};
 use super::memory::Buffer;
+use super::ray_functions::RayFunctions;
 use super::recorder::Recorder;
 use super::{debug, failed};
 use crate::error::{Error, Result};
@@ -12,31 +13,6 @@ use gpu_allocator::MemoryLocation;
 
 /// Rays of one row of a launch.
 const ROW: u32 = 1 << 16;
-
-/// Functions and properties of the extension.
-pub(super) struct RayFunctions {
-    functions: ash::khr::ray_tracing_pipeline::Device,
-    handle_bytes: u32,
-    /// Of the tables, a multiple of that of handles.
-    alignment: u32,
-    most_rays: u32,
-}
-
-impl RayFunctions {
-    /// Of a device that was made with the extension.
-    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
-        let mut limits = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
-        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
-        // SAFETY: the handle is one of this instance; the structs live until the call returns.
-        unsafe { instance.get_physical_device_properties2(physical, &mut properties) };
-        Self {
-            functions: ash::khr::ray_tracing_pipeline::Device::new(instance, device),
-            handle_bytes: limits.shader_group_handle_size,
-            alignment: limits.shader_group_base_alignment.max(1),
-            most_rays: limits.max_ray_dispatch_invocation_count,
-        }
-    }
-}
 
 fn extension(gpu: &Gpu) -> Result<&RayFunctions> {
     let functions = gpu.acceleration().and_then(|a| a.pipelines.as_ref());

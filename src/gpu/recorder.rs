@@ -3,10 +3,10 @@
 //! The recorder knows from reflection which buffers each kernel reads and writes. It checks, as the work is recorded, that no dispatch
 //! meets an earlier one's writes (or writes what an earlier one reads) without a barrier between them.
 
+use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
 use super::descriptors::{DescriptorPools, DescriptorRoom};
 use super::kernel::{Kernel, push_constants, uses};
-use super::memory::BufferRef;
 use crate::error::{Error, Result};
 use ash::vk;
 

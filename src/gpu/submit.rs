@@ -1,8 +1,9 @@
 //! The convenient side: record, submit, wait; move bytes to the device and back.
 
+use super::buffer_ref::BufferRef;
 use super::context::Gpu;
 use super::failed;
-use super::memory::{Buffer, BufferRef};
+use super::memory::Buffer;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
 use ash::vk;

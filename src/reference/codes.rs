@@ -11,6 +11,7 @@ use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::Assign;
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Primitives per task.
 const CHUNK: usize = 1 << 14;
@@ -118,6 +119,21 @@ impl Stage<'_> {
             }
         });
         Ok(entries)
+    }
+}
+
+impl Marks {
+    /// Marks the cells of the boundary primitives of a stage.
+    pub fn new(stage: &Stage<'_>) -> Self {
+        let words: Vec<AtomicU32> = (0..(1usize << (3 * stage.grid.level)).div_ceil(32)).map(|_| AtomicU32::new(0)).collect();
+        let all = Stage { marks: None, ..*stage };
+        (0..stage.mesh.tets.len() as u32).into_par_iter().filter(|&t| stage.topology.is_boundary(t)).for_each(|t| {
+            all.each_cell(t, |cell| {
+                let code = morton(cell);
+                words[(code / 32) as usize].fetch_or(1 << (code % 32), Relaxed);
+            });
+        });
+        Self(words.into_iter().map(AtomicU32::into_inner).collect())
     }
 }
 

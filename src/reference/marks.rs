@@ -5,31 +5,15 @@
 //! come within the margin of their faces, at least one, stand for it.
 
 use super::boundary::{NONE, bit};
-use super::codes::Stage;
 use super::grid::morton;
 use super::tet::{Tet, Vec3};
 use super::walk::Walker;
-use rayon::prelude::*;
-use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// One bit per cell of the level of the leaves, by Morton code.
 #[derive(Clone, Debug)]
-pub struct Marks(Vec<u32>);
+pub struct Marks(pub(super) Vec<u32>);
 
 impl Marks {
-    /// Marks the cells of the boundary primitives of a stage.
-    pub fn new(stage: &Stage<'_>) -> Self {
-        let words: Vec<AtomicU32> = (0..(1usize << (3 * stage.grid.level)).div_ceil(32)).map(|_| AtomicU32::new(0)).collect();
-        let all = Stage { marks: None, ..*stage };
-        (0..stage.mesh.tets.len() as u32).into_par_iter().filter(|&t| stage.topology.is_boundary(t)).for_each(|t| {
-            all.each_cell(t, |cell| {
-                let code = morton(cell);
-                words[(code / 32) as usize].fetch_or(1 << (code % 32), Relaxed);
-            });
-        });
-        Self(words.into_iter().map(AtomicU32::into_inner).collect())
-    }
-
     /// Whether the boundary touches the cell.
     pub fn contains(&self, cell: [u32; 3]) -> bool {
         bit(&self.0, morton(cell))

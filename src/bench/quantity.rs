@@ -1,0 +1,91 @@
+//! What is measured.
+
+use serde::Serialize;
+
+/// What is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Quantity {
+    /// Construction.
+    Build,
+    /// Ray intervals of a picture.
+    Intervals,
+    /// March of a picture, counting the samples in the mesh.
+    March,
+    /// Conservative slicing.
+    Slice,
+    /// Overlap with the moved mesh.
+    Overlap,
+    /// Location of points in no order.
+    LocateRandom,
+    /// Location of points along a Z curve.
+    LocateCoherent,
+    /// Location of the samples of a picture, each by itself.
+    LocateSamples,
+    /// Location of points in no order by the paper's traversal.
+    TraverseRandom,
+    /// Location of points along a Z curve by the paper's traversal.
+    TraverseCoherent,
+}
+
+impl Quantity {
+    /// All, in the paper's order.
+    pub const ALL: [Self; 10] = [
+        Self::Build,
+        Self::Intervals,
+        Self::March,
+        Self::LocateSamples,
+        Self::Slice,
+        Self::Overlap,
+        Self::LocateRandom,
+        Self::LocateCoherent,
+        Self::TraverseRandom,
+        Self::TraverseCoherent,
+    ];
+
+    /// The same points, located by the paper's traversal.
+    pub(super) fn traversed(self) -> Option<Self> {
+        match self {
+            Self::LocateRandom => Some(Self::TraverseRandom),
+            Self::LocateCoherent => Some(Self::TraverseCoherent),
+            _ => None,
+        }
+    }
+
+    /// Title of a table, with the paper's.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Build => "Construction (Fig. 6)",
+            Self::Intervals => "Ray intervals (Table 3)",
+            Self::March => "Samples inside the mesh, ray marching (Fig. 7)",
+            Self::Slice => "Conservative slicing (Fig. 8)",
+            Self::Overlap => "Overlap with the moved mesh (Fig. 10)",
+            Self::LocateRandom => "Point location, random points",
+            Self::LocateCoherent => "Point location, points along a Z curve",
+            Self::LocateSamples => "Samples inside the mesh, each located by itself (Fig. 7)",
+            Self::TraverseRandom => "Point location by the paper's traversal, random points",
+            Self::TraverseCoherent => "Point location by the paper's traversal, points along a Z curve",
+        }
+    }
+
+    /// Name of a file.
+    pub fn stem(self) -> &'static str {
+        match self {
+            Self::Build => "fig06_construction",
+            Self::Intervals => "table3_ray_intervals",
+            Self::March => "fig07_samples",
+            Self::Slice => "fig08_slicing",
+            Self::Overlap => "fig10_overlap",
+            Self::LocateRandom => "location_random",
+            Self::LocateCoherent => "location_coherent",
+            Self::LocateSamples => "fig07_samples_located",
+            Self::TraverseRandom => "location_random_traversal",
+            Self::TraverseCoherent => "location_coherent_traversal",
+        }
+    }
+
+    /// Whether it is told in items per second, not in milliseconds.
+    pub fn is_rate(self) -> bool {
+        !matches!(self, Self::Build | Self::Intervals | Self::Slice | Self::Overlap)
+    }
+}

@@ -1,0 +1,60 @@
+//! Arrays of files, and the names of the fields that they become.
+
+use std::collections::{HashMap, HashSet};
+
+use super::budget::Budget;
+use crate::mesh::On;
+
+/// An array of a file: `components` values per point or per cell of the file.
+pub(crate) struct Array {
+    pub name: String,
+    pub on: On,
+    pub components: usize,
+    pub values: Vec<f32>,
+}
+
+impl Array {
+    /// Fills it up to `tuples` with NaN where it is shorter; an error that tells the limit where the budget does not allow that.
+    pub fn fill(&mut self, tuples: usize, budget: &mut Budget) -> Result<(), String> {
+        let wanted = tuples * self.components;
+        let missing = wanted.saturating_sub(self.values.len());
+        budget.spend((missing * size_of::<f32>()) as u64)?;
+        if missing > 0 {
+            self.values.resize(wanted, f32::NAN);
+        }
+        Ok(())
+    }
+
+    /// What the names of its fields have behind its own.
+    pub fn suffixes(&self) -> &'static [&'static str] {
+        match self.components {
+            1 => &[""],
+            3 => &["", ".x", ".y", ".z"],
+            n => &[".0", ".1", ".2", ".3", ".4", ".5", ".6", ".7", ".8"][..n],
+        }
+    }
+}
+
+/// The names that fields have so far.
+#[derive(Default)]
+pub(crate) struct Names {
+    taken: HashSet<String>,
+    /// How many names were tried in place of one, so that many arrays of one name do not try the same ones.
+    tried: HashMap<(String, On), usize>,
+}
+
+impl Names {
+    /// A name for an array: its own, unless a field has that of one of its fields.
+    pub fn free(&mut self, array: &Array) -> String {
+        let fields = |name: &str| array.suffixes().iter().map(|suffix| format!("{name}{suffix}")).collect::<Vec<_>>();
+        let mut name = array.name.clone();
+        while fields(&name).iter().any(|field| self.taken.contains(field)) {
+            let word = if array.on == On::Cells { "cells" } else { "again" };
+            let tried = self.tried.entry((array.name.clone(), array.on)).or_default();
+            *tried += 1;
+            name = if *tried == 1 { format!("{} ({word})", array.name) } else { format!("{} ({word} {tried})", array.name) };
+        }
+        self.taken.extend(fields(&name));
+        name
+    }
+}

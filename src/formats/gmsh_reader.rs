@@ -1,0 +1,143 @@
+//! What all sections of Gmsh files are read with: numbers as text or binary, in the version and byte order that the first section tells.
+
+use super::scalar::{Number, Scalar};
+use super::source::{Source, Tokens, printable};
+use crate::error::{Error, Result};
+
+/// A version of the format.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Version {
+    V2,
+    V40,
+    V41,
+}
+
+/// Reads numbers as text or binary.
+pub(crate) struct Reader<'a> {
+    pub source: &'a Source,
+    pub tokens: Tokens<'a>,
+    pub binary: bool,
+    big_endian: bool,
+}
+
+impl<'a> Reader<'a> {
+    pub fn new(source: &'a Source) -> Self {
+        let tokens = Tokens::new(source, 0..source.bytes.len(), None);
+        Self { source, tokens, binary: false, big_endian: false }
+    }
+
+    /// Refuses a second section of a kind.
+    pub fn once(&self, seen: &mut bool, name: &[u8], at: usize) -> Result<()> {
+        if std::mem::replace(seen, true) {
+            return Err(self.source.error_line(at, format!("a second section ${}", printable(name))));
+        }
+        Ok(())
+    }
+
+    /// Reads the first section.
+    pub fn format(&mut self) -> Result<Version> {
+        let (number, at) = self.tokens.word("the version")?;
+        let version = match number {
+            b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
+            b"4" | b"4.0" => Version::V40,
+            b"4.1" => Version::V41,
+            other => return Err(old(self.source, at, &printable(other))),
+        };
+        self.binary = match self.tokens.integer("the file type (0 or 1)")? {
+            0 => false,
+            1 => true,
+            other => return Err(self.source.error_line(at, format!("file type {other}, neither 0 (text) nor 1 (binary)"))),
+        };
+        let size = self.tokens.integer("the data size")?;
+        if self.binary {
+            if size != 8 {
+                return Err(self.source.error_line(at, format!("binary data of size {size}; 8 is the only one that can be read")));
+            }
+            self.tokens.line();
+            let probe = self.source.bytes.get(self.tokens.at..self.tokens.at + 4).unwrap_or_default();
+            self.big_endian = match probe {
+                [1, 0, 0, 0] => false,
+                [0, 0, 0, 1] => true,
+                other => {
+                    return Err(self
+                        .source
+                        .error_byte(self.tokens.at, format!("{other:?} where the integer 1 should tell the byte order")));
+                }
+            };
+            self.tokens.at += 4;
+        }
+        self.end(b"$EndMeshFormat")?;
+        Ok(version)
+    }
+
+    /// Reads the end of a section.
+    pub fn end(&mut self, name: &[u8]) -> Result<()> {
+        let (token, at) = self.tokens.word(&printable(name))?;
+        if token == name {
+            return Ok(());
+        }
+        let message = format!("`{}` where {} should be", printable(token), printable(name));
+        Err(if self.binary { self.source.error_byte(at, message) } else { self.source.error_line(at, message) })
+    }
+
+    /// Skips a section by looking for its end.
+    pub fn skip(&mut self, name: &[u8], at: usize) -> Result<()> {
+        let end = [b"$End", name].concat();
+        let rest = &self.source.bytes[self.tokens.at..];
+        let found = rest.windows(end.len()).position(|w| w == end);
+        let found = found.ok_or_else(|| self.source.error_line(at, format!("section ${0} without $End{0}", printable(name))))?;
+        self.tokens.at += found + end.len();
+        Ok(())
+    }
+
+    /// Bytes of binary data.
+    fn bytes(&mut self, n: usize, what: &str) -> Result<&[u8]> {
+        let at = self.tokens.at;
+        let end = at.checked_add(n).filter(|&end| end <= self.source.bytes.len());
+        let end = end.ok_or_else(|| self.source.error_byte(at, format!("the file ends where {what} should be")))?;
+        self.tokens.at = end;
+        Ok(&self.source.bytes[at..end])
+    }
+
+    fn number<T: Number + Default>(&mut self, scalar: Scalar, what: &str) -> Result<T> {
+        let big = self.big_endian;
+        let bytes = self.bytes(scalar.size(), what)?;
+        Ok(scalar.convert(bytes, big).first().copied().unwrap_or_default())
+    }
+
+    /// An integer of 4 bytes in binary.
+    pub fn int(&mut self, what: &str) -> Result<i64> {
+        if self.binary { self.number(Scalar::I32, what) } else { self.tokens.integer(what) }
+    }
+
+    /// An unsigned integer of 8 bytes in binary, which counts or numbers something.
+    pub fn long(&mut self, what: &str) -> Result<i64> {
+        if self.binary { self.number(Scalar::U64, what) } else { self.tokens.integer(what) }
+    }
+
+    /// A number of 8 bytes in binary.
+    pub fn real(&mut self, what: &str) -> Result<f64> {
+        if self.binary { self.number(Scalar::F64, what) } else { self.tokens.float(what) }
+    }
+
+    /// How many things follow, of at least `each` bytes in binary and two in text.
+    pub fn bounded(&self, n: i64, each: usize, what: &str) -> Result<usize> {
+        let room = self.tokens.left() / if self.binary { each.max(1) } else { 2 } + 1;
+        usize::try_from(n).ok().filter(|&n| n <= room).ok_or_else(|| {
+            let message = format!("{n} {what} are announced, but the rest of the file has room for {room} at most");
+            if self.binary { self.source.error_byte(self.tokens.at, message) } else { self.source.error_line(self.tokens.at, message) }
+        })
+    }
+
+    pub fn point(&mut self) -> Result<[f64; 3]> {
+        Ok([self.real("a coordinate")?, self.real("a coordinate")?, self.real("a coordinate")?])
+    }
+}
+
+/// The error for a version that cannot be read.
+pub(crate) fn old(source: &Source, at: usize, version: &str) -> Error {
+    source.error_line(
+        at,
+        format!("Gmsh format {version}; 2.2, 4.0 and 4.1 can be read: convert it with `gmsh IN -save -format msh41 -o OUT.msh`"),
+    )
+}

@@ -1,0 +1,42 @@
+//! How much memory buffers take, where that has a limit.
+
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// What the buffers of a [`super::Gpu`] take together, and how much that may be.
+#[derive(Debug)]
+pub(super) struct Ledger {
+    limit: u64,
+    used: AtomicU64,
+    peak: AtomicU64,
+}
+
+impl Ledger {
+    pub(super) fn new(limit: u64) -> Self {
+        Self { limit, used: AtomicU64::new(0), peak: AtomicU64::new(0) }
+    }
+
+    pub(super) fn limit(&self) -> u64 {
+        self.limit
+    }
+
+    pub(super) fn left(&self) -> u64 {
+        self.limit - self.used.load(Ordering::Relaxed).min(self.limit)
+    }
+
+    pub(super) fn peak(&self) -> u64 {
+        self.peak.load(Ordering::Relaxed)
+    }
+
+    /// Counts so many bytes more, or says how many are in use.
+    pub(super) fn claim(&self, bytes: u64) -> Result<(), u64> {
+        let more = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.limit);
+        let before = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more)?;
+        self.peak.fetch_max(before + bytes, Ordering::Relaxed);
+        Ok(())
+    }
+
+    /// Counts so many bytes less.
+    pub(super) fn release(&self, bytes: u64) {
+        self.used.fetch_sub(bytes, Ordering::Relaxed);
+    }
+}

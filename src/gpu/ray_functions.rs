@@ -1,0 +1,53 @@
+//! Functions and limits of the extensions that trace rays.
+
+use ash::vk;
+
+/// Functions and limits of `VK_KHR_acceleration_structure`.
+pub(super) struct Acceleration {
+    pub functions: ash::khr::acceleration_structure::Device,
+    pub scratch_alignment: u64,
+    pub most_triangles: u64,
+    /// Those of ray-tracing pipelines, where they are enabled too.
+    pub pipelines: Option<RayFunctions>,
+}
+
+impl Acceleration {
+    /// Of a device that was made with the extension, and perhaps with ray-tracing pipelines.
+    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device, pipelines: bool) -> Self {
+        let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
+        // SAFETY: the handle is one of this instance; the structs live until the call returns.
+        unsafe { instance.get_physical_device_properties2(physical, &mut properties) };
+        Self {
+            functions: ash::khr::acceleration_structure::Device::new(instance, device),
+            scratch_alignment: u64::from(limits.min_acceleration_structure_scratch_offset_alignment.max(1)),
+            most_triangles: limits.max_primitive_count,
+            pipelines: pipelines.then(|| RayFunctions::new(instance, physical, device)),
+        }
+    }
+}
+
+/// Functions and limits of `VK_KHR_ray_tracing_pipeline`.
+pub(super) struct RayFunctions {
+    pub functions: ash::khr::ray_tracing_pipeline::Device,
+    pub handle_bytes: u32,
+    /// Of the tables, a multiple of that of handles.
+    pub alignment: u32,
+    pub most_rays: u32,
+}
+
+impl RayFunctions {
+    /// Of a device that was made with the extension.
+    pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
+        let mut limits = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
+        let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
+        // SAFETY: the handle is one of this instance; the structs live until the call returns.
+        unsafe { instance.get_physical_device_properties2(physical, &mut properties) };
+        Self {
+            functions: ash::khr::ray_tracing_pipeline::Device::new(instance, device),
+            handle_bytes: limits.shader_group_handle_size,
+            alignment: limits.shader_group_base_alignment.max(1),
+            most_rays: limits.max_ray_dispatch_invocation_count,
+        }
+    }
+}
