@@ -84,7 +84,7 @@ impl<'a> Source<'a> {
     pub(super) fn whole(&self) -> Block {
         let cells = CellRange { lo: [0; 3], hi: [(1 << self.level) - 1; 3] };
         let tets: Vec<u32> = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.topology.is_valid(t)).collect();
-        self.block(cells, &tets)
+        self.sized(cells, tets, self.mesh.points.len() as u32)
     }
 
     fn cells_of(&self, tet: u32) -> CellRange {
@@ -98,11 +98,17 @@ impl<'a> Source<'a> {
         // Whoever shares a face has three of its corners; the core has four.
         let beside = |t: &u32| self.mesh.tets[*t as usize].into_iter().filter(|&v| marks.holds(v)).count() >= 3;
         let tets: Vec<u32> = among.par_iter().copied().filter(beside).collect();
+        let points = marks.count() + (tets.len() - core.len()) as u32;
+        self.sized(cells, tets, points)
+    }
+
+    /// A block of these tetrahedra, which have so many points at most.
+    fn sized(&self, cells: CellRange, tets: Vec<u32>, points: u32) -> Block {
         let extent =
             tets.par_iter().fold(Extent::default, |sum, &t| sum.with(cells, self.cells_of(t))).reduce(Extent::default, Extent::and);
         let Extent { span, reach, candidates, crossing } = extent;
         let size = Size {
-            points: marks.count() + (tets.len() - core.len()) as u32,
+            points,
             tets: tets.len(),
             candidates,
             // Lists are long outside of the own cells, where the boundary of the block is, and where the surface of the mesh is.
