@@ -12,6 +12,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
 use olbvh::render::{Bounds, Plan, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
+use std::any::Any;
 use std::fmt::Debug;
 
 fn refused<T: Debug>(what: &str, words: &str, result: olbvh::Result<T>) {
@@ -68,4 +69,29 @@ fn another_device_is_refused() {
     refused("overlap", "on another device", overlap(a, b, false, &|_, _| {}));
     let same = gpu.with_memory(1 << 20).with_target(gpu.target().clone()).unwrap();
     Tree::build(&same, &here, &options).unwrap();
+}
+
+/// What is built over a mesh keeps the mesh's memory: a mesh that got the same place later would be taken for the first.
+#[test]
+fn trees_keep_the_place_of_their_mesh() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 24);
+    let mesh = kuhn([3; 3]).unwrap();
+    let whole = gpu.memory_left();
+    let upload = || DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let builders: [(&str, &dyn Fn(&DeviceMesh) -> Option<Box<dyn Any>>); 3] = [
+        ("tree", &|on| Some(Box::new(Tree::build(&gpu, on, &BuildOptions::default()).unwrap()))),
+        ("LBVH", &|on| Some(Box::new(Lbvh::build(&gpu, on).unwrap()))),
+        ("rays", &|on| Rays::build(&gpu, on, RayMethod::Query).unwrap().map(|rays| Box::new(rays) as Box<dyn Any>)),
+    ];
+    for (name, build) in builders {
+        let on = upload();
+        let mesh_bytes = whole - gpu.memory_left();
+        let Some(built) = build(&on) else { continue };
+        let both = gpu.memory_left();
+        assert!(mesh_bytes > 0 && both < whole - mesh_bytes, "{name}: {both} left of {whole}");
+        drop(on);
+        assert_eq!(gpu.memory_left(), both, "{name}");
+        drop(built);
+        assert_eq!(gpu.memory_left(), whole, "{name}");
+    }
 }

@@ -1,6 +1,6 @@
 //! LBVH over tetrahedra: Morton codes of box centres, agglomerative bottom-up construction (Apetrei 2014).
 
-use crate::build::{DeviceMesh, MeshArrays, MeshInput, MeshView};
+use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
@@ -17,7 +17,7 @@ const BUDGET: u32 = 16_384;
 #[derive(Debug)]
 pub struct Lbvh {
     pub(super) gpu: Gpu,
-    pub(super) mesh: MeshView,
+    pub(super) mesh: KeptMesh,
     pub(super) tree: BinaryTree,
     pub(super) valid: u32,
     stages: Vec<StageTime>,
@@ -160,7 +160,7 @@ impl Lbvh {
         let buffer = gpu.buffer("olbvh.lbvh.scratch", Arena::measure(carve)?)?;
         let scratch = carve(&mut Arena::new(buffer.all()))?;
         let ((), time) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
-        Ok(Self { gpu: gpu.clone(), mesh: view, tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
+        Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per primitive.
@@ -192,7 +192,7 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
-        mesh.check(&self.mesh)?;
+        mesh.check(&self.mesh.view)?;
         let gpu = &self.gpu;
         let n = points.len() as u64;
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
@@ -218,6 +218,6 @@ impl Lbvh {
 
 impl From<&Lbvh> for Searched {
     fn from(lbvh: &Lbvh) -> Self {
-        Self { mesh: lbvh.mesh, structure: Structure::Binary(lbvh.tree) }
+        Self { mesh: lbvh.mesh.view, structure: Structure::Binary(lbvh.tree) }
     }
 }

@@ -60,8 +60,8 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
-        mesh.check(&self.mesh)?;
-        other_mesh.check(&other.mesh)?;
+        mesh.check(&self.mesh.view)?;
+        other_mesh.check(&other.mesh.view)?;
         other_mesh.check_device(mesh.gpu())?;
         let gpu = &self.gpu;
         let mut done = Overlapped::default();

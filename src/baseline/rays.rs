@@ -4,7 +4,7 @@
 //! It is **not watertight**: the device's intersections are rounded, so a ray may slip past an edge, or meet a face that is not the first. Every
 //! answer is verified and does hold its point; a point whose ray went wrong is lost. Points on faces get any of their cells.
 
-use crate::build::{DeviceMesh, MeshInput, MeshView};
+use crate::build::{DeviceMesh, KeptMesh, MeshInput};
 use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
@@ -41,7 +41,7 @@ pub struct Rays {
     gpu: Gpu,
     /// None: ray queries.
     pipeline: Option<Box<RayPipeline>>,
-    mesh: MeshView,
+    mesh: KeptMesh,
     structure: AccelerationStructure,
     faces: u32,
     sides: Buffer,
@@ -94,7 +94,7 @@ impl Rays {
             RayMethod::Query => None,
             RayMethod::Pipeline => Some(Box::new(RayPipeline::new::<LocateByPipeline, FaceMissed, FaceHit>(gpu)?)),
         };
-        Ok(Some(Self { gpu: gpu.clone(), mesh: mesh.view(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
+        Ok(Some(Self { gpu: gpu.clone(), mesh: mesh.kept(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
     }
 
     /// The acceleration structure.
@@ -146,7 +146,7 @@ impl Rays {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
-        mesh.check(&self.mesh)?;
+        mesh.check(&self.mesh.view)?;
         let n = points.len() as u64;
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));

@@ -11,6 +11,7 @@ use crate::layout::{Grid, MeshStatus};
 use crate::mesh::Mesh;
 use crate::primitives::{Arena, cmd_fill};
 use crate::reference::boundary::{fault_of, set_bits};
+use std::sync::Arc;
 
 /// Most tetrahedra of one mesh: faces are numbered in 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
@@ -181,18 +182,28 @@ pub enum BadCells {
     Reject,
 }
 
-/// A mesh in device memory of our own, prepared for trees and queries.
+/// Where a mesh lies, and a share of its memory: while this is kept no other mesh gets that place, so that whose view is equal is the same mesh.
+#[derive(Clone, Debug)]
+pub(crate) struct KeptMesh {
+    pub view: MeshView,
+    memory: Arc<MeshMemory>,
+}
+
+#[derive(Debug)]
+struct MeshMemory {
+    _positions: Buffer,
+    _cells: Buffer,
+    arrays: Buffer,
+}
+
+/// A mesh in device memory of our own, prepared for trees and queries. What is built over it keeps that memory, too.
 #[derive(Debug)]
 pub struct DeviceMesh {
     gpu: Gpu,
-    input: MeshInput,
-    arrays: MeshArrays,
+    kept: KeptMesh,
     grid: Grid,
     status: MeshStatus,
     stages: Vec<StageTime>,
-    _positions: Buffer,
-    _cells: Buffer,
-    memory: Buffer,
 }
 
 impl DeviceMesh {
@@ -229,8 +240,9 @@ impl DeviceMesh {
         if status.overflow != 0 {
             return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
         }
-        let made =
-            Self { gpu: gpu.clone(), input, arrays, grid, status, stages: time.stages, _positions: positions, _cells: cells, memory };
+        let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
+        let kept = KeptMesh { view: MeshView { input, arrays }, memory };
+        let made = Self { gpu: gpu.clone(), kept, grid, status, stages: time.stages };
         if policy == BadCells::Reject && status.bad > 0 {
             let list = made.bad_cells()?;
             let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
@@ -245,7 +257,7 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn bad_cells(&self) -> Result<Vec<u32>> {
-        Ok(set_bits(self.download(self.arrays.bad, u64::from(self.input.tets).div_ceil(32))?))
+        Ok(set_bits(self.download(self.arrays().bad, u64::from(self.input().tets).div_ceil(32))?))
     }
 
     /// Boundary bits, one per tetrahedron.
@@ -253,7 +265,7 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn boundary_bits(&self) -> Result<Vec<u32>> {
-        self.download(self.arrays.boundary, u64::from(self.input.tets).div_ceil(32))
+        self.download(self.arrays().boundary, u64::from(self.input().tets).div_ceil(32))
     }
 
     /// The neighbours of every tetrahedron, four each.
@@ -261,7 +273,7 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn neighbours(&self) -> Result<Vec<[u32; 4]>> {
-        self.gpu.download(&self.memory, self.arrays.neighbours.part(0, 16 * u64::from(self.input.tets)))
+        self.gpu.download(&self.kept.memory.arrays, self.arrays().neighbours.part(0, 16 * u64::from(self.input().tets)))
     }
 
     /// Normalised coordinates of every point, x, y, z; the bits of the last word are its finest cell, 10 bits per axis from the lowest.
@@ -269,11 +281,11 @@ impl DeviceMesh {
     /// # Errors
     /// A failed transfer.
     pub fn vertices(&self) -> Result<Vec<[f32; 4]>> {
-        self.gpu.download(&self.memory, self.arrays.vertices.part(0, 16 * u64::from(self.input.points)))
+        self.gpu.download(&self.kept.memory.arrays, self.arrays().vertices.part(0, 16 * u64::from(self.input().points)))
     }
 
     fn download(&self, array: BufferRef, words: u64) -> Result<Vec<u32>> {
-        self.gpu.download(&self.memory, array.part(0, 4 * words))
+        self.gpu.download(&self.kept.memory.arrays, array.part(0, 4 * words))
     }
 
     /// The device it lies on.
@@ -283,15 +295,20 @@ impl DeviceMesh {
 
     /// Number of points and of tetrahedra.
     pub(crate) fn sizes(&self) -> [usize; 2] {
-        [self.input.points as usize, self.input.tets as usize]
+        [self.input().points as usize, self.input().tets as usize]
     }
 
     /// Both of the following, as what is recorded takes them.
     pub fn view(&self) -> MeshView {
-        MeshView { input: self.input, arrays: self.arrays }
+        self.kept.view
     }
 
-    /// Refuses what was built over another mesh.
+    /// What is built over the mesh keeps this.
+    pub(crate) fn kept(&self) -> KeptMesh {
+        self.kept.clone()
+    }
+
+    /// Refuses what was built over another mesh. The view is one of a [`KeptMesh`].
     pub(crate) fn check(&self, built_over: &MeshView) -> Result<()> {
         if *built_over == self.view() {
             Ok(())
@@ -307,12 +324,12 @@ impl DeviceMesh {
 
     /// Where points and cells lie.
     pub fn input(&self) -> &MeshInput {
-        &self.input
+        &self.kept.view.input
     }
 
     /// Where stage 0 left its arrays.
     pub fn arrays(&self) -> &MeshArrays {
-        &self.arrays
+        &self.kept.view.arrays
     }
 
     /// The grid over the bounds, at the finest level.
@@ -332,6 +349,6 @@ impl DeviceMesh {
 
     /// Bytes of the neighbour table, counted apart from the tree.
     pub fn neighbour_bytes(&self) -> u64 {
-        16 * u64::from(self.input.tets)
+        16 * u64::from(self.input().tets)
     }
 }

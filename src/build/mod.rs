@@ -18,8 +18,8 @@ mod ranges;
 mod stages;
 mod tree;
 
-pub(crate) use mesh::check_points;
 pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
+pub(crate) use mesh::{KeptMesh, check_points};
 pub(crate) use plan::MAX_ENTRIES;
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 #[cfg(feature = "cli")]

@@ -1,6 +1,6 @@
 //! A tree in device memory of our own.
 
-use super::mesh::DeviceMesh;
+use super::mesh::{DeviceMesh, KeptMesh};
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
@@ -18,7 +18,7 @@ use bytemuck::Pod;
 #[derive(Debug)]
 pub struct Tree {
     gpu: Gpu,
-    mesh: MeshView,
+    mesh: KeptMesh,
     options: BuildOptions,
     memory: TreeMemory,
     status: BuildStatus,
@@ -134,7 +134,18 @@ impl Tree {
         refuse_overflow(&status, options)?;
         let grid: Grid = first(gpu, &node_buffer, memory.grid)?;
         let scratch_bytes = head.size() + counts_buffer.size() + filter_buffer.size() + sorted_buffer.size();
-        Ok(Self { gpu: gpu.clone(), mesh: view, options: *options, memory, status, grid, stages, scratch_bytes, entry_buffer, node_buffer })
+        Ok(Self {
+            gpu: gpu.clone(),
+            mesh: mesh.kept(),
+            options: *options,
+            memory,
+            status,
+            grid,
+            stages,
+            scratch_bytes,
+            entry_buffer,
+            node_buffer,
+        })
     }
 
     /// The arrays in host memory.
@@ -172,7 +183,7 @@ impl Tree {
 
     /// The mesh it was built over.
     pub(crate) fn mesh(&self) -> &MeshView {
-        &self.mesh
+        &self.mesh.view
     }
 
     /// Where the arrays lie.
