@@ -688,7 +688,7 @@ typedef struct olbvh_slicing {
  */
 typedef struct olbvh_slicing_parts_data {
   /*
-   Bytes of the memory: 29 per voxel, and 32 per voxel of a row.
+   Bytes of the memory: 29 per voxel, and 32 per run of 64 voxels below each other in a layer.
    */
   uint64_t bytes;
   /*

@@ -203,14 +203,14 @@ fn rounds_go_on_where_they_ended() {
     let rows = Rows { layer: 0, first: 0, count: 5 };
     let searched = Searched::new(&device, &tree).unwrap();
     let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
-    let carve = |a: &mut Arena| SliceMemory::carve(a, 5, 5);
+    let carve = |a: &mut Arena| SliceMemory::carve(a, [5, 5], 5);
     let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
     // As many voxels, but more side by side.
     let wide = olbvh::slicing::VoxelGrid { size: [25, 1], ..voxels };
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
     let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
-    assert!(refused.is_err_and(|e| e.to_string().contains("1 rows of 25 voxels in memory for 25 voxels, 5 side by side")));
+    assert!(refused.is_err_and(|e| e.to_string().contains("1 rows of 25 voxels in memory for 25 voxels in 5 runs")));
     let (mut rounds, mut submissions) = (Rounds::begin(1), 0);
     let status = loop {
         submit(&gpu, "olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();

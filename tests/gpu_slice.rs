@@ -106,3 +106,36 @@ fn an_error_of_the_sink_ends_the_stack() {
     let result = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut stop);
     assert!(result.is_err_and(|e| e.to_string().contains("full")));
 }
+
+/// Where cells overlap, the owner is found from the owner of the voxel before: of the same one, however many voxels are sliced at once.
+#[test]
+fn memory_makes_no_difference_where_cells_overlap() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 25);
+    let one = kuhn_jittered([6; 3], 0.0, 0).unwrap();
+    let moved = one.points.iter().map(|p| [p[0] + 0.37, p[1] + 0.21, p[2] + 0.43]);
+    let beside = one.tets.iter().map(|t| t.map(|v| v + one.points.len() as u32));
+    let mesh = Mesh::new(one.points.iter().copied().chain(moved).collect(), one.tets.iter().copied().chain(beside).collect());
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let settings = SliceSettings { layers: 3, size: [40, 150], ..SliceSettings::default() };
+    let voxels = settings.voxels([0.0; 3], [6.43; 3], mesh.origin).unwrap();
+    let owners = || {
+        let (mut owners, mut bands) = (Vec::new(), 0);
+        let mut sink = |band: Band| {
+            owners.extend(band.owners);
+            bands += 1;
+            Ok(())
+        };
+        slice(&device, &tree, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut sink).unwrap();
+        (owners, bands)
+    };
+    let (all, bands) = owners();
+    assert_eq!(bands, 1);
+    let second = one.tets.len() as u32;
+    assert!(all.iter().any(|&t| t < second) && all.iter().any(|&t| t >= second && t != u32::MAX));
+    // Memory for 70 rows, of which 64 begin where runs do.
+    let _rest = gpu.buffer("olbvh.test.rest", gpu.memory_left() - 70 * 40 * 40 - (1 << 14)).unwrap();
+    let (in_parts, bands) = owners();
+    assert_eq!(bands, 9);
+    assert!(all == in_parts, "{} owners differ", all.iter().zip(&in_parts).filter(|(a, b)| a != b).count());
+}

@@ -7,6 +7,7 @@
 layout(constant_id = 2) const uint RUN = 64;
 ARGUMENTS(5)
     uint width; // of the rows
+    uint height; // of the layers
     uint rows;  // of the band
 END_ARGUMENTS
 BUFFER(0, readonly, uint, answers)
@@ -16,10 +17,11 @@ BUFFER(3, READ_WRITE, RunState, runs)
 BUFFER(4, writeonly, TouchState, states)
 
 void main() {
-    uint i = item_index(), lines = i / width * RUN, count = 0u, inside = 0u, wait = 0u;
+    uint i = item_index(), count = 0u, inside = 0u, wait = 0u;
+    uvec2 lines = rows_of_run(RUN, rows, height, i / width);
     // Only once all centres have been located.
-    if (lines < rows && status.at[0].locating == 0u) {
-        count = min(RUN, rows - lines);
+    if (lines.y > 0u && status.at[0].locating == 0u) {
+        count = lines.y;
         inside = runs.at[i].inside;
         wait = runs.at[i].waiting;
     }
@@ -32,7 +34,7 @@ void main() {
     if (total == 0u) return;
     place = subgroupBroadcastFirst(place);
     if (wait > 0u) runs.at[i].waiting = 0u;
-    uint line = lines * width + i % width;
+    uint line = lines.x * width + i % width;
     // Row by row: what stands side by side there is near to the same.
     for (uint k = 0u; k < RUN; ++k) {
         uint voxel = line + k * width;

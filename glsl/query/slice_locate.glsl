@@ -115,15 +115,15 @@ void main() {
     uint unfinished = 0u;
     plan = plans.at[0];
     if (i == 0u) status.at[0].refused = plan.refused;
-    uint lines = i / plan.width * RUN;
-    if (lines < plan.rows) {
+    uvec2 lines = rows_of_run(RUN, plan.rows, plan.height, i / plan.width);
+    if (lines.y > 0u) {
         Grid g = grid.at[0];
         state = RunState(0u, NONE, 0u, NONE, 0u, SMALLEST_FLOAT, 0u, 0u);
         if (fresh == 0u) state = states.at[i];
-        uint count = min(RUN, plan.rows - lines);
+        uint count = lines.y;
         column = i % plan.width;
-        line = lines * plan.width + column;
-        row = voxel_row(plan, lines + state.next);
+        line = lines.x * plan.width + column;
+        row = voxel_row(plan, lines.x + state.next);
         while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
         bool stands = state.hint != NONE && state.cursor == 0u;
         stand = stand_nowhere();

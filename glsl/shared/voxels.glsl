@@ -9,6 +9,13 @@ uvec2 voxel_row(SlicePlan plan, uint i) {
     return uvec2(y % plan.height, plan.layer + y / plan.height);
 }
 
+// The rows of run number i of a band of `rows` rows, the first of them and how many; twin of `Rows::run`.
+uvec2 rows_of_run(uint run, uint rows, uint height, uint i) {
+    uint most = min(rows, height), runs = (most + run - 1u) / run, layer = i / runs * most, begin = (i % runs) * run;
+    uint end = min(rows, layer + min(most, begin + run));
+    return uvec2(layer + begin, end - min(end, layer + begin));
+}
+
 // Where a row begins, and a voxel in it lies.
 vec3 row_origin(SlicePlan plan, uvec2 row) {
     precise vec3 at = (plan.origin.xyz + float(row.y) * plan.up.xyz) + float(row.x) * plan.down.xyz;

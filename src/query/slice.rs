@@ -56,11 +56,11 @@ impl SliceInput<'_> {
 
     /// Number of runs, one below the other and side by side.
     fn runs(&self) -> u32 {
-        self.rows.count.div_ceil(RUN) * self.voxels.size[0]
+        self.rows.runs(self.voxels.size[1]) * self.voxels.size[0]
     }
 }
 
-/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel, and 32 per voxel of a row.
+/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel, and 32 per run.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceMemory {
     /// Per voxel, row by row: the owner, plus 2^31 if the voxel is merely touched; all ones: empty.
@@ -76,21 +76,22 @@ pub struct SliceMemory {
 }
 
 impl SliceMemory {
-    /// For up to `rows` rows of `width` voxels.
+    /// For up to `rows` rows of `width` voxels in layers of `height` rows.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small, or without voxels.
-    pub fn carve(arena: &mut Arena, width: u32, rows: u32) -> Result<Self> {
+    pub fn carve(arena: &mut Arena, [width, height]: [u32; 2], rows: u32) -> Result<Self> {
         if width.checked_mul(rows).is_none_or(|n| n == 0) {
             return Err(Error::Invalid(format!("{rows} rows of {width} voxels at a time; at least one, and at most 2^32 in all")));
         }
+        let runs = u64::from(Rows { layer: 0, first: 0, count: rows }.runs(height));
         let (width, rows) = (u64::from(width), u64::from(rows));
         Ok(Self {
             answers: arena.words(width * rows)?,
             values: arena.words(width * rows)?,
             status: arena.take(size_of::<SliceStatus>() as u64)?,
             plan: arena.take(size_of::<SlicePlan>() as u64)?,
-            runs: arena.take(size_of::<RunState>() as u64 * width * rows.div_ceil(u64::from(RUN)))?,
+            runs: arena.take(size_of::<RunState>() as u64 * width * runs)?,
             touches: arena.take(size_of::<TouchState>() as u64 * width * rows)?,
             groups: arena.words(3)?,
         })
@@ -118,8 +119,8 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
         return Err(Error::Invalid(format!("{count} rows from row {first} of layer {layer} on, which the stack does not have")));
     }
     let fits = (memory.answers.size / 4, memory.runs.size / size_of::<RunState>() as u64);
-    if u64::from(width) * u64::from(count) > fits.0 || u64::from(width) * u64::from(count.div_ceil(RUN)) > fits.1 {
-        return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels, {} side by side", fits.0, fits.1)));
+    if u64::from(width) * u64::from(count) > fits.0 || u64::from(input.runs()) > fits.1 {
+        return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels in {} runs", fits.0, fits.1)));
     }
     if input.part.is_some() && matches!(searched.structure, Structure::Binary(_)) {
         return Err(Error::Invalid("a part of a binary tree, which has no cells".into()));
@@ -183,8 +184,8 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
     let workgroup = r.gpu().target().query;
     r.stage("query.slice_touch", |r| {
         let SliceMemory { answers, status, plan: plans, runs, touches: states, .. } = *memory;
-        let (width, rows) = (part.voxels.size[0], part.rows.count);
-        let collect = SliceCollect { answers, status, plans, runs, states, width, rows };
+        let ([width, height], rows) = (part.voxels.size, part.rows.count);
+        let collect = SliceCollect { answers, status, plans, runs, states, width, height, rows };
         let spec = SliceCollectSpec { workgroup, run: RUN, ..Default::default() };
         r.dispatch(&collect, spec, Groups::Count(part.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");

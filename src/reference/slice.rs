@@ -10,9 +10,10 @@ use super::walk::Stand;
 use crate::error::Result;
 use crate::layout::SlicePlan;
 use crate::mesh::{Field, Mesh, On};
-use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, RUN, Rows, TOUCHED, VoxelGrid, WALK};
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, VoxelGrid, WALK};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
+use std::ops::Range;
 
 /// Slices one mesh.
 pub struct Slicer<'a> {
@@ -78,21 +79,21 @@ impl<'a> Slicer<'a> {
 
     /// The voxels of these rows.
     pub fn band(&self, rows: Rows) -> Band {
-        let (width, run) = (self.voxels.size[0] as usize, RUN as usize);
-        let count = rows.count.div_ceil(RUN) as usize * width;
-        let runs: Vec<Vec<Voxel>> =
-            (0..count).into_par_iter().map(|i| self.run(rows, (i % width) as u32, (i / width) as u32 * RUN)).collect();
-        let voxel = |i: usize| runs[i / width / run * width + i % width][i / width % run];
-        let all = || (0..rows.count as usize * width).map(voxel);
+        let [width, height] = self.voxels.size;
+        let runs = rows.runs(height);
+        let columns: Vec<Vec<Voxel>> =
+            (0..runs * width).into_par_iter().map(|i| self.run(rows, i % width, rows.run(i / width, height))).collect();
+        let row_of = |run: u32, k: usize| columns[(run * width) as usize..][..width as usize].iter().map(move |column| column[k]);
+        let all = || (0..runs).flat_map(move |run| (0..rows.run(run, height).len()).flat_map(move |k| row_of(run, k)));
         let (values, kinds) = (all().map(|v| v.value).collect(), all().map(|v| v.kind).collect());
         Band { rows, values, kinds, owners: all().map(|v| v.owner).collect() }
     }
 
-    /// The voxels of a run, at `x` of the rows from `first` on: located one after the other, each first in the cell of the one before; then those outside
+    /// The voxels of a run, at `x` of the rows `lines`: located one after the other, each first in the cell of the one before; then those outside
     /// by their boxes.
-    fn run(&self, rows: Rows, x: u32, first: u32) -> Vec<Voxel> {
+    fn run(&self, rows: Rows, x: u32, lines: Range<u32>) -> Vec<Voxel> {
         let mut hint = NONE;
-        (first..rows.count.min(first + RUN))
+        lines
             .map(|row| {
                 let [y, layer] = rows.row(row, self.voxels.size[1]);
                 let centre = self.voxels.centre([x, y, layer]);

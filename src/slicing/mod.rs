@@ -19,6 +19,7 @@ use crate::layout::{Grid, SlicePlan};
 use crate::reference::grid::{canonical, two_to};
 use crate::reference::vertices::CellRange;
 use glam::DVec3;
+use std::ops::Range;
 
 /// Kind of a voxel that the mesh does not touch.
 pub const EMPTY: u8 = 0;
@@ -27,7 +28,7 @@ pub const TOUCHED: u8 = 1;
 /// Kind of a voxel whose centre lies in the mesh.
 pub const INSIDE: u8 = 2;
 
-/// Voxels below each other whose centres are located together, each from the owner of the one before.
+/// Most voxels below each other in a layer whose centres are located together, each from the owner of the one before.
 pub const RUN: u32 = 64;
 /// Steps of a walk across faces before the tree is asked.
 pub const WALK: u32 = 6;
@@ -194,6 +195,20 @@ impl Rows {
         })
     }
 
+    /// Number of runs in each column: those of [`RUN`] rows that a layer has, none in two layers (where rows begin in the middle of a layer and go on
+    /// in others, as if layers began there).
+    pub fn runs(self, height: u32) -> u32 {
+        let most = self.count.min(height).max(1);
+        self.count / most * most.div_ceil(RUN) + (self.count % most).div_ceil(RUN)
+    }
+
+    /// The rows of run number i.
+    pub fn run(self, i: u32, height: u32) -> Range<u32> {
+        let most = self.count.min(height).max(1);
+        let (of_layer, in_layer) = (i / most.div_ceil(RUN) * most, i % most.div_ceil(RUN) * RUN);
+        of_layer + in_layer..self.count.min(of_layer + most.min(in_layer + RUN))
+    }
+
     /// Row and layer of the i-th row.
     pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
         let at = self.first + i;
@@ -238,12 +253,14 @@ impl Tally {
     }
 }
 
-/// The parts in which a stack is sliced: as many whole rows as make at most `most` voxels, at least one; several layers only if whole.
+/// The parts in which a stack is sliced: as many rows as make at most `most` voxels, at least one; several layers only if whole, and parts of a layer by
+/// [`RUN`] rows if so many fit: then runs begin at the same rows whatever `most` is, and owners are the same where cells overlap, too.
 pub fn bands(grid: &VoxelGrid, most: u64) -> impl Iterator<Item = Rows> + use<> {
     let [w, h] = grid.size;
     let layers = grid.layers;
     let whole = (most / grid.layer_voxels().max(1)).min(u64::from(u32::MAX / h.max(1))).min(u64::from(layers)) as u32;
-    let rows = if whole >= 1 { h } else { (most / u64::from(w.max(1))).clamp(1, u64::from(h.max(1))) as u32 };
+    let fit = (most / u64::from(w.max(1))).clamp(1, u64::from(h.max(1))) as u32;
+    let rows = if fit < h && fit > RUN { fit / RUN * RUN } else { fit };
     let step = whole.max(1);
     (0..layers).step_by(step as usize).flat_map(move |layer| {
         let of_layer = move |first| Rows { layer, first, count: if step > 1 { h * step.min(layers - layer) } else { rows.min(h - first) } };
@@ -265,6 +282,29 @@ mod tests {
                 assert_eq!(rows, expected, "{size:?} {layers} {most}");
                 let largest = bands(&voxels, most).map(|b| u64::from(b.count) * u64::from(size[0])).max();
                 assert!(largest.is_some_and(|n| n <= most.max(u64::from(size[0]))));
+            }
+        }
+    }
+
+    #[test]
+    fn runs_take_every_row_once_and_are_the_same_in_all_bands() {
+        for (size, layers) in [([1, 7], 40), ([2, 64], 3), ([3, 65], 5), ([1, 200], 4), ([5, 1], 3)] {
+            let voxels = VoxelGrid { origin: [0.0; 3], across: [1.0; 3], down: [1.0; 3], up: [1.0; 3], half: [[1.0; 3]; 3], size, layers };
+            let runs = |most| -> Vec<Vec<[u32; 2]>> {
+                let of_band =
+                    |rows: Rows| (0..rows.runs(size[1])).map(move |i| rows.run(i, size[1]).map(|y| rows.row(y, size[1])).collect());
+                bands(&voxels, most).flat_map(of_band).collect()
+            };
+            let whole = runs(u64::from(u32::MAX));
+            let all: Vec<[u32; 2]> = (0..layers).flat_map(|k| (0..size[1]).map(move |y| [y, k])).collect();
+            assert_eq!(whole.concat(), all);
+            assert!(whole.iter().all(|run| !run.is_empty() && run.len() <= RUN as usize && run.iter().all(|at| at[1] == run[0][1])));
+            for rows in [64, 65, 127, 128, 199, 200, 399, 400, 1000] {
+                assert_eq!(runs(rows * u64::from(size[0])), whole, "{size:?}, {layers} layers, {rows} rows at a time");
+            }
+            for rows in (0..400).map(|first| Rows { layer: 0, first, count: 50 + first }) {
+                let run = |i| rows.run(i, size[1]);
+                assert!((0..rows.runs(size[1])).flat_map(run).eq(0..rows.count), "{rows:?} of {size:?}");
             }
         }
     }

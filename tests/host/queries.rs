@@ -63,7 +63,7 @@ impl Queries {
         let plan = plan(field);
         let normals = vec![[0.6, 0.0, 0.7]; field.len()];
         let carve = |a: &mut Arena| {
-            let slice = SliceMemory::carve(a, 37, rows.count)?;
+            let slice = SliceMemory::carve(a, [37, 29], rows.count)?;
             let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree)?)?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;

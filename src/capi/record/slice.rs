@@ -33,7 +33,7 @@ pub struct OlbvhSlicing {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhSlicingParts {
-    /// Bytes of the memory: 29 per voxel, and 32 per voxel of a row.
+    /// Bytes of the memory: 29 per voxel, and 32 per run of 64 voxels below each other in a layer.
     pub bytes: u64,
     /// A word per voxel, row by row, as `olbvh_slice` gives it.
     pub answers: OlbvhBuffer,
@@ -49,7 +49,8 @@ pub struct OlbvhSlicingParts {
 pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
     border(|| {
         let slicing = handle(slicing, "slicing")?;
-        let (bytes, memory) = slicing.memory.carve(|a| SliceMemory::carve(a, slicing.voxels.width, slicing.rows))?;
+        let (bytes, memory) =
+            slicing.memory.carve(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], slicing.rows))?;
         let SliceMemory { answers, values, status, .. } = memory;
         put(out, OlbvhSlicingParts { bytes, answers: answers.into(), values: values.into(), status: status.into() })
     })
@@ -64,7 +65,7 @@ pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const 
         let field = (field.values.size > 0).then(|| field.read(scene)).transpose()?;
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate, part: None };
-        let memory = slicing.memory.place(|a| SliceMemory::carve(a, slicing.voxels.width, rows))?;
+        let memory = slicing.memory.place(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], rows))?;
         cmd_slice(r, &Searched::from(scene), &input, &memory, slicing.rounds.into())
     })
 }

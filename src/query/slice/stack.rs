@@ -9,11 +9,11 @@ use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Searched};
 use crate::reference::vertices::CellRange;
-use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, RUN, Rows, TOUCHED, Tally, VoxelGrid, bands};
 
 /// Voxels of one band, unless a single row has more.
 const CHUNK: u64 = 1 << 20;
-/// Bytes of device memory per voxel of a band, transfers included, and a reserve.
+/// Bytes of device memory per voxel of a band, transfers included and runs left out, and a reserve.
 const PER_VOXEL: u64 = 40;
 const RESERVE: u64 = 1 << 14;
 /// Added to the owner of a touched voxel; see `glsl/shared/voxels.glsl`.
@@ -68,10 +68,12 @@ impl<'a> Slicing<'a> {
             Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))
         };
         let field = field.map(upload).transpose()?;
-        let per_row = size_of::<RunState>() as u64 * u64::from(voxels.size[0]);
-        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_row) / PER_VOXEL);
+        let [width, height] = voxels.size;
+        let per_run = size_of::<RunState>() as u64;
+        let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, RUN));
+        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_run * u64::from(width)) / per_voxel);
         let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
-        let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size[0], rows);
+        let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size, rows);
         let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
         let memory = carve(&mut Arena::new(buffer.all()))?;
         let (searched, sliced) = (Searched::new(mesh, built)?, Sliced::default());
