@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 pub const TOLERANCE: f32 = 1e-5;
 
 /// Points that are located one after the other, each from the owner of the one before, where they lie near each other.
-pub const RUN: u32 = 32;
+pub const RUN: u32 = 8;
 
 /// Which cells list a primitive (SPEC 2.2). The stronger the test, the shorter the lists and the longer the construction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]

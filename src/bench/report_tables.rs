@@ -158,7 +158,7 @@ fn heading(report: &Report) -> String {
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
          medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
-         trees with lists `boundary` look for points near the one before where there is one to two tetrahedra or more (random ones are sorted for it, \
+         trees with lists `boundary` look for points near the one before where there is one to four tetrahedra or more (random ones are sorted for it, \
          which is timed), and for samples of rays one by one, as all others do\n\
          copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),

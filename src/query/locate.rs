@@ -30,18 +30,18 @@ impl Path {
     /// The fastest for so many points in a tree with seeds over so many tetrahedra ([`crate::options::Lists::Boundary`]); `in_order`: each point lies near
     /// the one before.
     ///
-    /// Looking round the last owner pays from about one point to two tetrahedra on. In 1.5 million tetrahedra (lavapipe, Mesa 25) a point takes, in ns:
+    /// Looking round the last owner pays from about one point to four tetrahedra on. In 1.5 million tetrahedra (lavapipe, Mesa 25) a point takes, in ns:
     ///
-    /// | | 262,144 points | 1,048,576 points |
-    /// |---|---|---|
-    /// | random, [`Path::Descent`] | 194–279 | 193–242 |
-    /// | random, [`Path::Sorted`] | 251–254 | 153–159 |
-    /// | along a Z curve, [`Path::Descent`] | 108–138 | 90–92 |
-    /// | along a Z curve, [`Path::Runs`] | 160–178 | 77–83 |
+    /// | | 262,144 points | 524,288 points | 1,048,576 points |
+    /// |---|---|---|---|
+    /// | random, [`Path::Descent`] | 189–219 | 163–197 | 193–215 |
+    /// | random, [`Path::Sorted`] | 188–248 | 154–191 | 153–196 |
+    /// | along a Z curve, [`Path::Descent`] | 114–137 | 110–127 | 90–100 |
+    /// | along a Z curve, [`Path::Runs`] | 130–141 | 93–107 | 72–75 |
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
         // Only what is sorted together gets nearer.
         let together = if in_order { points } else { points.min(CHUNK) };
-        match (together.saturating_mul(2) < tets, in_order) {
+        match (together.saturating_mul(4) < tets, in_order) {
             (true, _) => Self::Descent,
             (false, true) => Self::Runs,
             (false, false) => Self::Sorted,
