@@ -128,9 +128,9 @@ impl<'a> Source<'a> {
         self.topology.is_valid(tet)
     }
 
-    /// Two blocks for one, with about as many tetrahedra in either; `None` if that does not make it smaller. They are cut behind a cell of the finest grid on
-    /// an axis that `may` allows.
-    pub(super) fn cut_in_two(&self, block: &Block, may: &dyn Fn(usize, u32) -> bool) -> Option<[Block; 2]> {
+    /// Two blocks for one that is to become so many in the end: with half of its tetrahedra, or as near to that as makes whole pieces; `None` if that does
+    /// not make it smaller. They are cut behind a cell of the finest grid on an axis that `may` allows.
+    pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: &dyn Fn(usize, u32) -> bool) -> Option<[Block; 2]> {
         let span = block.span?;
         let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
         let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;
@@ -143,11 +143,11 @@ impl<'a> Source<'a> {
         };
         let add = |a: Vec<usize>, b: Vec<usize>| a.iter().zip(b).map(|(a, b)| a + b).collect();
         let numbers = block.tets.par_iter().fold(none, count).reduce(none, add);
-        let half = numbers.iter().sum::<usize>() / 2;
+        let low_part = numbers.iter().sum::<usize>() * (pieces / 2) / pieces;
         let mut sum = 0;
         let below = numbers.iter().take_while(|n| {
             sum += **n;
-            sum < half
+            sum < low_part
         });
         let at = (span.lo[axis] + below.count() as u32).min(span.hi[axis] - 1);
         let near = [at, at.saturating_sub(1), at + 1].into_iter().filter(|at| (span.lo[axis]..span.hi[axis]).contains(at));
@@ -172,8 +172,8 @@ pub(super) struct Block {
 }
 
 /// One in so many entries of a tree with all lists is taken to be left with lists where the surface is; Jets has one in 11 at α = 0, smaller meshes have
-/// more.
-const SURFACE: u64 = 4;
+/// more. What turns out larger is cut again: of the meshes that were tried none was, thin walls included.
+const SURFACE: u64 = 8;
 
 /// Where the tetrahedra of a block are.
 #[derive(Clone, Copy, Default)]
@@ -332,8 +332,8 @@ mod tests {
         let mesh = kuhn_jittered([9, 8, 7], 0.2, 3).unwrap();
         let whole = topology(&mesh).unwrap();
         let source = Source::new(&mesh, &BuildOptions::default(), 1 << 30).unwrap();
-        let [low, high] = source.cut_in_two(&source.whole(), &|_, _| true).unwrap();
-        let [a, b] = source.cut_in_two(&low, &|_, _| true).unwrap();
+        let [low, high] = source.cut_in_two(&source.whole(), 2, &|_, _| true).unwrap();
+        let [a, b] = source.cut_in_two(&low, 2, &|_, _| true).unwrap();
         let (mut checked, mut beside, mut needed) = (0, 0, 0);
         for block in [a, b, high] {
             let part = topology(&block.part(&mesh).0).unwrap();

@@ -1,7 +1,7 @@
 //! Points located in blocks.
 
 use super::cut::{Placed, Source, least_bytes};
-use super::{InBlocks, check_field, is_full, refusal, smaller};
+use super::{InBlocks, check_field, is_full, pieces, refusal, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
@@ -110,7 +110,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
                 Ok(()) => continue,
             }
         }
-        let Some([low, high]) = smaller(&source, &block) else {
+        let Some([low, high]) = smaller(&source, &block, pieces(need, memory)) else {
             return Err(refusal(gpu, block.tets.len(), need + PER_POINT * FEW as u64, why));
         };
         let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));

@@ -1,6 +1,6 @@
 //! Meshes that do not fit the device's memory, in blocks: built, asked and dropped one after the other, each within the bytes that may be used.
 //!
-//! Blocks divide the cells of the tree's level, a box of them each, cut in two where the tetrahedra of either side are as many. A block has its *core*, every
+//! Blocks divide the cells of the tree's level, a box of them each, cut in two by numbers of tetrahedra. A block has its *core*, every
 //! tetrahedron that meets its cells, and around it the tetrahedra that share a face with the core. So every leaf over the block's own cells lists what it
 //! lists in the tree over the whole mesh, and has the same boundary flag: neighbours of the core are all there. The ids of points and tetrahedra keep their
 //! order, the grid is that of the whole mesh, and the level is the whole tree's ([`crate::options::BuildOptions::level`]). Hence each point is asked of one block,
@@ -75,9 +75,15 @@ impl InBlocks {
 /// Tetrahedra of a block that is not cut again.
 const LEAST: usize = 1024;
 
-/// The halves of a block that is worth being cut.
-fn smaller(source: &Source<'_>, block: &Block) -> Option<[Block; 2]> {
-    if block.tets.len() > LEAST { source.cut_in_two(block, &|_, _| true) } else { None }
+/// How many blocks to make of one that takes `need` bytes where there are `memory`: as few as will do, each with a tenth to spare, since what lies where blocks
+/// are cut is in both. At least two, so that no block is left as it is.
+fn pieces(need: u64, memory: u64) -> usize {
+    (u128::from(need) * 11).div_ceil(u128::from(memory.max(1)) * 10).clamp(2, 64) as usize
+}
+
+/// The parts of a block that is worth being cut, which is to become so many.
+fn smaller(source: &Source<'_>, block: &Block, pieces: usize) -> Option<[Block; 2]> {
+    if block.tets.len() > LEAST { source.cut_in_two(block, pieces, &|_, _| true) } else { None }
 }
 
 /// Refuses a field that is not the mesh's.
@@ -99,4 +105,15 @@ fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
     Error::TooLarge(format!(
         "{limit} bytes of device memory are too few for a block of {tets} tetrahedra{why}; allow {enough} or more{finer}"
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn pieces_fit_and_there_are_two_at_least() {
+        assert_eq!([0, 99, 100, 180, 190, 900, 920].map(|need| pieces(need, 100)), [2, 2, 2, 2, 3, 10, 11]);
+        assert_eq!([pieces(u64::MAX, 1), pieces(1, 0), pieces(u64::MAX, u64::MAX)], [64, 2, 2]);
+    }
 }

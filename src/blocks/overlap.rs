@@ -28,7 +28,7 @@ impl Node {
     }
 
     fn halves(&self, source: &Source<'_>) -> Option<&[Rc<Self>; 2]> {
-        self.halves.get_or_init(|| smaller(source, &self.block).map(|halves| halves.map(Self::new))).as_ref()
+        self.halves.get_or_init(|| smaller(source, &self.block, 2).map(|halves| halves.map(Self::new))).as_ref()
     }
 
     fn tets(&self) -> usize {

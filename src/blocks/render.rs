@@ -2,7 +2,7 @@
 //! order, and goes on in one where it stood after the last. A sample is taken by the block that has its cell. Between blocks, rays are in host memory.
 
 use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, LEAST, check_field, is_full, refusal};
+use super::{InBlocks, LEAST, check_field, is_full, pieces, refusal};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
@@ -118,7 +118,7 @@ impl Job<'_> {
         }
         let order = |axis: usize, last: u32| low_first(&self.prepared.plan, &self.source.grid, axis, last);
         let may = |axis: usize, last: u32| order(axis, last).is_some();
-        let halves = if block.tets.len() > LEAST { self.source.cut_in_two(block, &may) } else { None };
+        let halves = if block.tets.len() > LEAST { self.source.cut_in_two(block, pieces(need, self.memory), &may) } else { None };
         let Some([low, high]) = halves else { return Err(refusal(self.gpu, block.tets.len(), need, why)) };
         let finest = low.cells.finest(self.source.level).hi;
         let axis = (0..3).find(|&c| low.cells.hi[c] < high.cells.lo[c]).unwrap_or(0);

@@ -3,7 +3,7 @@
 //! trees, since a tree takes longer than a layer.
 
 use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, check_field, is_full, refusal, smaller};
+use super::{InBlocks, check_field, is_full, pieces, refusal, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
@@ -117,7 +117,7 @@ impl Job<'_> {
             match tried {
                 Err(Some(e)) if !is_full(&e) => return Err(e),
                 Err(why) => {
-                    let Some([low, high]) = smaller(self.source, &block) else {
+                    let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory)) else {
                         return Err(refusal(self.gpu, block.tets.len(), need, why));
                     };
                     waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
