@@ -662,7 +662,8 @@ typedef struct olbvh_slicing {
    */
   uint32_t first;
   /*
-   Rows; behind the last of a layer comes the first of the next.
+   Rows; behind the last of a layer comes the first of the next. In whole layers, or parts of one that begin at multiples of 64 rows, voxels have the same
+   owners as in the whole stack where cells overlap, too.
    */
   uint32_t rows;
   /*

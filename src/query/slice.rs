@@ -37,7 +37,7 @@ const TOUCH_BUDGET: u32 = 1024;
 pub struct SliceInput<'a> {
     /// The whole stack.
     pub voxels: &'a VoxelGrid,
-    /// The rows of it that are sliced now.
+    /// The rows of it that are sliced now. Those of [`crate::slicing::bands`] have the same owners as in the whole stack where cells overlap, too.
     pub rows: Rows,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
     pub field: Option<(BufferRef, On)>,

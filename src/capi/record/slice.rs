@@ -17,7 +17,8 @@ pub struct OlbvhSlicing {
     pub layer: u32,
     /// Number of that row in its layer.
     pub first: u32,
-    /// Rows; behind the last of a layer comes the first of the next.
+    /// Rows; behind the last of a layer comes the first of the next. In whole layers, or parts of one that begin at multiples of 64 rows, voxels have the same
+    /// owners as in the whole stack where cells overlap, too.
     pub rows: u32,
     /// As `olbvh_slice` takes it.
     pub linear: u32,
