@@ -20,7 +20,8 @@ impl Device {
         descriptor.backends = wgpu::Backends::VULKAN;
         let instance = wgpu::Instance::new(descriptor);
         let adapter = pollster::block_on(instance.request_adapter(&wgpu::RequestAdapterOptions::default()))?;
-        let descriptor = wgpu::DeviceDescriptor { label: Some("wgpu_frame"), ..Default::default() };
+        let int64 = adapter.features() & wgpu::Features::SHADER_INT64;
+        let descriptor = wgpu::DeviceDescriptor { label: Some("wgpu_frame"), required_features: int64, ..Default::default() };
         let (features, limits, hints) = (descriptor.required_features, &descriptor.required_limits, &descriptor.memory_hints);
         // SAFETY: the callback adds a feature that the device has; the device comes from this adapter.
         unsafe {
@@ -59,6 +60,7 @@ impl Device {
                 // No `subgroup_size_control`: wgpu enables that without `computeFullSubgroups`.
                 enabled: Enabled {
                     buffer_addresses: self.addresses,
+                    shader_int64: self.device.features().contains(wgpu::Features::SHADER_INT64),
                     debug_utils: instance.extensions().contains(&ash::ext::debug_utils::NAME),
                     ..Enabled::default()
                 },
