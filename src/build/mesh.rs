@@ -1,6 +1,5 @@
 //! Stage 0: a mesh on the device — bad cells, bounds and grid, normalised vertices, neighbours and boundary bits (SPEC 2.1, 2.3).
 
-use super::stages::MeshView;
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{
@@ -66,6 +65,15 @@ impl MeshArrays {
             neighbours: arena.take(16 * u64::from(tets))?,
         })
     }
+}
+
+/// A mesh as recorded functions take it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MeshView {
+    /// Points and cells.
+    pub input: MeshInput,
+    /// What stage 0 made of them.
+    pub arrays: MeshArrays,
 }
 
 /// Scratch memory of stage 0: 20 bytes and a bit per tetrahedron.

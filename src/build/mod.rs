@@ -12,27 +12,28 @@
 //! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole pipeline within given capacities;
 //! [`Tree::build`] records the same stages in three or four submissions, and reads counts back between them to allocate exactly.
 
+mod candidates;
 mod mesh;
 mod plan;
 mod ranges;
 mod stages;
 mod tree;
 
-pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, cmd_prepare_mesh};
+pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, MeshView, cmd_prepare_mesh};
 pub(crate) use mesh::{KeptMesh, check_points};
 pub(crate) use plan::MAX_ENTRIES;
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 #[cfg(feature = "cli")]
 pub(crate) use plan::{SHARE, filtered};
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
-pub use stages::MeshView;
 pub use tree::Tree;
 
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
-use stages::{cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_fit, cmd_leaves, cmd_levels, cmd_splits, entries};
+use candidates::{cmd_count, cmd_filter, cmd_fit};
+use stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_levels, cmd_splits, entries};
 
 /// Scratch memory of a whole build.
 #[derive(Clone, Copy, Debug)]

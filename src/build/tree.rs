@@ -1,8 +1,9 @@
 //! A tree in device memory of our own.
 
-use super::mesh::{DeviceMesh, KeptMesh};
+use super::candidates::{cmd_count, cmd_filter};
+use super::mesh::{DeviceMesh, KeptMesh, MeshView};
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
-use super::stages::{MeshView, cmd_codes, cmd_count, cmd_count_splits, cmd_depth, cmd_filter, cmd_leaves, cmd_levels, cmd_splits, entries};
+use super::stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid, wide};

@@ -1,0 +1,183 @@
+//! Stage 2, candidates: how many there are, which are entries, and coarser levels until those fit.
+
+use super::mesh::{MeshArrays, MeshInput, MeshView};
+use super::plan::{CountScratch, FilterScratch, SHARE, SeedScratch, TreeMemory, TryScratch, filtered};
+use crate::error::Result;
+use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::kernels::{Count as CountCells, CountSpec, Filter, FilterSpec, Fit, FitSpec, Mark, MarkSpec, SettleSeeds, SettleSeedsSpec};
+use crate::options::BuildOptions;
+use crate::primitives::{Count, cmd_exclusive_scan};
+
+/// Stage 2, first part: how many candidates every tetrahedron has (or shares of them, where they are filtered), and where they begin.
+pub(crate) fn cmd_count(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+) -> Result<()> {
+    r.stage("build.count", |r| count_candidates(r, mesh, grid, options, scratch, Over::all(scratch)))
+}
+
+/// Stage 2 of all but the paper's lists: which candidates are entries; their number goes to `filter.entries`.
+pub(crate) fn cmd_filter(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+    filter: &FilterScratch,
+) -> Result<()> {
+    r.stage("build.filter", |r| {
+        if let Some(seeds) = &filter.seeds {
+            r.fill(seeds.marks, 0);
+        }
+        filter_candidates(r, mesh, grid, options, scratch, filter, Over::all(scratch))
+    })
+}
+
+/// Stage 2, where entries may be more than there is room for: coarser levels, until they fit.
+pub(crate) fn cmd_fit(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    tree: &TreeMemory,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+    filter: &FilterScratch,
+) -> Result<()> {
+    let Some(tries) = filter.tries else { return Ok(()) };
+    let (TreeMemory { grid, status, capacity, .. }, tets) = (*tree, mesh.input.tets);
+    let TryScratch { live, groups, shares: tried_shares, entries: tried_entries } = tries;
+    let (shares, entries, capacity, levels) = (scratch.total, filter.entries, capacity.entries, capacity.level);
+    let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
+    let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
+    let over = Over { total: tried_shares, tries: Some(tries), marks: filter.seeds.map(|seeds| seeds.marks) };
+    r.stage("build.fit", |r| {
+        r.barrier("codes.scan → fit");
+        r.dispatch(&fit, spec, Groups::Count(1))?;
+        for _ in 0..levels {
+            r.barrier("fit → codes.count");
+            count_candidates(r, mesh, grid, options, scratch, over)?;
+            filter_candidates(r, mesh, grid, options, scratch, filter, over)?;
+            r.dispatch(&Fit { first: 0, ..fit }, spec, Groups::Count(1))?;
+        }
+        r.barrier("fit → codes.emit");
+        Ok(())
+    })
+}
+
+/// What is counted and filtered: all tetrahedra, or as many as the device says.
+#[derive(Clone, Copy)]
+struct Over {
+    /// Word for the number of shares.
+    total: BufferRef,
+    tries: Option<TryScratch>,
+    /// What a finer level has marked.
+    marks: Option<BufferRef>,
+}
+
+impl Over {
+    fn all(scratch: &CountScratch) -> Self {
+        Self { total: scratch.total, tries: None, marks: None }
+    }
+
+    /// Of the dispatch over so many items, one of the three that [`Fit`] plans.
+    fn groups(&self, slot: u64, items: u32, workgroup: u32) -> Groups {
+        self.tries.map_or(Groups::Count(items.div_ceil(workgroup)), |tries| Groups::Indirect(tries.groups.part(12 * slot, 12)))
+    }
+}
+
+fn count_candidates(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+    over: Over,
+) -> Result<()> {
+    let MeshInput { cells, tets, .. } = mesh.input;
+    let (workgroup, offsets) = (r.gpu().target().each, scratch.offsets);
+    let marks = over.marks.unwrap_or_else(|| r.gpu().nothing());
+    let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
+    let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
+    let spec = CountSpec { workgroup, share, clear, ..Default::default() };
+    r.dispatch(&count, spec, over.groups(0, tets + 1, workgroup))?;
+    let all = over.tries.map_or(Count::host(tets + 1), |tries| Count::device(tets + 1, tries.live));
+    cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
+}
+
+fn filter_candidates(
+    r: &mut Recorder<'_>,
+    mesh: &MeshView,
+    grid: BufferRef,
+    options: &BuildOptions,
+    scratch: &CountScratch,
+    filter: &FilterScratch,
+    over: Over,
+) -> Result<()> {
+    let MeshInput { cells, tets, .. } = mesh.input;
+    let workgroup = r.gpu().target().each;
+    if let Some(seeds) = &filter.seeds {
+        r.fill(seeds.doubt_count, 0);
+    }
+    let all = Count::device(filter.most, over.total);
+    let later = all.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
+    let nothing = r.gpu().nothing();
+    let SeedScratch { marks, doubts, doubt_count } =
+        filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
+    let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
+    let (quantized, offsets, shares, capacity) = (vertices, scratch.offsets, over.total, filter.most);
+    let (hits, counts) = (filter.hits, filter.counts);
+    if filter.seeds.is_some() {
+        let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
+        let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
+        r.dispatch(&mark, spec, over.groups(1, tets.div_ceil(32), workgroup))?;
+        r.barrier("codes.mark → codes.mark_later");
+        r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
+        r.barrier("codes.mark → codes.filter");
+    }
+    let arguments = Filter {
+        grid,
+        quantized,
+        cells,
+        bad,
+        vertices,
+        offsets,
+        shares,
+        hits,
+        counts,
+        marks,
+        boundary,
+        doubts,
+        doubt_count,
+        tets,
+        capacity,
+    };
+    let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
+    r.dispatch(&arguments, spec, over.groups(2, tets, workgroup))?;
+    r.barrier("codes.filter → codes.filter_later");
+    r.dispatch(&arguments, FilterSpec { later: 1, ..spec }, later)?;
+    if filter.seeds.is_some() {
+        r.barrier("codes.filter → codes.doubts");
+        let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
+        let settle = SettleSeeds {
+            grid,
+            quantized,
+            cells,
+            bad,
+            vertices,
+            offsets,
+            hits,
+            counts,
+            marks,
+            neighbours,
+            doubts,
+            doubt_count,
+            tets,
+            capacity,
+        };
+        r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
+    }
+    let entries = over.tries.map_or(filter.entries, |tries| tries.entries);
+    cmd_exclusive_scan(r, counts, counts, entries, all, &filter.scan)
+}
