@@ -33,6 +33,8 @@ mod tags;
 mod tetgen;
 mod unpack;
 mod vtk;
+mod vtk_attributes;
+mod vtk_reader;
 mod vtu;
 mod vtu_data;
 mod write;

@@ -1,0 +1,145 @@
+//! Arrays of legacy VTK files.
+
+use super::scalar::Scalar;
+use super::source::{parse_integer, printable};
+use super::vtk_reader::Reader;
+use crate::error::Result;
+use crate::mesh::On;
+
+/// What `POINT_DATA` or `CELL_DATA` said.
+pub(super) type Section = (On, usize);
+
+/// Name, components and values of an array.
+pub(super) type Named = (String, usize, Vec<f32>);
+
+impl Reader<'_> {
+    fn name(&mut self) -> Result<String> {
+        let (word, _) = self.tokens.word("the name of an array")?;
+        Ok(decode_name(word))
+    }
+
+    /// An array in a `POINT_DATA` or `CELL_DATA` section (or before them, where it belongs to neither).
+    pub(super) fn attribute(&mut self, keyword: &[u8], at: usize, section: Option<Section>) -> Result<Vec<Named>> {
+        let unknown = || Err(self.source.error_line(at, format!("`{}` where a keyword should be", printable(keyword))));
+        if keyword == b"FIELD" {
+            return self.field();
+        }
+        let Some((_, n)) = section else { return unknown() };
+        let (components, typed) = match keyword {
+            b"SCALARS" => return self.scalars(n),
+            b"LOOKUP_TABLE" => return self.lookup_table(),
+            b"VECTORS" | b"NORMALS" => (3, true),
+            b"TENSORS" => (9, true),
+            b"TENSORS6" => (6, true),
+            b"GLOBAL_IDS" | b"PEDIGREE_IDS" | b"EDGE_FLAGS" => (1, true),
+            b"TEXTURE_COORDINATES" => (0, true),
+            b"COLOR_SCALARS" => (0, false),
+            _ => return unknown(),
+        };
+        let name = self.name()?;
+        let components = if components == 0 { self.components()? } else { components };
+        // Colours are bytes in binary files and fractions in text.
+        let scalar = if typed { self.scalar()? } else { Some(if self.binary { Scalar::U8 } else { Scalar::F32 }) };
+        let values = self.values(scalar, n * components, &value_of(&name))?;
+        Ok(vec![(name, components, values)])
+    }
+
+    fn components(&mut self) -> Result<usize> {
+        let (token, at) = self.tokens.word("a number of components")?;
+        let n = parse_integer(token).filter(|n| (1..=9).contains(n));
+        n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("{} components, not 1 to 9", printable(token))))
+    }
+
+    fn scalars(&mut self, n: usize) -> Result<Vec<Named>> {
+        let name = self.name()?;
+        let scalar = self.scalar()?;
+        let mut rest = self.tokens.clone();
+        let same_line = rest.line().map_or(&b""[..], |(line, _)| line.trim_ascii());
+        let components = if same_line.is_empty() { 1 } else { self.components()? };
+        // The look-up table is required, but often missing.
+        let mut ahead = self.tokens.clone();
+        ahead.line();
+        if ahead.line().is_some_and(|(line, _)| line.trim_ascii().get(..12).is_some_and(|w| w.eq_ignore_ascii_case(b"LOOKUP_TABLE"))) {
+            self.tokens.next_token();
+            self.tokens.next_token();
+        }
+        let values = self.values(scalar, n * components, &value_of(&name))?;
+        Ok(vec![(name, components, values)])
+    }
+
+    /// A table of colours, which is of no use here.
+    fn lookup_table(&mut self) -> Result<Vec<Named>> {
+        self.name()?;
+        let n = self.tokens.count("the size of a look-up table")?;
+        let scalar = Some(if self.binary { Scalar::U8 } else { Scalar::F32 });
+        self.values::<f32>(scalar, 4 * n, "a colour")?;
+        Ok(Vec::new())
+    }
+
+    fn field(&mut self) -> Result<Vec<Named>> {
+        self.name()?;
+        let n = self.tokens.count("the number of arrays")?;
+        let mut arrays = Vec::new();
+        for _ in 0..n {
+            while self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"METADATA")) {
+                self.tokens.next_token();
+                self.metadata();
+            }
+            let name = self.name()?;
+            let components = self.size("a number of components")?;
+            let count = components * self.size("a number of tuples")?;
+            if self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"string")) {
+                self.tokens.next_token();
+                self.strings(count)?;
+                continue;
+            }
+            let scalar = self.scalar()?;
+            let values = self.values(scalar, count, &value_of(&name))?;
+            arrays.push((name, components, values));
+        }
+        Ok(arrays)
+    }
+
+    /// Skips texts: one per line, or each with its length before it in binary.
+    fn strings(&mut self, count: usize) -> Result<()> {
+        self.tokens.line();
+        for _ in 0..count {
+            if !self.binary {
+                let at = self.tokens.at;
+                self.tokens.line().ok_or_else(|| self.source.error_line(at, "the file ends in an array of texts"))?;
+                continue;
+            }
+            let at = self.tokens.at;
+            let rest = &self.source.bytes[at..];
+            let head = rest.first().copied().unwrap_or(0);
+            // The upper two bits tell how many bytes hold the length: 8, 4, 2 or 1.
+            let size = 8usize >> (head >> 6);
+            let word = rest.get(..size).ok_or_else(|| self.source.error_byte(at, "the file ends in an array of texts"))?;
+            let length = word.iter().fold(0u64, |n, &b| n << 8 | u64::from(b)) & (u64::MAX >> (64 - 8 * size) >> 2);
+            let end = usize::try_from(length).ok().and_then(|n| n.checked_add(size)).filter(|&n| n <= rest.len());
+            self.tokens.at += end.ok_or_else(|| self.source.error_byte(at, format!("a text of {length} bytes")))?;
+        }
+        Ok(())
+    }
+}
+
+fn value_of(name: &str) -> String {
+    format!("a value of array `{}`", printable(name.as_bytes()))
+}
+
+/// Names have spaces and the like as %20.
+fn decode_name(word: &[u8]) -> String {
+    let mut out = Vec::with_capacity(word.len());
+    let mut rest = word;
+    while let [first, tail @ ..] = rest {
+        let hex = tail.get(..2).filter(|_| *first == b'%').and_then(|h| std::str::from_utf8(h).ok());
+        if let Some(byte) = hex.and_then(|h| u8::from_str_radix(h, 16).ok()) {
+            out.push(byte);
+            rest = &tail[2..];
+        } else {
+            out.push(*first);
+            rest = tail;
+        }
+    }
+    String::from_utf8_lossy(&out).into_owned()
+}
