@@ -172,7 +172,7 @@ pub(super) struct Block {
 }
 
 /// One in so many entries of a tree with all lists is taken to be left with lists where the surface is; Jets has one in 11 at α = 0, smaller meshes have
-/// more. What turns out larger is cut again: of the meshes that were tried none was, thin walls included.
+/// more. What turns out larger is cut again.
 const SURFACE: u64 = 8;
 
 /// Where the tetrahedra of a block are.
