@@ -7,7 +7,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
-use olbvh::query::{self, Drawn, LocateOptions, Party, Searched};
+use olbvh::query::{self, Built, Drawn, LocateOptions, Party};
 use olbvh::reference::boundary::NONE;
 use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
@@ -140,8 +140,8 @@ fn same_picture(name: &str, b: &Both, settings: &RenderSettings, field: &Field) 
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
     let prepared = Prepared::new(settings, &b.mesh, &bounds, &neighbours, valid, field).ok()?;
     let normals = settings.shading.then_some(&prepared.normals[..]);
-    let draw = |built: Searched| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, &|_, _| {}).unwrap();
-    let (expected, drawn) = (draw((&b.tree).into()), draw((&b.lbvh).into()));
+    let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, &|_, _| {}).unwrap();
+    let (expected, drawn) = (draw(&b.tree), draw(&b.lbvh));
     let camera = &settings.camera;
     // The octree skips what shows no surface; nothing is skipped of a function that shows every value.
     assert!(expected.skipped_samples > 0 || expected.found_samples == drawn.found_samples, "{name}, {camera:?}: samples in the mesh");
@@ -169,7 +169,7 @@ fn check_slices(name: &str, b: &Both) -> u64 {
     for (plane, layers) in [(Plane::Axis(0), 1), (Plane::Axis(2), 3), (Plane::Normal([1.0, -2.0, 0.7]), 2)] {
         let settings = SliceSettings { plane, layers, size: size(name, [17, 13]), ..SliceSettings::default() };
         let Ok(voxels) = settings.voxels(lo, hi, b.mesh.origin) else { continue };
-        let slice = |built: Searched| {
+        let slice = |built: &dyn Built| {
             let (mut kinds, mut owners) = (Vec::new(), Vec::new());
             let mut sink = |band: Band| {
                 kinds.extend(band.kinds);
@@ -180,7 +180,7 @@ fn check_slices(name: &str, b: &Both) -> u64 {
             touched += sliced.tally.touched;
             (kinds, owners)
         };
-        let [expected, found] = [(&b.tree).into(), (&b.lbvh).into()].map(slice);
+        let [expected, found] = [&b.tree as &dyn Built, &b.lbvh].map(slice);
         assert!(expected.0 == found.0, "{name}: kinds of {plane:?}");
         assert!(expected.1 == found.1, "{name}: owners of {plane:?}");
     }

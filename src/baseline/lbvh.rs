@@ -6,7 +6,8 @@ use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
-use crate::query::{BinaryTree, LocateOutput, Located, Rounds, Searched, Structure};
+use crate::query::sealed::Sealed;
+use crate::query::{BinaryTree, Built, LocateOutput, Located, Rounds, Searched, Structure};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
 const CODE_BITS: u32 = 31;
@@ -216,8 +217,10 @@ impl Lbvh {
     }
 }
 
-impl From<&Lbvh> for Searched {
-    fn from(lbvh: &Lbvh) -> Self {
-        Self { mesh: lbvh.mesh.view, structure: Structure::Binary(lbvh.tree) }
+impl Sealed for Lbvh {}
+
+impl Built for Lbvh {
+    fn searched(&self) -> Searched {
+        Searched { mesh: self.mesh.view, structure: Structure::Binary(self.tree) }
     }
 }

@@ -96,10 +96,10 @@ impl Structure {
     }
 
     /// As pictures and slices take it; `None` for rays, which only locate.
-    pub(super) fn searched(&self) -> Option<query::Searched> {
+    pub(super) fn built(&self) -> Option<&dyn query::Built> {
         match self {
-            Self::Octree(tree) => Some(tree.into()),
-            Self::Lbvh(lbvh) => Some(lbvh.into()),
+            Self::Octree(tree) => Some(tree),
+            Self::Lbvh(lbvh) => Some(lbvh),
             Self::Rays(_) => None,
         }
     }

@@ -73,15 +73,15 @@ impl<'a> Subject<'a> {
 
     /// Draws the field; `None` where the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
-        let (Some(searched), Some(plan)) = (structure.searched(), &self.plan) else { return Ok(None) };
-        query::render(&self.device, searched, plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
+        let (Some(built), Some(plan)) = (structure.built(), &self.plan) else { return Ok(None) };
+        query::render(&self.device, built, plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
     }
 
     /// Slices the mesh through its middle; `None` where the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
-        let (Some(searched), Some(voxels)) = (structure.searched(), &self.voxels) else { return Ok(None) };
+        let (Some(built), Some(voxels)) = (structure.built(), &self.voxels) else { return Ok(None) };
         let field = Some((self.field.values.as_slice(), On::Points));
-        query::slice(&self.device, searched, field, voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
+        query::slice(&self.device, built, field, voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
     }
 }
 

@@ -119,8 +119,8 @@ impl Searched {
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if that was built over another mesh.
-    pub fn new(mesh: &DeviceMesh, built: impl Into<Self>) -> Result<Self> {
-        let searched = built.into();
+    pub fn new(mesh: &DeviceMesh, built: &dyn Built) -> Result<Self> {
+        let searched = built.searched();
         mesh.check(&searched.mesh)?;
         Ok(searched)
     }
@@ -139,9 +139,22 @@ impl Searched {
     }
 }
 
-impl From<&Tree> for Searched {
-    fn from(tree: &Tree) -> Self {
-        Self { mesh: *tree.mesh(), structure: Structure::Octree(*tree.memory()) }
+/// What owning calls find cells with: a tree or an LBVH, there as long as the call, which a [`Searched`] or a [`Scene`] alone does not see to.
+pub trait Built: sealed::Sealed {
+    /// It and its mesh, as recorded functions take them.
+    fn searched(&self) -> Searched;
+}
+
+pub(crate) mod sealed {
+    /// No others are known to be there.
+    pub trait Sealed {}
+}
+
+impl sealed::Sealed for Tree {}
+
+impl Built for Tree {
+    fn searched(&self) -> Searched {
+        Searched { mesh: *self.mesh(), structure: Structure::Octree(*self.memory()) }
     }
 }
 

@@ -7,7 +7,7 @@ use crate::gpu::{Buffer, Gpu};
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Rounds, Searched};
+use crate::query::{Built, Rounds, Searched};
 use crate::reference::vertices::CellRange;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, RUN, Rows, TOUCHED, Tally, VoxelGrid, bands};
 
@@ -56,7 +56,7 @@ impl<'a> Slicing<'a> {
     /// As [`slice`].
     pub(crate) fn new(
         mesh: &'a DeviceMesh,
-        built: impl Into<Searched>,
+        built: &dyn Built,
         field: Option<(&[f32], On)>,
         (voxels, extrapolate): (&'a VoxelGrid, Extrapolate),
         part: Option<CellRange>,
@@ -129,7 +129,7 @@ impl<'a> Slicing<'a> {
 /// `sink`.
 pub fn slice(
     mesh: &DeviceMesh,
-    built: impl Into<Searched>,
+    built: &dyn Built,
     field: Option<(&[f32], On)>,
     voxels: &VoxelGrid,
     extrapolate: Extrapolate,

@@ -7,7 +7,7 @@ use crate::gpu::{Buffer, BufferRef, Gpu};
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Rounds, Searched, Structure};
+use crate::query::{Built, Rounds, Searched, Structure};
 use crate::reference::vertices::CellRange;
 use crate::render::Plan;
 
@@ -74,7 +74,7 @@ impl<'a> Canvas<'a> {
     /// As [`render`].
     pub(crate) fn new(
         mesh: &'a DeviceMesh,
-        built: impl Into<Searched>,
+        built: &dyn Built,
         plan: &'a Plan,
         (values, on): (&[f32], On),
         normals: Option<&[[f32; 3]]>,
@@ -191,7 +191,7 @@ impl<'a> Canvas<'a> {
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field or normals have the wrong length.
 pub fn render(
     mesh: &DeviceMesh,
-    built: impl Into<Searched>,
+    built: &dyn Built,
     plan: &Plan,
     field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
