@@ -20,7 +20,8 @@ const POINTS: u32 = 1 << 17;
 const CELLS: u32 = 32;
 
 fn setting() -> (Gpu, Mesh) {
-    (Gpu::new(&GpuOptions::default()).expect("a device"), kuhn_jittered([CELLS; 3], 0.3, 1).expect("a mesh"))
+    // Moved by more, some cells turn over and lie in others, where trees may name different owners.
+    (Gpu::new(&GpuOptions::default()).expect("a device"), kuhn_jittered([CELLS; 3], 0.2, 1).expect("a mesh"))
 }
 
 fn location(c: &mut Criterion) {
