@@ -94,8 +94,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, sought_at(g, place, x, tolerance));
     uint owner = decide(best, leaf, tolerance);
     if (owner == NONE) return NONE;
-    Tet tet = load_tet(words(cells.at[owner]));
-    weights_of_owner = barycentric(weights(tet, x), tet.rank);
+    weights_of_owner = barycentric(load_tet(words(cells.at[owner])), x);
     return owner;
 }
 

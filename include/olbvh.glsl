@@ -493,6 +493,12 @@ vec4 olbvh_barycentric(olbvh_Sides r) {
     return b;
 }
 
+// The same of any point, in the caller's order: what an owner comes with, whatever found it.
+vec4 olbvh_barycentric(olbvh_Tet t, vec3 olbvh_p) {
+    vec4 b = olbvh_barycentric(olbvh_sides_of(t.v, olbvh_bounds_of(t.v), olbvh_p));
+    return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
+}
+
 // What has these values at the corners, at barycentric coordinates.
 float olbvh_weighed(vec4 b, vec4 at_corners) {
     precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
@@ -782,6 +788,16 @@ olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(olbvh_corners_of(s), ol
 
 olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corners_of(s), s.box, x); }
 
+float olbvh_of_vertex(olbvh_Stand s, vec4 ascending, uint id) {
+    return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
+}
+
+// Barycentric coordinates of the point that these are the sides of, in the caller's order.
+vec4 olbvh_barycentric(olbvh_Stand s, olbvh_Sides at) {
+    vec4 b = olbvh_barycentric(at);
+    return vec4(olbvh_of_vertex(s, b, s.cell.x), olbvh_of_vertex(s, b, s.cell.y), olbvh_of_vertex(s, b, s.cell.z), olbvh_of_vertex(s, b, s.cell.w));
+}
+
 uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
 // What is held of one kind after a step.
@@ -1032,8 +1048,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, olbvh_sought_at(g, place, x, tolerance));
     uint owner = olbvh_decide(best, leaf, tolerance);
     if (owner == olbvh_NONE) return olbvh_NONE;
-    olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[owner]));
-    weights_of_owner = olbvh_barycentric(olbvh_weights(tet, x), tet.rank);
+    weights_of_owner = olbvh_barycentric(olbvh_load_tet(olbvh_words(olbvh_cells.at[owner])), x);
     return owner;
 }
 

@@ -38,10 +38,7 @@ void main() {
         uint owner, work = 0u;
         if (find_owner(s, g, at, x, tolerance, work, budget, owner)) {
             vec4 b = vec4(0.0);
-            if (owner != NONE) {
-                Tet tet = load_tet(words(cells.at[owner]));
-                b = barycentric(weights(tet, x), tet.rank);
-            }
+            if (owner != NONE) b = barycentric(load_tet(words(cells.at[owner])), x);
             state = floatBitsToUint(b);
         } else {
             waits = 1u;

@@ -41,10 +41,9 @@ void locate(uint i) {
             for (uint side = 0u; side < 2u && owner == NONE; ++side) {
                 if (pair[side] == NONE) continue;
                 Tet tet = load_tet(words(cells.at[pair[side]]));
-                Weights w = weights(tet, x);
-                if (!w.inside) continue;
+                if (!weights(tet, x).inside) continue;
                 owner = pair[side];
-                b = barycentric(w, tet.rank);
+                b = barycentric(tet, x);
             }
         }
     }

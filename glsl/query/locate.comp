@@ -28,7 +28,7 @@ RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, guides)
 BUFFER(10, READ_WRITE, uint, owners)
-BUFFER16(11, READ_WRITE, vec4, barycentrics) // between slices: inside, in_box, smallest
+BUFFER16(11, READ_WRITE, FLOATS, barycentrics) // between slices: inside, in_box, smallest
 RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
@@ -73,8 +73,7 @@ void main() {
             Sides sides = sides_of(stand, a.x);
             if (sides.clear) {
                 owners.at[a.i] = stand.t;
-                Tet tet = tet_of(stand);
-                barycentrics.at[a.i] = last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(weights(tet, a.x), tet.rank);
+                barycentrics.at[a.i] = record(last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(stand, sides));
                 if (++place < end) a = point_at(g, place);
                 left = HINTED;
                 in_leaf = false;
@@ -86,7 +85,7 @@ void main() {
         if (place >= end) break;
         Best best = no_best();
         if (slice > 0u) {
-            vec4 state = barycentrics.at[a.i];
+            vec4 state = floats(barycentrics.at[a.i]);
             best = Best(owners.at[a.i], state.x != 0.0, state.y != 0.0, state.z);
         }
         if (at_face) {
@@ -107,12 +106,9 @@ void main() {
         if (!walks && !best.inside) search(best, begin, behind, sought_at(g, a.at, a.x, tolerance));
         uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
         vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
-        if (last != 0u && owner != NONE) {
-            Tet tet = load_tet(words(cells.at[owner]));
-            b = barycentric(weights(tet, a.x), tet.rank);
-        }
+        if (last != 0u && owner != NONE) b = barycentric(load_tet(words(cells.at[owner])), a.x);
         owners.at[a.i] = last == 0u ? best.owner : owner;
-        barycentrics.at[a.i] = b;
+        barycentrics.at[a.i] = record(b);
         if (++place < end) {
             a = point_at(g, place);
             // Where a list goes on in the next slice, the owner is not known yet.

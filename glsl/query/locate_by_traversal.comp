@@ -63,10 +63,7 @@ void main() {
             consider(best, t, tet, weights(tet, x));
         }
         owner = decide(best, leaf_found, tolerance);
-        if (owner != NONE) {
-            Tet tet = load_tet(words(cells.at[owner]));
-            b = barycentric(weights(tet, x), tet.rank);
-        }
+        if (owner != NONE) b = barycentric(load_tet(words(cells.at[owner])), x);
     }
     owners.at[i] = owner;
     barycentrics.at[i] = b;

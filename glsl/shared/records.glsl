@@ -6,9 +6,11 @@
 #define RECORDS(slot, T, name) BUFFER16(slot, readonly, u64vec2, name)
 uvec4 words(u64vec2 record) { return uvec4(unpack32(record.x), unpack32(record.y)); }
 vec4 floats(u64vec2 record) { return uintBitsToFloat(words(record)); }
+u64vec2 record(vec4 floats) { return u64vec2(pack64(floatBitsToUint(floats.xy)), pack64(floatBitsToUint(floats.zw))); }
 #else
 #define FLOATS vec4
 #define RECORDS(slot, T, name) BUFFER16(slot, readonly, T, name)
 uvec4 words(uvec4 record) { return record; }
 vec4 floats(vec4 record) { return record; }
+vec4 record(vec4 floats) { return floats; }
 #endif

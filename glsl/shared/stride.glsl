@@ -42,6 +42,16 @@ Tet tet_of(Stand s) { return Tet(corners_of(s), ranks(s.cell)); }
 
 Sides sides_of(Stand s, vec3 x) { return sides_of(corners_of(s), s.box, x); }
 
+float of_vertex(Stand s, vec4 ascending, uint id) {
+    return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
+}
+
+// Barycentric coordinates of the point that these are the sides of, in the caller's order.
+vec4 barycentric(Stand s, Sides at) {
+    vec4 b = barycentric(at);
+    return vec4(of_vertex(s, b, s.cell.x), of_vertex(s, b, s.cell.y), of_vertex(s, b, s.cell.z), of_vertex(s, b, s.cell.w));
+}
+
 uvec3 kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
 // What is held of one kind after a step.

@@ -144,6 +144,12 @@ vec4 barycentric(Sides r) {
     return b;
 }
 
+// The same of any point, in the caller's order: what an owner comes with, whatever found it.
+vec4 barycentric(Tet t, vec3 p) {
+    vec4 b = barycentric(sides_of(t.v, bounds_of(t.v), p));
+    return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
+}
+
 // What has these values at the corners, at barycentric coordinates.
 float weighed(vec4 b, vec4 at_corners) {
     precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);

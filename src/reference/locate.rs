@@ -183,8 +183,7 @@ impl<'a> Locator<'a> {
     }
 
     fn location(&self, owner: u32, x: Vec3) -> Location {
-        let (tet, weights) = self.weights(owner, x);
-        Location { owner, barycentric: weights.barycentric(tet.rank) }
+        Location { owner, barycentric: self.vertices.tet(self.mesh.tets[owner as usize]).barycentric(x) }
     }
 
     /// The walk to a point, if its leaf is one to walk through: what [`Locator::locate`] does there.

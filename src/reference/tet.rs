@@ -129,6 +129,12 @@ impl Sides {
 }
 
 impl Tet {
+    /// Barycentric coordinates of `p` in the caller's order of vertices: what an owner comes with, whatever found it.
+    pub fn barycentric(&self, p: Vec3) -> [f32; 4] {
+        let b = sides_of(self.v, &Bounds::new(self.v), p).barycentric();
+        self.rank.map(|r| b[r])
+    }
+
     /// The tetrahedron `ids` (four different vertices) of a mesh with these normalised points.
     pub fn new(ids: [u32; 4], normalised: &[Vec3]) -> Self {
         let rank = ids.map(|id| ids.iter().filter(|&&other| other < id).count());
