@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use olbvh::build::{BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, SortedScratch, Tree};
-use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::gpu::{Buffer, Gpu, GpuOptions};
 use olbvh::mesh::kuhn;
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
@@ -52,4 +52,33 @@ fn a_build_allocates_what_it_needs() {
         drop(tree);
         assert_eq!(allocated(&gpu), before, "{assign}");
     }
+}
+
+/// Dropped buffers wait for others of nearly their size, up to a limit, as long as a handle is there.
+#[test]
+fn a_pool_keeps_what_is_dropped() {
+    const MIB: u64 = 1 << 20;
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let none = allocated(&gpu);
+    let pooled = gpu.with_pool(4 * MIB);
+    let buffer = |size: u64| pooled.buffer("olbvh.test.kept", size).unwrap();
+    let handle_of = |buffer: Buffer| buffer.all().buffer();
+    let handle = handle_of(buffer(MIB));
+    assert!(allocated(&gpu) >= none + MIB, "nothing is kept");
+    for other in [MIB / 2, 2 * MIB] {
+        assert_ne!(handle_of(buffer(other)), handle, "{other} bytes took the place of {MIB}");
+    }
+    let again = buffer(MIB - MIB / 16);
+    assert_eq!((again.size(), handle_of(again)), (MIB - MIB / 16, handle));
+    // It still holds as much as at first.
+    let words: Vec<u32> = (0..1 << 18).collect();
+    let written = pooled.upload("olbvh.test.kept", &words).unwrap();
+    assert_eq!(pooled.download::<u32>(&written, written.all()).unwrap(), words);
+    let many: Vec<_> = (0..9).map(|_| buffer(MIB)).collect();
+    drop((many, written));
+    let kept = allocated(&gpu) - none;
+    assert!((MIB..=4 * MIB).contains(&kept), "{kept} bytes are kept");
+    assert!(gpu.with_pool(MIB).with_memory(64 * MIB).buffer("olbvh.test.limited", MIB).is_ok());
+    drop(pooled);
+    assert_eq!(allocated(&gpu), none);
 }

@@ -5,6 +5,7 @@ use super::constants::Constants;
 use super::foundation::Foundation;
 use super::ledger::Ledger;
 use super::pipelines::Pipelines;
+use super::pool::Pool;
 use super::ray_functions::Acceleration;
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
@@ -44,6 +45,7 @@ pub struct Gpu {
     inner: Arc<Inner>,
     target: Arc<Target>,
     ledger: Option<Arc<Ledger>>,
+    pool: Option<Arc<Pool>>,
 }
 
 struct Inner {
@@ -122,7 +124,7 @@ impl Gpu {
             foundation,
         };
         inner.constants.make(&inner.foundation, inner.debug_device.as_ref())?;
-        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None };
+        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None, pool: None };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
         }
@@ -158,7 +160,7 @@ impl Gpu {
     /// [`Error::Invalid`] if they do not fit the device.
     pub fn with_target(&self, target: Target) -> Result<Self> {
         target.check(&self.report().room)?;
-        Ok(Self { inner: self.inner.clone(), target: Arc::new(target), ledger: self.ledger.clone() })
+        Ok(Self { target: Arc::new(target), ..self.clone() })
     }
 
     /// Whether both are handles of one opened device.
@@ -167,10 +169,20 @@ impl Gpu {
     }
 
     /// The same device, where all buffers made from this handle and its clones take at most `bytes` together, transfers included: the next one is refused
-    /// with [`Error::Memory`]. The allocator takes memory from the driver in blocks of 16 MiB, or as large as a larger buffer.
+    /// with [`Error::Memory`]. The allocator takes memory from the driver in blocks of 16 MiB, or as large as a larger buffer. Nothing is kept
+    /// ([`Gpu::with_pool`]).
     #[must_use]
     pub fn with_memory(&self, bytes: u64) -> Self {
-        Self { ledger: Some(Arc::new(Ledger::new(bytes))), ..self.clone() }
+        Self { ledger: Some(Arc::new(Ledger::new(bytes))), pool: None, ..self.clone() }
+    }
+
+    /// The same device, where memory of large buffers made from this handle and its clones, up to `bytes` together, is kept when they are dropped, for
+    /// others of nearly the same size, until this handle, its clones and what was made from them are gone, or the device is full. For what is done again and
+    /// again: drivers clear fresh memory, which may take as long as the work on it.
+    #[must_use]
+    pub fn with_pool(&self, bytes: u64) -> Self {
+        let plain = Self { pool: None, ..self.clone() };
+        Self { pool: Some(Arc::new(Pool::new(plain, bytes))), ledger: None, ..self.clone() }
     }
 
     /// What [`Gpu::with_memory`] was told; all there are without a limit.
@@ -190,6 +202,10 @@ impl Gpu {
 
     pub(super) fn ledger(&self) -> Option<&Ledger> {
         self.ledger.as_deref()
+    }
+
+    pub(super) fn pool(&self) -> Option<&Pool> {
+        self.pool.as_deref()
     }
 
     /// Tests that the device can be trusted with these shapes of the kernels, as opening it does.

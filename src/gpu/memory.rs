@@ -2,6 +2,7 @@
 
 use super::buffer_ref::{BufferRef, USAGE};
 use super::context::Gpu;
+use super::pool::{Kind, Pool};
 use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -14,15 +15,75 @@ pub const ALIGNMENT: u64 = 256;
 /// Addresses of buffers are multiples of this, whatever the device asks for: kernels load 16 bytes at once.
 const LEAST_ALIGNMENT: u64 = 16;
 
-/// A buffer with memory of its own, freed when dropped.
-pub struct Buffer {
-    gpu: Gpu,
+/// A Vulkan buffer and what it lies in.
+pub(super) struct Memory {
+    pub kind: Kind,
+    /// Bytes of the Vulkan buffer.
+    pub size: u64,
     handle: vk::Buffer,
     allocation: Option<Allocation>,
+    address: u64,
+}
+
+impl Memory {
+    /// A buffer of `size` bytes in fresh memory, which takes so many as `claim` is told.
+    fn new(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<Self> {
+        let device = gpu.device();
+        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
+        let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage);
+        // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.
+        let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
+        let mut memory = Self { kind, size, handle, allocation: None, address: 0 };
+        let made = memory.bind(gpu, name, claim);
+        if let Err(e) = made {
+            memory.free(gpu);
+            return Err(e);
+        }
+        Ok(memory)
+    }
+
+    fn bind(&mut self, gpu: &Gpu, name: &str, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<()> {
+        let (device, handle) = (gpu.device(), self.handle);
+        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: self.size, reason };
+        // SAFETY: the handle was just made.
+        let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+        requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
+        claim(requirements.size)?;
+        let (location, allocation_scheme) = (self.kind.location, AllocationScheme::GpuAllocatorManaged);
+        let description = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
+        let mut allocator = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
+        let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
+        drop(allocator);
+        // SAFETY: fresh memory of the right requirements, bound once.
+        let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+        self.allocation = Some(allocation);
+        bound.map_err(failed("vkBindBufferMemory"))?;
+        if gpu.has_addresses() {
+            // SAFETY: the buffer was made with the address usage and is bound.
+            self.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
+        }
+        Ok(())
+    }
+
+    /// Gives it back to the driver.
+    pub(super) fn free(self, gpu: &Gpu) {
+        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
+        unsafe { gpu.device().destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Ok(mut allocator)) = (self.allocation, gpu.allocator().lock())
+            && let Err(e) = allocator.free(allocation)
+        {
+            log::error!("freeing {} bytes: {e}", self.size);
+        }
+    }
+}
+
+/// A buffer with memory of its own, freed when dropped, or kept for the next ([`Gpu::with_pool`]).
+pub struct Buffer {
+    gpu: Gpu,
+    memory: Option<Memory>,
     /// Bytes counted in the device's ledger.
     claimed: u64,
     size: u64,
-    address: u64,
     name: String,
 }
 
@@ -42,8 +103,6 @@ impl Buffer {
 
     /// A buffer with usage flags beside those of every buffer.
     pub(super) fn with_usage(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation, more: vk::BufferUsageFlags) -> Result<Self> {
-        let device = gpu.device();
-        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
         let mut usage = USAGE | more;
         if gpu.has_addresses() {
             usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
@@ -51,37 +110,35 @@ impl Buffer {
         if gpu.acceleration().is_some() {
             usage |= vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
         }
-        let info = vk::BufferCreateInfo::default().size(size.max(16)).usage(usage);
-        // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.
-        let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
-        // SAFETY: the handle was just made.
-        let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-        requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
-        let description =
-            AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme: AllocationScheme::GpuAllocatorManaged };
-        let mut buffer = Self { gpu: gpu.clone(), handle, allocation: None, claimed: 0, size, address: 0, name: name.into() };
-        if let Some(ledger) = gpu.ledger() {
-            let full = |used: u64| memory_error(format!("{used} of the {} bytes that may be used are in use", ledger.limit()));
-            ledger.claim(requirements.size).map_err(full)?;
-            buffer.claimed = requirements.size;
-        }
-        let allocated = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()));
-        buffer.allocation = Some(allocated.and_then(|mut a| a.allocate(&description).map_err(|e| memory_error(e.to_string())))?);
-        if let Some(allocation) = &buffer.allocation {
-            // SAFETY: fresh memory of the right requirements, bound once.
-            unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) }.map_err(failed("vkBindBufferMemory"))?;
-        }
-        if gpu.has_addresses() {
-            // SAFETY: the buffer was made with the address usage and is bound.
-            buffer.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
-        }
-        debug::name(gpu.debug_device(), handle, name);
+        let kind = Kind { usage, location };
+        let mut buffer = Self { gpu: gpu.clone(), memory: None, claimed: 0, size, name: name.into() };
+        let claimed = &mut buffer.claimed;
+        let mut claim = |bytes: u64| {
+            let Some(ledger) = gpu.ledger() else { return Ok(()) };
+            let reason = |used: u64| format!("{used} of the {} bytes that may be used are in use", ledger.limit());
+            ledger.claim(bytes).map_err(|used| Error::Memory { name: name.into(), bytes: size, reason: reason(used) })?;
+            *claimed = bytes;
+            Ok(())
+        };
+        let mut fresh = || Memory::new(gpu, name, kind, size.max(16), &mut claim);
+        let memory = match gpu.pool().and_then(|pool| pool.take(kind, size)) {
+            Some(memory) => memory,
+            // What is kept may be what is missing.
+            None => fresh().or_else(|e| if gpu.pool().is_some_and(Pool::clear) { fresh() } else { Err(e) })?,
+        };
+        debug::name(gpu.debug_device(), memory.handle, name);
+        buffer.memory = Some(memory);
         Ok(buffer)
+    }
+
+    fn memory(&self) -> &Memory {
+        self.memory.as_ref().unwrap_or_else(|| unreachable!("memory is taken in drop only"))
     }
 
     /// The whole buffer as an argument.
     pub fn all(&self) -> BufferRef {
-        BufferRef { buffer: self.handle, offset: 0, size: self.size, address: self.address }
+        let Memory { handle, address, .. } = *self.memory();
+        BufferRef { buffer: handle, offset: 0, size: self.size, address }
     }
 
     /// Bytes asked for.
@@ -97,7 +154,7 @@ impl Buffer {
     /// The allocation, if its memory has these properties besides being coherent.
     fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
         let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;
-        self.allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
+        self.memory().allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
     }
 
     /// The bytes, where the host sees them as the device does: nothing here flushes a cache.
@@ -113,7 +170,7 @@ impl Buffer {
     /// As [`Buffer::mapped`], to write.
     pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
         self.coherent(vk::MemoryPropertyFlags::empty())?;
-        self.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
+        self.memory.as_mut()?.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
     }
 }
 
@@ -135,15 +192,14 @@ impl std::fmt::Debug for Buffer {
 
 impl Drop for Buffer {
     fn drop(&mut self) {
-        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
-        unsafe { self.gpu.device().destroy_buffer(self.handle, None) };
         if let Some(ledger) = self.gpu.ledger() {
             ledger.release(self.claimed);
         }
-        if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.gpu.allocator().lock())
-            && let Err(e) = allocator.free(allocation)
-        {
-            log::error!("freeing {}: {e}", self.name);
+        if let Some(memory) = self.memory.take() {
+            match self.gpu.pool() {
+                Some(pool) => pool.keep(memory),
+                None => memory.free(&self.gpu),
+            }
         }
     }
 }

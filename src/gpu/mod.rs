@@ -14,6 +14,7 @@ mod ledger;
 mod memory;
 mod open;
 mod pipelines;
+mod pool;
 mod ray_functions;
 mod ray_pipeline;
 mod recorder;

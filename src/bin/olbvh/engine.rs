@@ -104,7 +104,10 @@ pub fn device(common: &Common) -> Outcome<Gpu> {
     if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
     }
-    Ok(gpu::Device::open(common)?.gpu().clone())
+    let device = gpu::Device::open(common)?;
+    let gpu = device.gpu();
+    // What is measured is repeated: the memory of one repetition waits for the next.
+    Ok(gpu.with_pool(gpu.report().memory / 4))
 }
 
 /// The shapes that kernels have on the device that `--device` names.
