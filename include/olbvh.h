@@ -106,6 +106,11 @@ typedef struct olbvh_build_options {
    */
   uint32_t level;
   /*
+   Entries of a leaf, on average, beyond which leaves become finer than that; 30 suits pictures of thin parts, 128 anything else. A recorded build takes no
+   notice. 0: whatever they are.
+   */
+  uint32_t mean_list;
+  /*
    Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
    */
   uint32_t capacity;

@@ -84,3 +84,10 @@ pub enum Error {
         source: std::io::Error,
     },
 }
+
+impl Error {
+    /// Whether something failed for want of memory or room, so that less may do.
+    pub(crate) fn is_for_want_of_room(&self) -> bool {
+        matches!(self, Self::Memory { .. } | Self::TooLarge(_))
+    }
+}

@@ -233,3 +233,37 @@ fn more_than_a_million() {
     subject.locations(&gpu, &options(0.0, Assign::Planes, Lists::Boundary), 5000);
     quiet(&gpu);
 }
+
+/// Cells that reach through a plate call for a tree of a single node, whose list is every cell.
+#[test]
+fn long_lists_make_leaves_finer() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let plate = Subject::new(&gpu, "plate", kuhn_jittered([40, 40, 1], 0.2, 3).unwrap());
+    let alpha = BuildOptions::default();
+    let (coarse, _) = plate.tree(&gpu, &alpha);
+    assert_eq!((coarse.status().level, coarse.status().longest_leaf), (0, 9_600));
+    let found = plate.locations(&gpu, &alpha, 3000);
+    let inside = |l: &Location| l.owner != NONE && l.barycentric.iter().all(|&b| b >= 0.0);
+    assert!(found.iter().filter(|l| inside(l)).count() > 2000);
+    for (most, limit) in [(30, None), (500, None), (30, Some(40_000))] {
+        let options = BuildOptions { mean_list: Some(most), capacity: limit, ..alpha };
+        let status = *plate.tree(&gpu, &options).0.status();
+        let (level, mean, next) = (status.level, status.entries / status.leaves, status.total[2 * status.level as usize + 2]);
+        assert!(level > 0 && (mean <= most) == limit.is_none(), "{most}: {mean} entries per leaf of level {level}");
+        assert!(limit.is_none_or(|limit| status.candidates <= limit && next > limit), "{next} candidates would fit");
+        for (a, b) in found.iter().zip(plate.locations(&gpu, &options, 3000)) {
+            assert!(a.owner == b.owner || !inside(a), "{most}: {a:?}, {b:?}");
+        }
+    }
+    // Where there is no memory for a finer one beside it, the coarse one stays.
+    let options = BuildOptions { mean_list: Some(1), ..alpha };
+    let measured = gpu.with_memory(1 << 40);
+    Tree::build(&measured, &plate.device, &alpha).unwrap();
+    let (tight, roomy) = (gpu.with_memory(measured.memory_peak()), gpu.with_memory(1 << 30));
+    assert_eq!(Tree::build(&tight, &plate.device, &options).unwrap().status().level, 0);
+    assert!(Tree::build(&roomy, &plate.device, &options).unwrap().status().level > 3);
+    // A body that fills its bounds has short lists as it is.
+    let cube = Subject::new(&gpu, "cube", kuhn([16; 3]).unwrap());
+    let level = |mean_list| cube.tree(&gpu, &BuildOptions { mean_list, ..alpha }).0.status().level;
+    assert_eq!(level(Some(30)), level(None));
+}

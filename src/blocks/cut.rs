@@ -66,7 +66,7 @@ impl<'a> Source<'a> {
         let wanted = measure(mesh, &topology, &vertices).level(options)?;
         let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
         let level = (0..=wanted).rev().find(fits).unwrap_or(0);
-        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, ..*options };
+        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, mean_list: None, ..*options };
         Ok(Self { mesh, grid, options, level, topology, vertices })
     }
 

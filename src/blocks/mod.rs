@@ -91,11 +91,6 @@ fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
     field.map_or(Ok(()), |(values, on)| on.check(values, [mesh.points.len(), mesh.tets.len()]))
 }
 
-/// Whether something failed for want of memory or room, so that less of the mesh may do.
-fn is_full(error: &Error) -> bool {
-    matches!(error, Error::Memory { .. } | Error::TooLarge(_))
-}
-
 /// Why there is no answer: a block of `tets` tetrahedra takes about `bytes`, or more than there are, and is not cut again.
 fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
     let why = why.map_or_else(String::new, |e| format!(" ({e})"));

@@ -2,7 +2,7 @@
 //! pair, so the answer is the union of theirs.
 
 use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, is_full, refusal, smaller};
+use super::{InBlocks, refusal, smaller};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
@@ -63,7 +63,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
             query::overlap(party(&a), party(&b), pairs, report)
         });
         match found {
-            Err(e) if is_full(&e) => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_for_want_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
@@ -86,7 +86,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
         let mut why = None;
         if need <= memory {
             match visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took) {
-                Err(e) if is_full(&e) => why = Some(e),
+                Err(e) if e.is_for_want_of_room() => why = Some(e),
                 Err(e) => return Err(e),
                 Ok(found) => {
                     merge(&mut all, found);

@@ -2,7 +2,7 @@
 //! order, and goes on in one where it stood after the last. A sample is taken by the block that has its cell. Between blocks, rays are in host memory.
 
 use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, LEAST, check_field, is_full, pieces, refusal};
+use super::{InBlocks, LEAST, check_field, pieces, refusal};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
@@ -50,7 +50,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
     if least_bytes(gpu, mesh, options)? <= memory {
         let placed = took.build(|| Placed::whole(gpu, mesh, options));
         match placed.and_then(|placed| render_whole(&placed, asked, report)) {
-            Err(e) if is_full(&e) => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_for_want_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
@@ -112,7 +112,7 @@ impl Job<'_> {
         let mut why = None;
         if need <= self.memory {
             match self.draw(block, &met, rays) {
-                Err(e) if is_full(&e) => why = Some(e),
+                Err(e) if e.is_for_want_of_room() => why = Some(e),
                 other => return other.map(|()| None),
             }
         }

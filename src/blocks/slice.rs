@@ -3,7 +3,7 @@
 //! trees, since a tree takes longer than a layer.
 
 use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, check_field, is_full, pieces, refusal, smaller};
+use super::{InBlocks, check_field, pieces, refusal, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
@@ -63,7 +63,9 @@ pub fn slice(
         let sliced = whole
             .and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink).map(|_| ()));
         match sliced {
-            Err(e) if is_full(&e) && tally.get() == Tally::default() => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_for_want_of_room() && tally.get() == Tally::default() => {
+                log::info!("in blocks, since the whole does not fit: {e}")
+            }
             other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
         }
     }
@@ -115,7 +117,7 @@ impl Job<'_> {
                 Err(None)
             };
             match tried {
-                Err(Some(e)) if !is_full(&e) => return Err(e),
+                Err(Some(e)) if !e.is_for_want_of_room() => return Err(e),
                 Err(why) => {
                     let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory)) else {
                         return Err(refusal(self.gpu, block.tets.len(), need, why));

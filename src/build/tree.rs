@@ -7,7 +7,7 @@ use super::stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_leve
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid, wide};
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, Size};
 use crate::primitives::Arena;
 use crate::reference::depth::too_large;
 use crate::reference::grid::MAX_LEVEL;
@@ -43,12 +43,35 @@ fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Resul
 
 impl Tree {
     /// Builds a tree over a mesh: in four submissions (three with the paper's lists, where every candidate is an entry), between them the numbers of
-    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated.
+    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated. Where lists turn out longer than
+    /// [`BuildOptions::mean_list`], a finer one is built after it, if there is memory for both.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
     /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
+        let mut tree = Self::build_once(gpu, mesh, options)?;
+        while let Some(options) = tree.finer() {
+            match Self::build_once(gpu, mesh, &options) {
+                Ok(finer) if finer.status.level > tree.status.level => {
+                    let stages = tree.stages.iter().chain(&finer.stages).cloned().collect();
+                    tree = Self { stages, ..finer };
+                }
+                Err(e) if !e.is_for_want_of_room() => return Err(e),
+                _ => break,
+            }
+        }
+        Ok(tree)
+    }
+
+    /// The options of a finer tree, if the lists of this one are too long.
+    fn finer(&self) -> Option<BuildOptions> {
+        let BuildStatus { level, entries, leaves, .. } = self.status;
+        let candidates = &candidates(&self.status);
+        self.options.finer(&Size { level, entries: u64::from(entries), leaves: u64::from(leaves), candidates })
+    }
+
+    fn build_once(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         mesh.check_device(gpu)?;
         let view = mesh.view();
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
@@ -224,10 +247,14 @@ impl Tree {
     }
 }
 
+/// Entries of `Aabb` on every level.
+fn candidates(status: &BuildStatus) -> [u64; 11] {
+    std::array::from_fn(|k| wide([status.total[2 * k], status.total[2 * k + 1]]))
+}
+
 fn refuse_overflow(status: &BuildStatus, options: &BuildOptions) -> Result<()> {
-    let entries: [u64; 11] = std::array::from_fn(|k| wide([status.total[2 * k], status.total[2 * k + 1]]));
     if status.overflow != 0 {
-        return Err(too_large(&entries, options));
+        return Err(too_large(&candidates(status), options));
     }
     Ok(())
 }

@@ -2,13 +2,13 @@
 
 use super::boundary::Topology;
 use super::codes::Stage;
-use super::grid::Grid;
+use super::grid::{Grid, MAX_LEVEL};
 use super::marks::Marks;
 use super::vertices::Vertices;
 use super::{depth, leaves, levels, quarters};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::options::{BuildOptions, Lists};
+use crate::options::{BuildOptions, Lists, Size};
 use crate::tree::TreeArrays;
 
 /// A tree, and what no array of it tells of its making.
@@ -34,9 +34,19 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     let vertices = Vertices::new(mesh, &topology.grid);
 
     // Stage 1: determine the depth of the tree.
-    let level = depth::measure(mesh, topology, &vertices).level(options)?;
+    let sizes = depth::measure(mesh, topology, &vertices);
+    let at = |level: u32, options: &BuildOptions| Ok(construct(mesh, topology, &vertices, level, options)?.tree);
 
-    Ok(construct(mesh, topology, &vertices, level, options)?.tree)
+    let mut tree = at(sizes.level(options)?, options)?;
+    while let Some(finer) = options.finer(&Size {
+        level: tree.grid.level,
+        entries: tree.p.len() as u64,
+        leaves: tree.leaves().len() as u64,
+        candidates: &sizes.entries,
+    }) {
+        tree = at(finer.level.unwrap_or(MAX_LEVEL), &finer)?;
+    }
+    Ok(tree)
 }
 
 /// Stages 2 to 4: the tree whose leaves are cells of `level`, whatever α and limits `options` has.

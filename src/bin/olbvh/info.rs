@@ -7,13 +7,10 @@ use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::Lists;
+use olbvh::options::{LONG_LIST, Lists};
 use olbvh::reference::grid::MAX_LEVEL;
 use serde_json::{Value, json};
 use std::path::PathBuf;
-
-/// Entries per leaf, on average, from which a finer tree is suggested: of 110 a level more draws twice as fast, of 31 1.4 times, and of 20 it costs what it gains.
-const LONG: u64 = 24;
 
 /// Show what is in a mesh, and build its tree and show what that is like.
 #[derive(clap::Args)]
@@ -141,8 +138,8 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
-    let hint = args.tree.lists == Lists::Boundary && each >= LONG && s.wanted == s.level && finer <= MAX_LEVEL;
-    let hint = if hint { format!("; --level {finer} would be quicker to ask") } else { String::new() };
+    let hint = args.tree.lists == Lists::Boundary && each > u64::from(LONG_LIST) && s.wanted == s.level && finer <= MAX_LEVEL;
+    let hint = if hint { format!("; --level {finer} is quicker to ask, and what `render` takes at least") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
     for (name, n) in s.memory.arrays() {
         let what = match name {

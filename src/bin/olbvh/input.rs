@@ -14,8 +14,8 @@ pub struct TreeArgs {
     /// Coarseness of the tree, 0 to 10: each whole number takes one level off. Coarser trees are smaller and quicker to build; answers are the same.
     #[arg(long, default_value_t = 0.0, value_name = "A", allow_hyphen_values = true)]
     pub alpha: f32,
-    /// Level of the leaves, 0 to 10, instead of the one that alpha asks for; each has cells half as large. Where parts are thin, one level more makes pictures
-    /// and slices quicker; `info` tells. Answers are the same.
+    /// Level of the leaves, 0 to 10, instead of the one that alpha asks for; each has cells half as large. Without this and --alpha, leaves are finer where
+    /// parts are thin and lists long, as is quickest; `info` tells. Answers are the same.
     #[arg(long, value_name = "L", conflicts_with = "alpha", value_parser = clap::value_parser!(u32).range(0..=10))]
     pub level: Option<u32>,
     /// Which octree cells list a tetrahedron: those its box meets, as in the paper; of those the ones that its face planes leave; or exactly those it touches,
@@ -58,6 +58,14 @@ fn bytes(text: &str) -> Result<u64, String> {
 }
 
 impl TreeArgs {
+    /// The options of a build to ask questions of, checked. Leaves are finer than by default where lists are longer than `mean_list`, unless it is said how
+    /// fine they should be.
+    pub fn finer_from(&self, mean_list: u32) -> Outcome<BuildOptions> {
+        let options = self.options(false)?;
+        let by_default = options.alpha == 0.0 && options.level.is_none() && options.lists == Lists::Boundary && options.budget.is_none();
+        Ok(BuildOptions { mean_list: by_default.then_some(mean_list), ..options })
+    }
+
     /// The options of a build, checked.
     pub fn options(&self, boxes: bool) -> Outcome<BuildOptions> {
         let options = BuildOptions {

@@ -11,7 +11,7 @@ use olbvh::blocks::Meshes;
 use olbvh::error::Error;
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::{Assign, Lists};
+use olbvh::options::{Assign, BuildOptions, Lists, VERY_LONG_LIST};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -54,9 +54,10 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
-    let mut options = args.tree.options(false)?;
+    let mut options = args.tree.finer_from(VERY_LONG_LIST)?;
     if args.pairs {
-        (options.lists, options.assign) = (Lists::All, Assign::Aabb); // pairs are found by lists, by those of boxes only once
+        // Pairs are found by lists, by those of boxes only once.
+        options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, mean_list: None, ..options };
     }
     let engine = engine::open(common)?;
     let a = args.tree.mesh(&args.a, common)?.mesh;

@@ -10,6 +10,7 @@ use olbvh::blocks::View;
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, write_png};
 use olbvh::mesh::{Field, Mesh, On};
+use olbvh::options::LONG_LIST;
 use olbvh::render::camera::CameraSpec;
 use olbvh::render::maps::MAPS;
 use olbvh::render::{Background, RenderSettings, TransferFunction, transfer};
@@ -100,7 +101,7 @@ struct Iso(Vec<f32>);
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
-    let options = args.tree.options(false)?;
+    let options = args.tree.finer_from(LONG_LIST)?;
     let settings = args.settings()?;
     settings.check()?;
     let engine = engine::open(common)?;
