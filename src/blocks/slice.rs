@@ -64,7 +64,7 @@ pub fn slice(
             .and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink).map(|_| ()));
         match sliced {
             Err(e) if e.is_for_want_of_room() && tally.get() == Tally::default() => {
-                log::info!("in blocks, since the whole does not fit: {e}")
+                log::info!("in blocks, since the whole does not fit: {e}");
             }
             other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
         }
