@@ -51,14 +51,20 @@ impl Tree {
     /// [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let mut tree = Self::build_once(gpu, mesh, options)?;
-        while let Some(options) = tree.finer() {
-            match Self::build_once(gpu, mesh, &options) {
-                Ok(finer) if finer.status.level > tree.status.level => {
+        let mut room = MAX_LEVEL; // the finest level that there is memory for
+        while let Some(finer) = tree.finer() {
+            let level = finer.level.unwrap_or(MAX_LEVEL).min(room);
+            if level <= tree.status.level {
+                break;
+            }
+            match Self::build_once(gpu, mesh, &BuildOptions { level: Some(level), ..finer }) {
+                Ok(finer) => {
                     let stages = tree.stages.iter().chain(&finer.stages).cloned().collect();
+                    room = if finer.status.level < level { finer.status.level } else { room };
                     tree = Self { stages, ..finer };
                 }
-                Err(e) if !e.is_for_want_of_room() => return Err(e),
-                _ => break,
+                Err(e) if e.is_for_want_of_room() => room = level - 1,
+                Err(e) => return Err(e),
             }
         }
         Ok(tree)
