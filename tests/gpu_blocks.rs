@@ -6,7 +6,7 @@ use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, overlap, re
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::options::{Assign, BuildOptions, Lists, VERY_LONG_LIST};
 use olbvh::query::{self, LocateOptions, Party, Path};
 use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
@@ -73,6 +73,7 @@ fn answers_are_those_of_the_whole() {
     let mesh = grid();
     located(&gpu, &mesh);
     refused(&gpu, &mesh);
+    flat(&gpu);
     overlapped(&gpu, &mesh);
     sliced(&gpu, &mesh);
     drawn(&gpu, &mesh);
@@ -104,6 +105,20 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     let said = refused.to_string();
     let enough = said.split("allow ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(locate(gpu, enough, &asked, None, QUIET).unwrap().trees > 4, "{said}");
+}
+
+/// A plate is one cell of α's level, which cannot be cut; of a finer one, it can.
+fn flat(gpu: &Gpu) {
+    let mesh = kuhn_jittered([50, 50, 1], 0.2, 3).unwrap();
+    let points: Vec<_> =
+        mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
+    let ask = |mean_list| {
+        let options = BuildOptions { mean_list, ..BuildOptions::default() };
+        locate(gpu, 768 << 10, &Points { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, QUIET)
+    };
+    assert!(matches!(ask(None), Err(Error::TooLarge(_))));
+    let found = ask(Some(VERY_LONG_LIST)).unwrap();
+    assert!(found.trees > 4 && found.answer.owners.iter().copied().eq(0..mesh.tets.len() as u32), "{} trees", found.trees);
 }
 
 fn overlapped(gpu: &Gpu, a: &Mesh) {

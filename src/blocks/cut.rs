@@ -19,6 +19,9 @@ use std::borrow::Cow;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
+/// Entries of `Aabb` per tetrahedron; a body that fills its bounds has 8 at α = 0, and 32 on the level after that.
+const CHEAP: u64 = 16;
+
 /// A mesh to be cut.
 pub(super) struct Source<'a> {
     pub(super) mesh: &'a Mesh,
@@ -63,7 +66,10 @@ impl<'a> Source<'a> {
         let grid = topology.grid;
         let cell = mesh.points.par_iter().map(|&p| grid.quantize(p).map(|q| q as u16)).collect();
         let vertices = Vertices { cell, normalised: Vec::new() };
-        let wanted = measure(mesh, &topology, &vertices).level(options)?;
+        let sizes = measure(mesh, &topology, &vertices);
+        // Long lists cannot be told before there is a tree; but where leaves as fine as this have so few entries, either they are long or it costs little.
+        let cheap = |level: &u32| options.mean_list.is_some() && sizes.entries[*level as usize] <= CHEAP * sizes.entries[0];
+        let wanted = sizes.level(options)?.max((0..=MAX_LEVEL).rev().find(cheap).unwrap_or(0));
         let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
         let level = (0..=wanted).rev().find(fits).unwrap_or(0);
         let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, mean_list: None, ..*options };
