@@ -106,10 +106,10 @@ typedef struct olbvh_build_options {
    */
   uint32_t level;
   /*
-   Entries of a leaf, on average, beyond which leaves become finer than that; 30 suits pictures of thin parts, 128 anything else. A recorded build takes no
-   notice. 0: whatever they are.
+   How fine leaves are beyond that: 0: as it says. 1: finer where lists are long, as suits points, slices and overlap. 2: as suits pictures. A recorded
+   build takes no notice.
    */
-  uint32_t mean_list;
+  uint32_t fineness;
   /*
    Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
    */

@@ -33,6 +33,40 @@ pub enum Lists {
     Boundary = 1,
 }
 
+/// How fine leaves are, where nothing else says it.
+///
+/// α goes by the largest extent of a cell in parts of the bounds along that axis, so the tree over a plate, whose cells reach through it, is a single node, and
+/// points beside thin parts meet long lists. A finer tree than α's is built after it where that repays the time, as far as capacity and memory allow. It is for
+/// trees in memory of our own ([`crate::build::Tree::build`]) and the reference, where counts are known in time; a recorded build takes no notice.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[repr(u32)]
+pub enum Fineness {
+    /// As α or the level asked for says (the paper).
+    #[default]
+    Alpha = 0,
+    /// As suits points, slices and overlap: a leaf lists up to 128 entries on average.
+    Points = 1,
+    /// As suits pictures, which ask far more: up to 30 entries on average (of 110 a level more draws twice as fast, of 31 1.4 times, of 20 it costs what it
+    /// gains), and anyway as fine as 2^20 entries of `Aabb` go, since rays pass by empty cells at once.
+    Pictures = 2,
+}
+
+impl Fineness {
+    /// Entries that a leaf lists at most on average, and entries of `Aabb` that a tree may have anyway; nothing where neither matters.
+    fn limits(self) -> Option<(u64, u64)> {
+        match self {
+            Self::Alpha => None,
+            Self::Points => Some((128, 0)),
+            Self::Pictures => Some((30, 1 << 20)),
+        }
+    }
+
+    /// Whether finer leaves than α's would suit better, by their mean number of entries.
+    pub fn is_long(self, mean: u64) -> bool {
+        self.limits().is_some_and(|(most, _)| mean > most)
+    }
+}
+
 /// Names of the variants, as the command line and reports use them.
 macro_rules! named {
     ($type:ident, $what:literal, [$($variant:ident = $name:literal),+ $(,)?]) => {
@@ -70,6 +104,7 @@ pub(crate) use named;
 
 named!(Assign, "assignment", [Aabb = "aabb", Planes = "planes", Exact = "exact"]);
 named!(Lists, "kind of lists", [All = "all", Boundary = "boundary"]);
+named!(Fineness, "fineness", [Alpha = "alpha", Points = "points", Pictures = "pictures"]);
 
 /// How to build a tree.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -90,18 +125,9 @@ pub struct BuildOptions {
     pub budget: Option<u64>,
     /// Level that the leaves should have, up to 10, whatever α and the size of the cells ask for; capacity and budget still hold. `None`: by α.
     pub level: Option<u32>,
-    /// Entries of a leaf, on average, beyond which leaves become finer than α or `level` asks for, as far as the capacity allows. α goes by the largest
-    /// extent of a cell in parts of the bounds along that axis, so the tree over a plate, whose cells reach through it, is a single node, and points
-    /// beside thin parts meet long lists: [`LONG_LIST`] of pictures, [`VERY_LONG_LIST`] of anything else is where finer leaves repay the time for a second build. It is for
-    /// trees in memory of our own, built with [`crate::build::Tree::build`] or the reference, where counts are known in time. `None` (the default): α's level.
-    pub mean_list: Option<u32>,
+    /// How fine leaves are beyond that.
+    pub fineness: Fineness,
 }
-
-/// Entries per leaf, on average, from which a picture is drawn sooner with finer ones: of 110 a level more draws twice as fast, of 31 1.4 times, and of 20 it
-/// costs what it gains.
-pub const LONG_LIST: u32 = 30;
-/// The same of single questions, which a second build would delay.
-pub const VERY_LONG_LIST: u32 = 128;
 
 /// Entries per tetrahedron of the usual capacity; even cells have about 8 at α = 0.
 pub const USUAL_ENTRIES: u32 = 64;
@@ -124,7 +150,7 @@ impl Default for BuildOptions {
             capacity: None,
             budget: None,
             level: None,
-            mean_list: None,
+            fineness: Fineness::Alpha,
         }
     }
 }
@@ -142,18 +168,18 @@ pub(crate) struct Size<'a> {
 }
 
 impl BuildOptions {
-    /// The options of a finer tree than one with these options, if its lists are too long on average.
+    /// The options of a finer tree than one with these options, if that suits better.
     pub(crate) fn finer(&self, tree: &Size<'_>) -> Option<Self> {
-        let (limit, mut mean) = (u64::from(self.mean_list?.max(1)), tree.entries / tree.leaves.max(1));
-        let mut level = tree.level;
-        while mean > limit {
+        let (longest, anyway) = self.fineness.limits()?;
+        let (mut mean, mut level) = (tree.entries / tree.leaves.max(1), tree.level);
+        while mean > longest {
             // A surface meets four times as many cells of a level more.
             (mean, level) = (mean / 4, level + 1);
         }
+        let below = |most: u64| (tree.level + 1..LEVELS as u32).rev().find(|&l| tree.candidates[l as usize] <= most);
         let most = u64::from(self.capacity.unwrap_or_else(|| usual_capacity(tree.candidates[0] as u32)));
-        let fits = |level: &u32| self.budget.is_none() && tree.candidates.get(*level as usize).is_some_and(|&n| n <= most);
-        let level = (tree.level + 1..=level).rev().find(fits)?;
-        Some(Self { level: Some(level), ..*self })
+        let level = below(anyway).map_or(level, |cheap| level.max(cheap)).min(below(most)?);
+        (level > tree.level && self.budget.is_none()).then_some(Self { level: Some(level), ..*self })
     }
 
     /// α in units of 1/65536, rounded to nearest, so that every device chooses the same level.

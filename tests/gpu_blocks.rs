@@ -6,7 +6,7 @@ use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, overlap, re
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Lists, VERY_LONG_LIST};
+use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::query::{self, LocateOptions, Party, Path};
 use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
@@ -112,12 +112,12 @@ fn flat(gpu: &Gpu) {
     let mesh = kuhn_jittered([50, 50, 1], 0.2, 3).unwrap();
     let points: Vec<_> =
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
-    let ask = |mean_list| {
-        let options = BuildOptions { mean_list, ..BuildOptions::default() };
+    let ask = |fineness| {
+        let options = BuildOptions { fineness, ..BuildOptions::default() };
         locate(gpu, 768 << 10, &Points { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, QUIET)
     };
-    assert!(matches!(ask(None), Err(Error::TooLarge(_))));
-    let found = ask(Some(VERY_LONG_LIST)).unwrap();
+    assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
+    let found = ask(Fineness::Points).unwrap();
     assert!(found.trees > 4 && found.answer.owners.iter().copied().eq(0..mesh.tets.len() as u32), "{} trees", found.trees);
 }
 

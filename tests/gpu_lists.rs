@@ -7,7 +7,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use olbvh::query::{LocateOptions, LocateOutput, Party, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice};
 use olbvh::reference::boundary::{NONE, Topology, topology};
 use olbvh::reference::build::build;
@@ -245,25 +245,25 @@ fn long_lists_make_leaves_finer() {
     let found = plate.locations(&gpu, &alpha, 3000);
     let inside = |l: &Location| l.owner != NONE && l.barycentric.iter().all(|&b| b >= 0.0);
     assert!(found.iter().filter(|l| inside(l)).count() > 2000);
-    for (most, limit) in [(30, None), (500, None), (30, Some(40_000))] {
-        let options = BuildOptions { mean_list: Some(most), capacity: limit, ..alpha };
+    for (fineness, limit) in [(Fineness::Pictures, None), (Fineness::Points, None), (Fineness::Pictures, Some(40_000))] {
+        let options = BuildOptions { fineness, capacity: limit, ..alpha };
         let status = *plate.tree(&gpu, &options).0.status();
         let (level, mean, next) = (status.level, status.entries / status.leaves, status.total[2 * status.level as usize + 2]);
-        assert!(level > 0 && (mean <= most) == limit.is_none(), "{most}: {mean} entries per leaf of level {level}");
+        assert!(level > 0 && fineness.is_long(u64::from(mean)) == limit.is_some(), "{fineness}: {mean} entries per leaf of level {level}");
         assert!(limit.is_none_or(|limit| status.candidates <= limit && next > limit), "{next} candidates would fit");
         for (a, b) in found.iter().zip(plate.locations(&gpu, &options, 3000)) {
-            assert!(a.owner == b.owner || !inside(a), "{most}: {a:?}, {b:?}");
+            assert!(a.owner == b.owner || !inside(a), "{fineness}: {a:?}, {b:?}");
         }
     }
     // As fine as there is memory for beside the one before, which stays if there is none.
-    let options = BuildOptions { mean_list: Some(1), ..alpha };
+    let options = BuildOptions { fineness: Fineness::Pictures, ..alpha };
     let measured = gpu.with_memory(1 << 40);
     Tree::build(&measured, &plate.device, &alpha).unwrap();
     let level = |memory: u64| Tree::build(&gpu.with_memory(memory), &plate.device, &options).unwrap().status().level;
     let [none, some, enough] = [measured.memory_peak(), 4 * measured.memory_peak(), 1 << 30].map(level);
     assert!(none == 0 && some > 0 && enough > some, "{none} {some} {enough}");
-    // A body that fills its bounds has short lists as it is.
+    // A body that fills its bounds has short lists as it is; rays pass by what is empty around a small one in cells of a million entries.
     let cube = Subject::new(&gpu, "cube", kuhn([16; 3]).unwrap());
-    let level = |mean_list| cube.tree(&gpu, &BuildOptions { mean_list, ..alpha }).0.status().level;
-    assert_eq!(level(Some(30)), level(None));
+    let level = |fineness| cube.tree(&gpu, &BuildOptions { fineness, ..alpha }).0.status().level;
+    assert_eq!(Fineness::EVERY.map(level), [4, 4, 5]);
 }

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
 use crate::mesh::{Mesh, On};
-use crate::options::{BuildOptions, Lists};
+use crate::options::{BuildOptions, Fineness, Lists};
 use crate::primitives::Arena;
 use crate::reference::boundary::{Topology, neighbours};
 use crate::reference::depth::measure;
@@ -68,11 +68,11 @@ impl<'a> Source<'a> {
         let vertices = Vertices { cell, normalised: Vec::new() };
         let sizes = measure(mesh, &topology, &vertices);
         // Long lists cannot be told before there is a tree; but where leaves as fine as this have so few entries, either they are long or it costs little.
-        let cheap = |level: &u32| options.mean_list.is_some() && sizes.entries[*level as usize] <= CHEAP * sizes.entries[0];
+        let cheap = |level: &u32| options.fineness != Fineness::Alpha && sizes.entries[*level as usize] <= CHEAP * sizes.entries[0];
         let wanted = sizes.level(options)?.max((0..=MAX_LEVEL).rev().find(cheap).unwrap_or(0));
         let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
         let level = (0..=wanted).rev().find(fits).unwrap_or(0);
-        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, mean_list: None, ..*options };
+        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, fineness: Fineness::Alpha, ..*options };
         Ok(Self { mesh, grid, options, level, topology, vertices })
     }
 

@@ -15,7 +15,7 @@
 //! - The mesh itself lies in host memory as a whole, and beside it 6 bytes per point and 4 per tetrahedron; for a picture normals (12 bytes per point), rays
 //!   (48 bytes), and before it is drawn neighbours (16 bytes per tetrahedron, about three times that while they are matched).
 //! - The level may be coarser than asked for where the bits of its cells would take more than an eighth of the memory, and finer where lists may be long
-//!   ([`crate::options::BuildOptions::mean_list`]): a plate would be one cell, which cannot be cut. In cells that overlap each other
+//!   ([`crate::options::BuildOptions::fineness`]): a plate would be one cell, which cannot be cut. In cells that overlap each other
 //!   [`crate::options::Lists::Boundary`] may name another of those that contain a point, as always.
 
 mod cut;

@@ -43,8 +43,8 @@ fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Resul
 
 impl Tree {
     /// Builds a tree over a mesh: in four submissions (three with the paper's lists, where every candidate is an entry), between them the numbers of
-    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated. Where lists turn out longer than
-    /// [`BuildOptions::mean_list`], a finer one is built after it, if there is memory for both.
+    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated. Where
+    /// [`BuildOptions::fineness`] asks for a finer one, that is built after it, if there is memory for both.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,

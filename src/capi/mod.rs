@@ -19,7 +19,7 @@ use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions, StageTime};
 use crate::mesh::{Mesh, On};
-use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use crate::render::Bounds;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
@@ -106,9 +106,9 @@ pub struct OlbvhBuildOptions {
     pub lists: u32,
     /// Level of the leaves whatever alpha says, 1 to 10: one finer than alpha 0 asks for suits thin parts. 0: as alpha says.
     pub level: u32,
-    /// Entries of a leaf, on average, beyond which leaves become finer than that; 30 suits pictures of thin parts, 128 anything else. A recorded build takes no
-    /// notice. 0: whatever they are.
-    pub mean_list: u32,
+    /// How fine leaves are beyond that: 0: as it says. 1: finer where lists are long, as suits points, slices and overlap. 2: as suits pictures. A recorded
+    /// build takes no notice.
+    pub fineness: u32,
     /// Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
     pub capacity: u32,
     /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
@@ -126,7 +126,7 @@ impl OlbvhBuildOptions {
             capacity: (self.capacity != 0).then_some(self.capacity),
             budget: (self.budget != 0).then_some(self.budget),
             level: (self.level != 0).then_some(self.level),
-            mean_list: (self.mean_list != 0).then_some(self.mean_list),
+            fineness: Fineness::EVERY.into_iter().find(|f| *f as u32 == self.fineness).ok_or_else(|| unknown("fineness", self.fineness))?,
         })
     }
 }
@@ -302,9 +302,9 @@ pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
 /// What `olbvh_tree_build` takes where it is given no options.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
-    let BuildOptions { alpha, assign, lists, level, mean_list, capacity, budget, .. } = BuildOptions::default();
-    let [level, mean_list, capacity] = [level, mean_list, capacity].map(|limit| limit.unwrap_or(0));
-    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, level, mean_list, capacity, budget: budget.unwrap_or(0) }
+    let BuildOptions { alpha, assign, lists, level, fineness, capacity, budget, .. } = BuildOptions::default();
+    let ([level, capacity], budget) = ([level, capacity].map(|limit| limit.unwrap_or(0)), budget.unwrap_or(0));
+    OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, level, fineness: fineness as u32, capacity, budget }
 }
 
 /// Builds the tree over a mesh. `options` may be null.

@@ -7,7 +7,7 @@ use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::{LONG_LIST, Lists};
+use olbvh::options::{Fineness, Lists};
 use olbvh::reference::grid::MAX_LEVEL;
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -138,7 +138,7 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
-    let hint = args.tree.lists == Lists::Boundary && each > u64::from(LONG_LIST) && s.wanted == s.level && finer <= MAX_LEVEL;
+    let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.is_long(each) && s.wanted == s.level && finer <= MAX_LEVEL;
     let hint = if hint { format!("; --level {finer} is quicker to ask, and what `render` takes at least") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
     for (name, n) in s.memory.arrays() {

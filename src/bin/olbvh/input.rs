@@ -4,7 +4,7 @@ use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
 use olbvh::formats::{LoadOptions, Loaded, load};
 use olbvh::mesh::{Field, Mesh, On};
-use olbvh::options::{Assign, BuildOptions, Lists};
+use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use std::path::Path;
 use std::time::Instant;
 
@@ -58,12 +58,11 @@ fn bytes(text: &str) -> Result<u64, String> {
 }
 
 impl TreeArgs {
-    /// The options of a build to ask questions of, checked. Leaves are finer than by default where lists are longer than `mean_list`, unless it is said how
-    /// fine they should be.
-    pub fn finer_from(&self, mean_list: u32) -> Outcome<BuildOptions> {
+    /// The options of a build to ask questions of, checked. Leaves are as fine as suits the questions, unless it is said how fine they should be.
+    pub fn suited(&self, fineness: Fineness) -> Outcome<BuildOptions> {
         let options = self.options(false)?;
         let by_default = options.alpha == 0.0 && options.level.is_none() && options.lists == Lists::Boundary && options.budget.is_none();
-        Ok(BuildOptions { mean_list: by_default.then_some(mean_list), ..options })
+        Ok(BuildOptions { fineness: if by_default { fineness } else { Fineness::Alpha }, ..options })
     }
 
     /// The options of a build, checked.

@@ -8,7 +8,7 @@ use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
-use olbvh::options::VERY_LONG_LIST;
+use olbvh::options::Fineness;
 use olbvh::query::{self, LocateOptions};
 use serde_json::json;
 use std::io::Write as _;
@@ -68,7 +68,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let format = output::announce(&args.output, formats, &[&args.mesh, &args.points])?;
-    let options = args.tree.finer_from(VERY_LONG_LIST)?;
+    let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;

@@ -11,7 +11,7 @@ use olbvh::blocks::Meshes;
 use olbvh::error::Error;
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::{Assign, BuildOptions, Lists, VERY_LONG_LIST};
+use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -54,10 +54,10 @@ pub struct Args {
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
-    let mut options = args.tree.finer_from(VERY_LONG_LIST)?;
+    let mut options = args.tree.suited(Fineness::Points)?;
     if args.pairs {
         // Pairs are found by lists, by those of boxes only once.
-        options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, mean_list: None, ..options };
+        options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, fineness: Fineness::Alpha, ..options };
     }
     let engine = engine::open(common)?;
     let a = args.tree.mesh(&args.a, common)?.mesh;

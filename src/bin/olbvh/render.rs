@@ -10,7 +10,7 @@ use olbvh::blocks::View;
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, write_png};
 use olbvh::mesh::{Field, Mesh, On};
-use olbvh::options::LONG_LIST;
+use olbvh::options::Fineness;
 use olbvh::render::camera::CameraSpec;
 use olbvh::render::maps::MAPS;
 use olbvh::render::{Background, RenderSettings, TransferFunction, transfer};
@@ -101,11 +101,15 @@ struct Iso(Vec<f32>);
 /// Runs it.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
-    let options = args.tree.finer_from(LONG_LIST)?;
+    let mut options = args.tree.suited(Fineness::Pictures)?;
     let settings = args.settings()?;
     settings.check()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
+    let [width, height] = settings.size.map(|n| n as usize);
+    if options.fineness == Fineness::Pictures && 2 * width * height < loaded.mesh.tets.len() {
+        options.fineness = Fineness::Points; // a second build over so many cells would take longer than it spares
+    }
     let field = args.field(&loaded.mesh, common)?;
     if let (false, Some([lo, hi])) = (settings.iso.is_empty(), field.range())
         && !settings.iso.iter().any(|iso| (lo..=hi).contains(iso))

@@ -10,7 +10,7 @@ use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
 use olbvh::mesh::{Field, On};
-use olbvh::options::VERY_LONG_LIST;
+use olbvh::options::Fineness;
 use olbvh::reference::boundary::valid_grid;
 use olbvh::render::{Bounds, TransferFunction, transfer};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
@@ -107,7 +107,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         }
     }
     let colors = TransferFunction::named(args.tf.as_deref().unwrap_or(transfer::DEFAULT_MAP))?;
-    let options = args.tree.finer_from(VERY_LONG_LIST)?;
+    let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
