@@ -18,6 +18,8 @@
 //! # Ok(()) }
 //! ```
 //!
+//! Thin bodies and pictures want [`options::Fineness`]; many points, [`query::Path`]; what is repeated, [`gpu::Gpu::with_pool`].
+//!
 //! # In a renderer of your own
 //! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], as exported here). Then, once:
 //! sizes ([`primitives::Arena::measure`] runs a `carve` without memory), one buffer, and the same `carve` over it. Every frame: record.
