@@ -37,7 +37,8 @@ pub enum Lists {
 ///
 /// α goes by the largest extent of a cell in parts of the bounds along that axis, so the tree over a plate, whose cells reach through it, is a single node, and
 /// points beside thin parts meet long lists. A finer tree than α's is built after it where that repays the time, as far as capacity and memory allow. It is for
-/// trees in memory of our own ([`crate::build::Tree::build`]) and the reference, where counts are known in time; a recorded build takes no notice.
+/// trees in memory of our own ([`crate::build::Tree::build`]) and the reference, where counts are known in time; a recorded build takes no notice, and is given
+/// the level that a tree over the mesh at rest came to ([`BuildOptions::level`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Fineness {

@@ -59,6 +59,11 @@ impl Tree {
             }
             match Self::build_once(gpu, mesh, &BuildOptions { level: Some(level), ..finer }) {
                 Ok(finer) => {
+                    log::info!(
+                        "leaves of level {}, finer than {}, whose lists are long or cells large",
+                        finer.status.level,
+                        tree.status.level
+                    );
                     let stages = tree.stages.iter().chain(&finer.stages).cloned().collect();
                     room = if finer.status.level < level { finer.status.level } else { room };
                     tree = Self { stages, ..finer };
