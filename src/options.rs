@@ -54,7 +54,7 @@ pub enum Fineness {
 
 impl Fineness {
     /// Entries that a leaf lists at most on average, and entries of `Aabb` that a tree may have anyway; nothing where neither matters.
-    fn limits(self) -> Option<(u64, u64)> {
+    pub(crate) fn limits(self) -> Option<(u64, u64)> {
         match self {
             Self::Alpha => None,
             Self::Points => Some((128, 0)),
@@ -156,33 +156,7 @@ impl Default for BuildOptions {
     }
 }
 
-/// Levels there are at most.
-const LEVELS: usize = 11;
-
-/// What a tree came to.
-pub(crate) struct Size<'a> {
-    pub level: u32,
-    pub entries: u64,
-    pub leaves: u64,
-    /// Entries of `Aabb` on every level; on the first, valid tetrahedra.
-    pub candidates: &'a [u64; LEVELS],
-}
-
 impl BuildOptions {
-    /// The options of a finer tree than one with these options, if that suits better.
-    pub(crate) fn finer(&self, tree: &Size<'_>) -> Option<Self> {
-        let (longest, anyway) = self.fineness.limits()?;
-        let (mut mean, mut level) = (tree.entries / tree.leaves.max(1), tree.level);
-        while mean > longest {
-            // A surface meets four times as many cells of a level more.
-            (mean, level) = (mean / 4, level + 1);
-        }
-        let below = |most: u64| (tree.level + 1..LEVELS as u32).rev().find(|&l| tree.candidates[l as usize] <= most);
-        let most = u64::from(self.capacity.unwrap_or_else(|| usual_capacity(tree.candidates[0] as u32)));
-        let level = below(anyway).map_or(level, |cheap| level.max(cheap)).min(below(most)?);
-        (level > tree.level && self.budget.is_none()).then_some(Self { level: Some(level), ..*self })
-    }
-
     /// α in units of 1/65536, rounded to nearest, so that every device chooses the same level.
     ///
     /// # Errors

@@ -219,3 +219,27 @@ fn a_closed_pipe_is_no_panic() {
     let out = child.wait_with_output().unwrap();
     assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), String::new()));
 }
+
+/// Trees are as fine as suits what is asked, unless a level is.
+#[test]
+fn leaves_suit_what_is_asked() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("p.csv"), "x,y,z\n5.3,6.1,0.5\n").unwrap();
+    let told = |arguments: &[&str]| {
+        let out = olbvh(folder.path(), &[arguments, &["--device", "cpu", "-v"]].concat());
+        let message = text(&out.stderr);
+        assert_eq!(out.status.code(), Some(0), "{arguments:?}: {message}");
+        ["points", "pictures"].map(|what| message.contains(&format!("suits {what} better")))
+    };
+    let (locate, slice) = (["locate", "kuhn:30,30,1", "p.csv", "-o", "o.csv"], ["slice", "kuhn:30,30,1", "-o", "s.npy", "--size", "8"]);
+    let render = ["render", "kuhn:30,30,1", "-o", "a.png", "--size", "60x60"];
+    let overlap = ["overlap", "kuhn:30,30,1", "kuhn:9,9,1", "-o", "c.json"];
+    for asked in [&locate[..], &slice, &overlap] {
+        assert_eq!(told(asked), [true, false], "{asked:?}");
+        assert_eq!(told(&[asked, &["--level", "1"]].concat()), [false; 2], "{asked:?}");
+    }
+    assert_eq!(told(&render), [false, true]);
+    // Where there are few pixels for so many cells, a second build repays for lists that are very long alone.
+    assert_eq!(told(&[&render[..5], &["20x20"]].concat()), [true, false]);
+    assert_eq!(told(&["info", "kuhn:30,30,1"]), [false; 2]);
+}

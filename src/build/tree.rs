@@ -7,9 +7,9 @@ use super::stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_leve
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::layout::{BuildStatus, Grid, wide};
-use crate::options::{BuildOptions, Size};
+use crate::options::BuildOptions;
 use crate::primitives::Arena;
-use crate::reference::depth::too_large;
+use crate::reference::depth::{finer, too_large};
 use crate::reference::grid::MAX_LEVEL;
 use crate::reference::quarters::taken_apart;
 use crate::tree::{Memory, TreeArrays};
@@ -59,11 +59,6 @@ impl Tree {
             }
             match Self::build_once(gpu, mesh, &BuildOptions { level: Some(level), ..finer }) {
                 Ok(finer) => {
-                    log::info!(
-                        "leaves of level {}, finer than {}, whose lists are long or cells large",
-                        finer.status.level,
-                        tree.status.level
-                    );
                     let stages = tree.stages.iter().chain(&finer.stages).cloned().collect();
                     room = if finer.status.level < level { finer.status.level } else { room };
                     tree = Self { stages, ..finer };
@@ -75,11 +70,10 @@ impl Tree {
         Ok(tree)
     }
 
-    /// The options of a finer tree, if the lists of this one are too long.
+    /// The options of a finer tree, if that suits better.
     fn finer(&self) -> Option<BuildOptions> {
         let BuildStatus { level, entries, leaves, .. } = self.status;
-        let candidates = &candidates(&self.status);
-        self.options.finer(&Size { level, entries: u64::from(entries), leaves: u64::from(leaves), candidates })
+        finer(&self.options, level, u64::from(entries), u64::from(leaves), &candidates(&self.status))
     }
 
     fn build_once(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {

@@ -42,10 +42,11 @@ pub struct GpuOptions {
 /// An opened device. Cheap to clone; everything made from it keeps it alive.
 #[derive(Clone)]
 pub struct Gpu {
+    // Before the device, so that what it keeps is gone first.
+    pool: Option<Arc<Pool>>,
     inner: Arc<Inner>,
     target: Arc<Target>,
     ledger: Option<Arc<Ledger>>,
-    pool: Option<Arc<Pool>>,
 }
 
 struct Inner {
@@ -181,8 +182,8 @@ impl Gpu {
     /// again: drivers clear fresh memory, which may take as long as the work on it.
     #[must_use]
     pub fn with_pool(&self, bytes: u64) -> Self {
-        let plain = Self { pool: None, ..self.clone() };
-        Self { pool: Some(Arc::new(Pool::new(plain, bytes))), ledger: None, ..self.clone() }
+        let pool = Pool::new(self.device().clone(), self.allocator().clone(), bytes);
+        Self { pool: Some(Arc::new(pool)), ledger: None, ..self.clone() }
     }
 
     /// What [`Gpu::with_memory`] was told; all there are without a limit.

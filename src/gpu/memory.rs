@@ -2,7 +2,7 @@
 
 use super::buffer_ref::{BufferRef, USAGE};
 use super::context::Gpu;
-use super::pool::{Kind, Pool};
+use super::pool::{Kind, Memory, Pool};
 use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
@@ -15,66 +15,44 @@ pub const ALIGNMENT: u64 = 256;
 /// Addresses of buffers are multiples of this, whatever the device asks for: kernels load 16 bytes at once.
 const LEAST_ALIGNMENT: u64 = 16;
 
-/// A Vulkan buffer and what it lies in.
-pub(super) struct Memory {
-    pub kind: Kind,
-    /// Bytes of the Vulkan buffer.
-    pub size: u64,
-    handle: vk::Buffer,
-    allocation: Option<Allocation>,
-    address: u64,
+/// A buffer of `size` bytes in fresh memory, which takes so many as `claim` is told.
+fn allocate(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<Memory> {
+    let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
+    let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage);
+    // SAFETY: the device is alive as long as `gpu`; on the error path below the handle is destroyed.
+    let handle = unsafe { gpu.device().create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
+    let mut memory = Memory { kind, size, handle, allocation: None, address: 0 };
+    match bind(gpu, name, &mut memory, claim) {
+        Ok(()) => Ok(memory),
+        Err(e) => {
+            memory.free(gpu.device(), gpu.allocator());
+            Err(e)
+        }
+    }
 }
 
-impl Memory {
-    /// A buffer of `size` bytes in fresh memory, which takes so many as `claim` is told.
-    fn new(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<Self> {
-        let device = gpu.device();
-        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
-        let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage);
-        // SAFETY: the device is alive as long as `gpu`; on every error path below the handle is destroyed.
-        let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
-        let mut memory = Self { kind, size, handle, allocation: None, address: 0 };
-        let made = memory.bind(gpu, name, claim);
-        if let Err(e) = made {
-            memory.free(gpu);
-            return Err(e);
-        }
-        Ok(memory)
+/// Gives a buffer that has none its memory.
+fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<()> {
+    let (device, handle, location) = (gpu.device(), memory.handle, memory.kind.location);
+    let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: memory.size, reason };
+    // SAFETY: the handle was just made.
+    let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
+    requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
+    claim(requirements.size)?;
+    let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
+    let description = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
+    let mut allocator = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
+    let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
+    drop(allocator);
+    // SAFETY: fresh memory of the right requirements, bound once.
+    let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+    memory.allocation = Some(allocation);
+    bound.map_err(failed("vkBindBufferMemory"))?;
+    if gpu.has_addresses() {
+        // SAFETY: the buffer was made with the address usage and is bound.
+        memory.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
     }
-
-    fn bind(&mut self, gpu: &Gpu, name: &str, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<()> {
-        let (device, handle) = (gpu.device(), self.handle);
-        let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: self.size, reason };
-        // SAFETY: the handle was just made.
-        let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-        requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
-        claim(requirements.size)?;
-        let (location, allocation_scheme) = (self.kind.location, AllocationScheme::GpuAllocatorManaged);
-        let description = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
-        let mut allocator = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
-        let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
-        drop(allocator);
-        // SAFETY: fresh memory of the right requirements, bound once.
-        let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
-        self.allocation = Some(allocation);
-        bound.map_err(failed("vkBindBufferMemory"))?;
-        if gpu.has_addresses() {
-            // SAFETY: the buffer was made with the address usage and is bound.
-            self.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
-        }
-        Ok(())
-    }
-
-    /// Gives it back to the driver.
-    pub(super) fn free(self, gpu: &Gpu) {
-        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
-        unsafe { gpu.device().destroy_buffer(self.handle, None) };
-        if let (Some(allocation), Ok(mut allocator)) = (self.allocation, gpu.allocator().lock())
-            && let Err(e) = allocator.free(allocation)
-        {
-            log::error!("freeing {} bytes: {e}", self.size);
-        }
-    }
+    Ok(())
 }
 
 /// A buffer with memory of its own, freed when dropped, or kept for the next ([`Gpu::with_pool`]).
@@ -120,7 +98,7 @@ impl Buffer {
             *claimed = bytes;
             Ok(())
         };
-        let mut fresh = || Memory::new(gpu, name, kind, size.max(16), &mut claim);
+        let mut fresh = || allocate(gpu, name, kind, size.max(16), &mut claim);
         let memory = match gpu.pool().and_then(|pool| pool.take(kind, size)) {
             Some(memory) => memory,
             // What is kept may be what is missing.
@@ -198,7 +176,7 @@ impl Drop for Buffer {
         if let Some(memory) = self.memory.take() {
             match self.gpu.pool() {
                 Some(pool) => pool.keep(memory),
-                None => memory.free(&self.gpu),
+                None => memory.free(self.gpu.device(), self.gpu.allocator()),
             }
         }
     }

@@ -1,10 +1,9 @@
 //! Memory of dropped buffers that waits for the next ones.
 
-use super::context::Gpu;
-use super::memory::Memory;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use std::sync::Mutex;
+use gpu_allocator::vulkan::{Allocation, Allocator};
+use std::sync::{Arc, Mutex};
 
 /// Buffers below this are not worth keeping: the allocator has blocks for them.
 const LEAST: u64 = 256 << 10;
@@ -16,18 +15,45 @@ pub(super) struct Kind {
     pub location: MemoryLocation,
 }
 
-/// Memory of dropped buffers, the latest last.
+/// A Vulkan buffer and what it lies in.
+pub(super) struct Memory {
+    pub kind: Kind,
+    /// Bytes of the Vulkan buffer.
+    pub size: u64,
+    pub handle: vk::Buffer,
+    pub allocation: Option<Allocation>,
+    pub address: u64,
+}
+
+impl Memory {
+    /// Gives it back to the driver.
+    pub(super) fn free(self, device: &ash::Device, allocator: &Mutex<Allocator>) {
+        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
+        unsafe { device.destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Ok(mut allocator)) = (self.allocation, allocator.lock())
+            && let Err(e) = allocator.free(allocation)
+        {
+            log::error!("freeing {} bytes: {e}", self.size);
+        }
+    }
+}
+
+/// Memory of dropped buffers, the latest last. Gone before the device, see [`super::Gpu`].
 pub(super) struct Pool {
-    /// A handle without pool, which frees what is kept.
-    gpu: Gpu,
+    device: ash::Device,
+    allocator: Arc<Mutex<Allocator>>,
     most: u64,
     kept: Mutex<Vec<Memory>>,
 }
 
 impl Pool {
     /// Of at most so many bytes.
-    pub(super) fn new(gpu: Gpu, most: u64) -> Self {
-        Self { gpu, most, kept: Mutex::default() }
+    pub(super) fn new(device: ash::Device, allocator: Arc<Mutex<Allocator>>, most: u64) -> Self {
+        Self { device, allocator, most, kept: Mutex::default() }
+    }
+
+    fn free(&self, memory: Memory) {
+        memory.free(&self.device, &self.allocator);
     }
 
     /// The smallest that holds `size` bytes without much to spare.
@@ -40,13 +66,13 @@ impl Pool {
 
     /// Keeps memory, in place of what has waited longest where that is too much, or gives it back.
     pub(super) fn keep(&self, memory: Memory) {
-        let Ok(mut kept) = self.kept.lock() else { return memory.free(&self.gpu) };
+        let Ok(mut kept) = self.kept.lock() else { return self.free(memory) };
         if !(LEAST..=self.most).contains(&memory.size) {
-            return memory.free(&self.gpu);
+            return self.free(memory);
         }
         kept.push(memory);
         while kept.iter().map(|m| m.size).sum::<u64>() > self.most {
-            kept.remove(0).free(&self.gpu);
+            self.free(kept.remove(0));
         }
     }
 
@@ -54,7 +80,7 @@ impl Pool {
     pub(super) fn clear(&self) -> bool {
         let Ok(mut kept) = self.kept.lock() else { return false };
         let any = !kept.is_empty();
-        kept.drain(..).for_each(|memory| memory.free(&self.gpu));
+        kept.drain(..).for_each(|memory| self.free(memory));
         any
     }
 }

@@ -8,7 +8,7 @@ use super::vertices::Vertices;
 use super::{depth, leaves, levels, quarters};
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
-use crate::options::{BuildOptions, Lists, Size};
+use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;
 
 /// A tree, and what no array of it tells of its making.
@@ -38,12 +38,11 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     let at = |level: u32, options: &BuildOptions| Ok(construct(mesh, topology, &vertices, level, options)?.tree);
 
     let mut tree = at(sizes.level(options)?, options)?;
-    while let Some(finer) = options.finer(&Size {
-        level: tree.grid.level,
-        entries: tree.p.len() as u64,
-        leaves: tree.leaves().len() as u64,
-        candidates: &sizes.entries,
-    }) {
+    let finer = |tree: &TreeArrays| {
+        let (entries, leaves) = (tree.p.len() as u64, tree.leaves().len() as u64);
+        depth::finer(options, tree.grid.level, entries, leaves, &sizes.entries)
+    };
+    while let Some(finer) = finer(&tree) {
         tree = at(finer.level.unwrap_or(MAX_LEVEL), &finer)?;
     }
     Ok(tree)

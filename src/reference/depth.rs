@@ -83,6 +83,29 @@ impl Sizes {
     }
 }
 
+/// The options of a finer tree than the one of that level that these options came to, if it suits better ([`crate::options::Fineness`]). `candidates`: as
+/// [`Sizes::entries`], on the first level valid tetrahedra.
+pub(crate) fn finer(options: &BuildOptions, built: u32, entries: u64, leaves: u64, candidates: &[u64; LEVELS]) -> Option<BuildOptions> {
+    let (longest, anyway) = options.fineness.limits()?;
+    let (mut mean, mut level) = (entries / leaves.max(1), built);
+    while mean > longest {
+        // A surface meets four times as many cells of a level more.
+        (mean, level) = (mean / 4, level + 1);
+    }
+    let finest = |most: u64| (built + 1..=MAX_LEVEL).rev().find(|&l| candidates[l as usize] <= most);
+    let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(candidates[0] as u32)));
+    let level = finest(anyway).map_or(level, |cheap| level.max(cheap)).min(finest(most)?);
+    if level <= built || options.budget.is_some() {
+        return None;
+    }
+    log::info!(
+        "leaves of level {built} list {} entries on average; level {level} suits {} better",
+        entries / leaves.max(1),
+        options.fineness
+    );
+    Some(BuildOptions { level: Some(level), ..*options })
+}
+
 /// Why there is no tree, `entries` being those of every level.
 pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
     let root = entries[0];

@@ -14,8 +14,8 @@ pub struct TreeArgs {
     /// Coarseness of the tree, 0 to 10: each whole number takes one level off. Coarser trees are smaller and quicker to build; answers are the same.
     #[arg(long, default_value_t = 0.0, value_name = "A", allow_hyphen_values = true)]
     pub alpha: f32,
-    /// Level of the leaves, 0 to 10, instead of the one that alpha asks for; each has cells half as large. Without this and --alpha, leaves are finer where
-    /// parts are thin and lists long, as is quickest; `info` tells. Answers are the same.
+    /// Level of the leaves, 0 to 10, instead of the one that alpha asks for; each has cells half as large. Without this, at alpha 0, leaves
+    /// are finer where parts are thin and lists long, and for pictures of small meshes (but not in `info`). Answers are the same.
     #[arg(long, value_name = "L", conflicts_with = "alpha", value_parser = clap::value_parser!(u32).range(0..=10))]
     pub level: Option<u32>,
     /// Which octree cells list a tetrahedron: those its box meets, as in the paper; of those the ones that its face planes leave; or exactly those it touches,
