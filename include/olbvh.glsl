@@ -89,9 +89,9 @@ struct olbvh_RenderView {
     vec4 origin;     // Origin of the ray of pixel (0, 0).
     vec4 origin_x;   // What one pixel to the right adds to it.
     vec4 origin_y;   // What one pixel down adds to it.
-    vec4 way;        // Direction of the ray of pixel (0, 0), of any length.
-    vec4 way_x;      // What one pixel to the right adds to it.
-    vec4 way_y;      // What one pixel down adds to it.
+    vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
+    vec4 direction_x;      // What one pixel to the right adds to it.
+    vec4 direction_y;      // What one pixel down adds to it.
     vec4 to_light;   // Unit vector to the light.
     vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
     float step_size; // Distance of two samples.
@@ -874,7 +874,7 @@ bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
 }
 
 // Cell of a leaf in normalised coordinates.
-struct olbvh_Room {
+struct olbvh_LeafCell {
     vec3 centre;
     vec3 half_size;
 };
@@ -958,7 +958,7 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
 }
 
 // Point number k of the cell, the first its centre.
-vec3 olbvh_room_point(olbvh_Room room, uint k) {
+vec3 olbvh_room_point(olbvh_LeafCell room, uint k) {
     vec3 olbvh_p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * olbvh_two_to(-23) - 1.0;
@@ -972,7 +972,7 @@ vec3 olbvh_room_point(olbvh_Room room, uint k) {
 
 // Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
 // kernels hold each part once.
-olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_Room room, vec3 x) {
+olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell room, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !olbvh_settled(best); ++way) {
@@ -1001,7 +1001,7 @@ uint olbvh_middle_of(uvec2 range) { return olbvh_listed_tet(range.x + (range.y -
 
 // The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
-    olbvh_Room room;
+    olbvh_LeafCell room;
     room.half_size = olbvh_half_cell(g, g.level);
     room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
     return olbvh_walk_from_seed(olbvh_listed_tet(range.x), room, x);

@@ -87,7 +87,7 @@ pub enum Error {
 
 impl Error {
     /// Whether something failed for want of memory or room, so that less may do.
-    pub(crate) fn is_for_want_of_room(&self) -> bool {
+    pub(crate) fn is_lack_of_room(&self) -> bool {
         matches!(self, Self::Memory { .. } | Self::TooLarge(_))
     }
 }

@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 pub const TOLERANCE: f32 = 1e-5;
 
 /// Points that are located one after the other, each from the owner of the one before, where they lie near each other.
-pub const RUN: u32 = 8;
+pub const POINT_RUN: u32 = 8;
 
 /// Which cells list a primitive (SPEC 2.2). The stronger the test, the shorter the lists and the longer the construction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -63,7 +63,7 @@ impl Fineness {
     }
 
     /// Whether finer leaves than α's would suit better, by their mean number of entries.
-    pub fn is_long(self, mean: u64) -> bool {
+    pub fn wants_finer(self, mean: u64) -> bool {
         self.limits().is_some_and(|(most, _)| mean > most)
     }
 }
@@ -121,8 +121,8 @@ pub struct BuildOptions {
     /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
     /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: [`usual_capacity`].
     pub capacity: Option<u32>,
-    /// Most bytes that the arrays of the tree may have together ([`crate::tree::Memory::total`]), α being the finest that is asked for: the tree gets
-    /// coarser until it fits. What is held to the budget is [`crate::tree::Memory::most`], which is known before anything is built. `None`: no limit.
+    /// Most bytes that the arrays of the tree may have together ([`crate::tree::TreeBytes::total`]), α being the finest that is asked for: the tree gets
+    /// coarser until it fits. What is held to the budget is [`crate::tree::TreeBytes::most`], which is known before anything is built. `None`: no limit.
     pub budget: Option<u64>,
     /// Level that the leaves should have, up to 10, whatever α and the size of the cells ask for; capacity and budget still hold. `None`: by α.
     pub level: Option<u32>,

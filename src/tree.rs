@@ -2,7 +2,7 @@
 
 mod stats;
 mod validate;
-pub use stats::{Memory, TreeStats};
+pub use stats::{TreeBytes, TreeStats};
 
 use crate::options::{Assign, Lists};
 use crate::reference::boundary::bit;

@@ -7,20 +7,20 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
-use olbvh::query::{self, Built, Drawn, LocateOptions, Party};
+use olbvh::query::{self, Built, Drawn, LocateOptions, OverlapInput};
 use olbvh::reference::boundary::NONE;
 use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh with both structures over it.
-struct Both {
+struct HostAndDevice {
     mesh: Mesh,
     device: DeviceMesh,
     tree: Tree,
     lbvh: Lbvh,
 }
 
-impl Both {
+impl HostAndDevice {
     fn new(gpu: &Gpu, mesh: Mesh) -> Self {
         let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap();
         let tree = Tree::build(gpu, &device, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
@@ -75,7 +75,7 @@ fn check_subtree(at: u32, tree: &LbvhArrays, mesh: &Mesh, vertices: &[[f32; 4]],
     ([left[0], right[1]], [lo, hi], 1 + left_depth.max(right_depth))
 }
 
-fn check_tree(name: &str, b: &Both) {
+fn check_tree(name: &str, b: &HostAndDevice) {
     let tree = b.lbvh.download().unwrap();
     let valid = b.device.input().tets - b.device.status().bad;
     let mut ids = tree.ids.clone();
@@ -106,7 +106,7 @@ fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
     points
 }
 
-fn check_owners(name: &str, b: &Both) {
+fn check_owners(name: &str, b: &HostAndDevice) {
     let mut points = points(&b.mesh);
     if name == "identical-9000" {
         points = points.into_iter().step_by(97).collect(); // each looks at all cells
@@ -134,7 +134,7 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
 }
 
 /// A picture by either structure; `None` where there is nothing to see.
-fn same_picture(name: &str, b: &Both, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
+fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
     let bounds = Bounds::from(b.device.grid());
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
@@ -150,7 +150,7 @@ fn same_picture(name: &str, b: &Both, settings: &RenderSettings, field: &Field) 
 }
 
 /// Pictures of numbers of points and cells, if there is something to see.
-fn check_picture(name: &str, b: &Both) -> u64 {
+fn check_picture(name: &str, b: &HostAndDevice) -> u64 {
     let mut found = 0;
     for (camera, on, n) in [("iso", On::Points, b.mesh.points.len()), ("azimuth=100,elevation=-10,zoom=1.5", On::Cells, b.mesh.tets.len())]
     {
@@ -162,7 +162,7 @@ fn check_picture(name: &str, b: &Both) -> u64 {
 }
 
 /// Slices through the middle: touched voxels.
-fn check_slices(name: &str, b: &Both) -> u64 {
+fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     let (lo, hi) = (three(b.device.grid().lo), three(b.device.grid().hi));
     let mut touched = 0;
@@ -187,9 +187,9 @@ fn check_slices(name: &str, b: &Both) -> u64 {
     touched
 }
 
-fn check_overlap<'a>(name: &str, a: &'a Both, b: &'a Both) -> usize {
-    let party = |b: &'a Both| Party { mesh: &b.device, tree: &b.tree };
-    let expected = query::overlap(party(a), party(b), false, &|_, _| {}).unwrap();
+fn check_overlap<'a>(name: &str, a: &'a HostAndDevice, b: &'a HostAndDevice) -> usize {
+    let input = |b: &'a HostAndDevice| OverlapInput { mesh: &b.device, tree: &b.tree };
+    let expected = query::overlap(input(a), input(b), false, &|_, _| {}).unwrap();
     let found = a.lbvh.overlap(&a.device, &b.lbvh, &b.device, &|_, _| {}).unwrap();
     assert_eq!(expected.overlap.a, found.overlap.a, "{name}: a");
     assert_eq!(expected.overlap.b, found.overlap.b, "{name}: b");
@@ -204,9 +204,9 @@ fn everything(binding: Binding) {
     let (mut found, mut touched, mut hits) = (0, 0, 0);
     let mut grid = kuhn_jittered([6, 5, 4], 0.3, 9).unwrap();
     grid.points.iter_mut().for_each(|p| *p = [p[0] - 2.6, p[1] - 3.3, p[2] - 1.4]);
-    let grid = Both::new(&gpu, grid);
+    let grid = HostAndDevice::new(&gpu, grid);
     for (name, mesh) in meshes() {
-        let both = Both::new(&gpu, mesh);
+        let both = HostAndDevice::new(&gpu, mesh);
         check_tree(name, &both);
         check_owners(name, &both);
         found += if name == "identical-9000" { 0 } else { check_picture(name, &both) };
@@ -222,7 +222,7 @@ fn everything(binding: Binding) {
 /// Two surfaces that cut through cells: lit or not, and half transparent, so that those behind are seen.
 fn surfaces(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
-    let both = Both::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());
+    let both = HostAndDevice::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());
     let values = both.mesh.points.iter().map(|p| p[0] * p[1] - p[2]).collect();
     let field = Field { name: "saddle".into(), on: On::Points, values };
     for shading in [true, false] {

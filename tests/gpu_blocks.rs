@@ -7,7 +7,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
-use olbvh::query::{self, LocateOptions, Party, Path};
+use olbvh::query::{self, LocateOptions, OverlapInput, Path};
 use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 
@@ -128,7 +128,7 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let options = BuildOptions { lists, ..BuildOptions::default() };
         let devices = [a, &b].map(|mesh| DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
         let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
-        let [x, y] = [0, 1].map(|i| Party { mesh: &devices[i], tree: &trees[i] });
+        let [x, y] = [0, 1].map(|i| OverlapInput { mesh: &devices[i], tree: &trees[i] });
         let whole = query::overlap(x, y, pairs, QUIET).unwrap().overlap;
         let memory = 2 << 20;
         let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, QUIET).unwrap();
@@ -205,10 +205,10 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         };
         let options = BuildOptions::default();
         let asked = View { mesh, options, field: wave, settings: &settings };
-        let (whole, took) = render(gpu, 64 << 20, &asked, QUIET).unwrap().apart();
+        let (whole, took) = render(gpu, 64 << 20, &asked, QUIET).unwrap().into_parts();
         assert_eq!(took.trees, 1);
         let memory = 640 << 10;
-        let (found, took) = render(gpu, memory, &asked, QUIET).unwrap().apart();
+        let (found, took) = render(gpu, memory, &asked, QUIET).unwrap().into_parts();
         println!("{camera}: {} samples, {} trees, peak {}", found.drawn.found_samples, took.trees, took.peak);
         let first = (0..whole.drawn.colors.len()).find(|&i| bits(&whole.drawn.colors[i]) != bits(&found.drawn.colors[i]));
         assert_eq!(first.map(|i| (i % 41, i / 41, whole.drawn.colors[i], found.drawn.colors[i])), None, "{camera}");
@@ -225,7 +225,7 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
         let transfer = TransferFunction::default().with_opacity(opacity).unwrap();
         let settings = RenderSettings { size: [41, 33], transfer, ..RenderSettings::default() };
         let asked = View { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
-        let (picture, took) = render(gpu, memory, &asked, QUIET).unwrap().apart();
+        let (picture, took) = render(gpu, memory, &asked, QUIET).unwrap().into_parts();
         (picture.drawn.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
     };
     let end = vec![(0.0, 0.0), (0.8, 0.0), (1.0, 0.5)];

@@ -15,9 +15,9 @@ use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::Locator;
-use olbvh::reference::quarters::taken_apart;
+use olbvh::reference::quarters::split_entries;
 use olbvh::reference::vertices::Vertices;
-use olbvh::tree::{Memory, TreeArrays};
+use olbvh::tree::{TreeArrays, TreeBytes};
 use submit::submit;
 
 /// A mesh that fills little of its bounds, so that a level has far fewer nodes than cells.
@@ -64,7 +64,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
         (Assign::Exact, Lists::All, true),
         (Assign::Planes, Lists::Boundary, false),
     ] {
-        let of = |level: u32| Memory::most(&sizes.entries, level, boxes).total();
+        let of = |level: u32| TreeBytes::most(&sizes.entries, level, boxes).total();
         let options = |budget: u64| BuildOptions { assign, lists, boxes, budget: Some(budget), ..BuildOptions::default() };
         // Too small by a byte: refused by both, with the sizes.
         let (short, what) = (of(0) - 1, format!("{name} {assign} {lists} boxes {boxes}"));
@@ -89,7 +89,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
         let found = locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
         (tree.status().level, found.owners)
     };
-    let ((coarse, found), (fine, expected)) = (of(Some(Memory::most(&sizes.entries, 1, false).total())), of(None));
+    let ((coarse, found), (fine, expected)) = (of(Some(TreeBytes::most(&sizes.entries, 1, false).total())), of(None));
     assert!(coarse < fine, "{name}");
     assert_eq!(found, expected, "{name}");
     assert!(!found.contains(&u32::MAX), "{name}");
@@ -156,7 +156,7 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     let words = |part: BufferRef, n: u32| content[part.offset() as usize / 4..][..n as usize].to_vec();
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
-    let (p, quarters) = taken_apart(words(tree.p, status.entries), &grid);
+    let (p, quarters) = split_entries(words(tree.p, status.entries), &grid);
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,

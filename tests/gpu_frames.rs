@@ -14,7 +14,7 @@ use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
-use olbvh::reference::quarters::taken_apart;
+use olbvh::reference::quarters::split_entries;
 
 const SLOTS: usize = 2;
 
@@ -56,7 +56,7 @@ fn compare(gpu: &Gpu, slot: &Slot, mesh: &Mesh, number: u32) {
     let words = |part: BufferRef, n: usize| gpu.download::<u32>(&frame.memory, part.part(0, 4 * n as u64)).unwrap();
     let status: Vec<BuildStatus> = gpu.download(&frame.memory, frame.tree.status.part(0, size_of::<BuildStatus>() as u64)).unwrap();
     assert_eq!((status[0].overflow, status[0].level), (0, expected.grid.level), "frame {number}");
-    let (p, quarters) = taken_apart(words(frame.tree.p, expected.p.len()), &expected.grid);
+    let (p, quarters) = split_entries(words(frame.tree.p, expected.p.len()), &expected.grid);
     assert_eq!((p, quarters), (expected.p, expected.quarters), "P of frame {number}");
     assert_eq!(words(frame.tree.po, expected.po.len()), expected.po, "PO of frame {number}");
     assert_eq!(words(frame.tree.co, expected.co.len()), expected.co, "CO of frame {number}");

@@ -8,7 +8,9 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
-use olbvh::query::{LocateOptions, LocateOutput, Party, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice};
+use olbvh::query::{
+    LocateOptions, LocateOutput, OverlapInput, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice,
+};
 use olbvh::reference::boundary::{NONE, Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Location, Locator};
@@ -210,11 +212,11 @@ fn overlaps() {
     let (a, b) = (Subject::new(&gpu, "a", kuhn_jittered([14; 3], 0.12, 3).unwrap()), Subject::new(&gpu, "b", moved));
     let sets = Lists::EVERY.map(|lists| {
         let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
-        let parties = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| Party { mesh: &s.device, tree });
+        let inputs = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| OverlapInput { mesh: &s.device, tree });
         if lists == Lists::Boundary {
-            assert!(overlap(parties[0], parties[1], true, QUIET).is_err_and(|e| e.to_string().contains("Lists::All")));
+            assert!(overlap(inputs[0], inputs[1], true, QUIET).is_err_and(|e| e.to_string().contains("Lists::All")));
         }
-        let found = overlap(parties[0], parties[1], false, QUIET).unwrap().overlap;
+        let found = overlap(inputs[0], inputs[1], false, QUIET).unwrap().overlap;
         (found.a, found.b)
     });
     assert!(sets[0].0.len() > 100 && sets[0].1.len() > 100);
@@ -249,7 +251,10 @@ fn long_lists_make_leaves_finer() {
         let options = BuildOptions { fineness, capacity: limit, ..alpha };
         let status = *plate.tree(&gpu, &options).0.status();
         let (level, mean, next) = (status.level, status.entries / status.leaves, status.total[2 * status.level as usize + 2]);
-        assert!(level > 0 && fineness.is_long(u64::from(mean)) == limit.is_some(), "{fineness}: {mean} entries per leaf of level {level}");
+        assert!(
+            level > 0 && fineness.wants_finer(u64::from(mean)) == limit.is_some(),
+            "{fineness}: {mean} entries per leaf of level {level}"
+        );
         assert!(limit.is_none_or(|limit| status.candidates <= limit && next > limit), "{next} candidates would fit");
         for (a, b) in found.iter().zip(plate.locations(&gpu, &options, 3000)) {
             assert!(a.owner == b.owner || !inside(a), "{fineness}: {a:?}, {b:?}");

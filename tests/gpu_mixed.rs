@@ -9,7 +9,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::layout::Grid;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
+use olbvh::query::{LocateOptions, OverlapInput, locate, locate_all, overlap, render, slice};
 use olbvh::render::{Bounds, Plan, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;
@@ -34,7 +34,7 @@ fn another_mesh_is_refused() {
     refused("locate", words, locate(&mine, &tree, &small.points, None, &none, &quiet));
     refused("locate_all", words, locate_all(&mine, &tree, &small.points, 0.0, &quiet));
     refused("lbvh.locate", words, lbvh.locate(&mine, &small.points, 0.0));
-    let [a, b] = [Party { mesh: &other, tree: &tree }, Party { mesh: &mine, tree: &tree }];
+    let [a, b] = [OverlapInput { mesh: &other, tree: &tree }, OverlapInput { mesh: &mine, tree: &tree }];
     refused("overlap", words, overlap(a, b, false, &quiet));
     refused("overlap", words, overlap(b, a, true, &quiet));
     refused("lbvh.overlap", words, lbvh.overlap(&mine, &lbvh, &other, &quiet));
@@ -65,7 +65,7 @@ fn another_device_is_refused() {
     refused("tree", "on another device", Tree::build(&gpu, &there, &options));
     refused("lbvh", "on another device", Lbvh::build(&gpu, &there).map(|_| ()));
     let [a, b] = [(&gpu, &here), (&elsewhere, &there)].map(|(gpu, mesh)| Tree::build(gpu, mesh, &options).unwrap());
-    let [a, b] = [Party { mesh: &here, tree: &a }, Party { mesh: &there, tree: &b }];
+    let [a, b] = [OverlapInput { mesh: &here, tree: &a }, OverlapInput { mesh: &there, tree: &b }];
     refused("overlap", "on another device", overlap(a, b, false, &|_, _| {}));
     let same = gpu.with_memory(1 << 20).with_target(gpu.target().clone()).unwrap();
     Tree::build(&same, &here, &options).unwrap();

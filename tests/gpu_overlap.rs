@@ -1,7 +1,7 @@
 //! Overlaps on the device are the reference's, and so is what they take: poses and lists that the conformance suite lacks.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
-use olbvh::conformance::{Both, check_overlap};
+use olbvh::conformance::{HostAndDevice, check_overlap};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
@@ -17,10 +17,10 @@ fn everything(binding: Binding) {
     let mut hits = 0;
     for (alpha, assign) in [(0.0, Assign::Aabb), (1.0, Assign::Exact), (10.0, Assign::Planes)] {
         let options = BuildOptions { alpha, assign, lists: Lists::All, ..BuildOptions::default() };
-        let cube = Both::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap(), &options).unwrap();
+        let cube = HostAndDevice::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap(), &options).unwrap();
         for (i, scale) in [1.0, 0.3, 1.7].into_iter().enumerate() {
             let at = [0.4 + i as f32, 0.37 * i as f32 - 1.0, 1.1];
-            let other = Both::new(&gpu, moved(kuhn_jittered([7, 6, 8], 0.2, 3).unwrap(), at, scale), &options).unwrap();
+            let other = HostAndDevice::new(&gpu, moved(kuhn_jittered([7, 6, 8], 0.2, 3).unwrap(), at, scale), &options).unwrap();
             hits += check_overlap(&cube, &other).unwrap();
         }
     }
@@ -45,7 +45,7 @@ fn long_lists_take_several_submissions() {
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     // A primitive that touches none of 20,000 others in its cell, and one that touches all.
-    let many = Both::new(&gpu, Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]), &options).unwrap();
+    let many = HostAndDevice::new(&gpu, Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]), &options).unwrap();
     let apart = Mesh::new(
         vec![
             [0.1, 0.5, 0.9],
@@ -59,9 +59,9 @@ fn long_lists_take_several_submissions() {
         ],
         vec![[0, 1, 2, 3], [4, 5, 6, 7]],
     );
-    let apart = Both::new(&gpu, apart, &options).unwrap();
+    let apart = HostAndDevice::new(&gpu, apart, &options).unwrap();
     check_overlap(&apart, &many).unwrap();
     check_overlap(&many, &apart).unwrap();
-    let found = overlap(apart.party(), many.party(), true, &|_, _| {}).unwrap();
+    let found = overlap(apart.input(), many.input(), true, &|_, _| {}).unwrap();
     assert!(found.submissions > 10, "{}", found.submissions);
 }

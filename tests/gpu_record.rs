@@ -16,13 +16,13 @@ use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    PairMemory, Party, RenderInput, RenderMemory, Rounds, Scene, Searched, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs,
-    cmd_render, cmd_slice, overlap, render, slice,
+    OverlapInput, PairMemory, RenderInput, RenderMemory, Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_pairs,
+    cmd_list_pairs, cmd_render, cmd_slice, overlap, render, slice,
 };
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::locate::Locator;
-use olbvh::reference::overlap::{Side, overlap as reference};
+use olbvh::reference::overlap::{OverlapSide, overlap as reference};
 use olbvh::reference::slice::Slicer;
 use olbvh::render::{Bounds, Plan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
@@ -144,12 +144,15 @@ fn frames(binding: Binding) {
         let seen = compare_picture(&gpu, &queries, &values, &device, &tree, &host.grid);
         drawn = [drawn[0] + seen[0], drawn[1] + seen[1]];
 
-        let (a, b) =
-            (Side { mesh: &shown, topology: &topology, tree: &host }, Side { mesh: &other, topology: &other_topology, tree: &other_tree });
+        let (a, b) = (
+            OverlapSide { mesh: &shown, topology: &topology, tree: &host },
+            OverlapSide { mesh: &other, topology: &other_topology, tree: &other_tree },
+        );
         let (sets, pairs) = (reference(a, b, false), reference(a, b, true).pairs.unwrap());
         let hits = |k: usize, n: usize| bits(&read(&gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
         assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
-        let (device, other) = (Party { mesh: &device, tree: &tree }, Party { mesh: &queries.other, tree: &queries.other_tree });
+        let (device, other) =
+            (OverlapInput { mesh: &device, tree: &tree }, OverlapInput { mesh: &queries.other, tree: &queries.other_tree });
         assert_eq!(overlap(device, other, false, &|_, _| {}).unwrap().overlap, sets, "frame {i}");
         let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(&gpu, &queries, part, 1)[0]);
         assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
@@ -201,7 +204,7 @@ fn rounds_go_on_where_they_ended() {
         layers: 1,
     };
     let rows = Rows { layer: 0, first: 0, count: 5 };
-    let searched = Searched::new(&device, &tree).unwrap();
+    let searched = StructureView::new(&device, &tree).unwrap();
     let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
     let carve = |a: &mut Arena| SliceMemory::carve(a, [5, 5], 5);
     let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
@@ -235,13 +238,17 @@ fn rounds_go_on_where_they_ended() {
     let lbvh = Lbvh::build(&gpu, &device).unwrap();
     picture_goes_on(&gpu, &searched, &mesh.points, false);
     let surface = picture_goes_on(&gpu, &searched, &mesh.points, true);
-    assert!(surface == picture_goes_on(&gpu, &Searched::new(&device, &lbvh).unwrap(), &mesh.points, true), "a surface by either structure");
+    assert!(
+        surface == picture_goes_on(&gpu, &StructureView::new(&device, &lbvh).unwrap(), &mesh.points, true),
+        "a surface by either structure"
+    );
 
     let scene = Scene::new(&device, &tree).unwrap();
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
     let few_scene = Scene::new(&few, &few_tree).unwrap();
-    let expected = overlap(Party { mesh: &few, tree: &few_tree }, Party { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
+    let expected =
+        overlap(OverlapInput { mesh: &few, tree: &few_tree }, OverlapInput { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
     let buffer = gpu.buffer("olbvh.test.pairs", Arena::measure(carve).unwrap()).unwrap();
@@ -265,7 +272,7 @@ fn rounds_go_on_where_they_ended() {
 }
 
 /// A picture in several recordings is that of one: of the volume, or of a surface across it.
-fn picture_goes_on(gpu: &Gpu, searched: &Searched, points: &[[f32; 3]], iso: bool) -> Vec<[f32; 4]> {
+fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso: bool) -> Vec<[f32; 4]> {
     let (surfaces, step) = if iso { (vec![0.7], 0.1) } else { (vec![], 0.2) };
     let settings = RenderSettings { size: [4, 3], step: Some(step), iso: surfaces, ..RenderSettings::default() };
     let plan = Plan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();

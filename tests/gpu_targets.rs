@@ -8,7 +8,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::kernels::{Row, Target};
 use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{self, LocateOptions, Party};
+use olbvh::query::{self, LocateOptions, OverlapInput};
 use olbvh::render::{Bounds, Prepared, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
@@ -53,8 +53,8 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
         Ok(())
     })
     .unwrap();
-    let party = Party { mesh: &device, tree: &all };
-    let overlap = query::overlap(party, Party { mesh: &device, tree: &boundary }, false, silent).unwrap().overlap;
+    let party = OverlapInput { mesh: &device, tree: &all };
+    let overlap = query::overlap(party, OverlapInput { mesh: &device, tree: &boundary }, false, silent).unwrap().overlap;
     Answers {
         trees: [all.download().unwrap(), boundary.download().unwrap()],
         neighbours,

@@ -181,13 +181,13 @@ fn surfaces_of_a_linear_field_are_planes() {
         let plan = scene.plan();
         let mut seen = std::collections::BTreeMap::<String, (Vec<u8>, u32)>::new();
         for (i, pixel) in picture.pixels.chunks(4).enumerate() {
-            let (origin, way) = plan.rays.ray(i as u32 % plan.size[0], i as u32 / plan.size[0]);
-            let rise: f32 = (0..3).map(|c| gradient[c] * way[c]).sum();
+            let (origin, direction) = plan.rays.ray(i as u32 % plan.size[0], i as u32 / plan.size[0]);
+            let rise: f32 = (0..3).map(|c| gradient[c] * direction[c]).sum();
             // Planes that the ray meets, by distance, those near the edge of the mesh aside.
             let mut hits: Vec<(f32, f32)> = isos.iter().map(|&iso| ((iso - value(origin)) / rise, iso)).collect();
             hits.sort_by(|a, b| a.0.total_cmp(&b.0));
             let depth = |t: f32| {
-                (0..3).map(|c| origin[c] + t * way[c]).enumerate().map(|(c, x)| (x - lo[c]).min(hi[c] - x)).fold(f32::MAX, f32::min)
+                (0..3).map(|c| origin[c] + t * direction[c]).enumerate().map(|(c, x)| (x - lo[c]).min(hi[c] - x)).fold(f32::MAX, f32::min)
             };
             if hits.iter().any(|&(t, _)| depth(t).abs() < 0.06) {
                 continue;

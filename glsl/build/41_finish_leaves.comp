@@ -28,14 +28,14 @@ BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/marks.glsl"
 #include "shared/quarters.glsl"
 
-const uint ASKED = 16u;
-const uint OCTANTS_ASKED = 16384u;
+const uint MAX_TOUCH_TESTS = 16u;
+const uint MAX_LIST_FOR_OCTANTS = 16384u;
 
 // Whether one of the first primitives of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {
     vec3 h = half_cell(g, g.level), centre = cell_centre(h, unmorton(code));
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
-    for (uint i = begin; i < min(end, begin + ASKED); ++i) {
+    for (uint i = begin; i < min(end, begin + MAX_TOUCH_TESTS); ++i) {
         uvec4 ids = words(cells.at[p.at[i]]);
         Tet t = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
         vec3 v[4];
@@ -47,7 +47,7 @@ bool touched(Grid g, uint begin, uint end, uint code) {
 
 // The octants that the entries of a leaf's list are near to; all of them for the longest lists.
 uint octants(Grid g, uint begin, uint end) {
-    if (end - begin > OCTANTS_ASKED) return ALL_OCTANTS;
+    if (end - begin > MAX_LIST_FOR_OCTANTS) return ALL_OCTANTS;
     uint mask = 0u;
     for (uint i = begin; i < end && mask != ALL_OCTANTS; ++i) {
         mask |= octants_near(g, p.at[i]);

@@ -4,17 +4,17 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 // Point location (SPEC 3.1). An invocation takes RUN points, and looks for each first around where it starts: the owner of the one before, or a hint. Where
-// that fails, in the point's leaf, by descent over child masks, then by a list or a walk. Lists are searched in slices of at most SLICE entries per
-// dispatch, those after the first without runs; between slices the best candidate waits in the outputs. Twin of src/reference/locate.rs.
+// that fails, in the point's leaf, by descent over child masks, then by a list or a walk. Lists are searched in parts of at most PART_LENGTH entries per
+// dispatch, those after the first without runs; between parts the best candidate waits in the outputs. Twin of src/reference/locate.rs.
 layout(constant_id = 2) const uint GUIDE = 0; // what `guides` has: nothing, HINTS or ORDER
-layout(constant_id = 3) const uint SLICE = 16384;
+layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
 layout(constant_id = 5) const uint RUN = 1;
 ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
-    uint slice;  // number of this dispatch
-    uint last;   // not 0: lists end in this slice
+    uint part;  // number of this dispatch
+    uint last;   // not 0: lists end in this part
     float tolerance;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -28,13 +28,13 @@ RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, guides)
 BUFFER(10, READ_WRITE, uint, owners)
-BUFFER16(11, READ_WRITE, FLOATS, barycentrics) // between slices: inside, in_box, smallest
+BUFFER16(11, READ_WRITE, FLOATS, barycentrics) // between parts: inside, in_box, smallest
 RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
-const uint LEAST_SLICE = 16384u; // where slices are longer, points are still located around the same owners
+const uint LEAST_PART = 16384u; // where parts are longer, points are still located around the same owners
 const uint HINTS = 1u; // a tetrahedron per point, or NONE
 const uint ORDER = 2u; // which point is at each place
 
@@ -59,8 +59,8 @@ void main() {
     Point a = point_at(g, place);
     uint from = NONE; // where the next stride begins
     uint left = 0u;   // steps that it may still take; 0: it has ended
-    bool in_leaf = slice > 0u; // whether it began in the point's leaf
-    if (GUIDE == HINTS && slice == 0u) {
+    bool in_leaf = part > 0u; // whether it began in the point's leaf
+    if (GUIDE == HINTS && part == 0u) {
         from = guides.at[a.i];
         left = from == NONE ? 0u : HINTED;
     }
@@ -84,7 +84,7 @@ void main() {
         }
         if (place >= end) break;
         Best best = no_best();
-        if (slice > 0u) {
+        if (part > 0u) {
             vec4 state = floats(barycentrics.at[a.i]);
             best = Best(owners.at[a.i], state.x != 0.0, state.y != 0.0, state.z);
         }
@@ -101,8 +101,8 @@ void main() {
             in_leaf = true;
             continue;
         }
-        if (walks && slice == 0u) best = walked_through(g, range, a.at, a.x);
-        uint begin = min(range.y, range.x + slice * SLICE), behind = min(range.y, begin + SLICE);
+        if (walks && part == 0u) best = walked_through(g, range, a.at, a.x);
+        uint begin = min(range.y, range.x + part * PART_LENGTH), behind = min(range.y, begin + PART_LENGTH);
         if (!walks && !best.inside) search(best, begin, behind, sought_at(g, a.at, a.x, tolerance));
         uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
         vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
@@ -111,8 +111,8 @@ void main() {
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
             a = point_at(g, place);
-            // Where a list goes on in the next slice, the owner is not known yet.
-            bool known = owner != NONE && (walks || range.y - range.x <= LEAST_SLICE);
+            // Where a list goes on in the next part, the owner is not known yet.
+            bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;
             left = known ? HINTED : 0u;
             in_leaf = false;

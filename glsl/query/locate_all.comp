@@ -4,14 +4,14 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 // Every primitive that contains a point, ascending; where none does, the owner alone (SPEC 3.1). FILL 0 counts, FILL 1 writes, list by list in
-// slices. `owners` are the answers of locate.
+// parts. `owners` are the answers of locate.
 layout(constant_id = 2) const uint FILL = 0;
-layout(constant_id = 3) const uint SLICE = 16384;
+layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
 ARGUMENTS(13)
     uint count;
     uint stride;
-    uint slice;
+    uint part;
     uint capacity; // of `found`
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -62,7 +62,7 @@ void main() {
     uint place = places.at[i];
     if (!weights(own, x).inside) {
         // The nearest cell, which nothing contains.
-        if (slice == 0u) {
+        if (part == 0u) {
             if (FILL != 0u && place < capacity) found.at[place] = owners.at[i];
             places.at[i] = place + 1u;
         }
@@ -70,10 +70,10 @@ void main() {
     }
     uvec2 range = entry_range(leaf);
     if (walks_in(leaf, range)) {
-        if (slice == 0u) places.at[i] = place + list_star(owners.at[i], x, place);
+        if (part == 0u) places.at[i] = place + list_star(owners.at[i], x, place);
         return;
     }
-    uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
+    uint begin = min(range.y, range.x + part * PART_LENGTH), end = min(range.y, begin + PART_LENGTH);
     Sought sought = sought_at(g, at, x, 0.0);
     for (; begin < end; begin += 32u) {
         for (uint near = near_among(begin, end, sought); near != 0u; near &= near - 1u) {

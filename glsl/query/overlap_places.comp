@@ -4,12 +4,12 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 // Overlap (SPEC 3.5), step 1: which vertices lie in the other mesh: those in a cell of a non-boundary leaf, and those that a list says so. Lists
-// are searched in slices of at most SLICE entries per dispatch. Twin of src/reference/overlap.rs.
-layout(constant_id = 2) const uint SLICE = 16384;
+// are searched in parts of at most PART_LENGTH entries per dispatch. Twin of src/reference/overlap.rs.
+layout(constant_id = 2) const uint PART_LENGTH = 16384;
 ARGUMENTS(13)
     uint points;
     uint stride; // floats from one point to the next
-    uint slice;  // number of this dispatch
+    uint part;  // number of this dispatch
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `vertices`
 BUFFER(1, readonly, uint, masks)
@@ -31,8 +31,8 @@ void main() {
     uint i = item_index();
     uint located = 0u;
     bool look = i < points && status.at[0].empty == 0u && (used.at[i >> 5u] >> (i & 31u) & 1u) != 0u;
-    if (look && slice > 0u) look = places.at[i] == 0u;
-    if (i < points && slice == 0u) places.at[i] = 0u;
+    if (look && part > 0u) look = places.at[i] == 0u;
+    if (i < points && part == 0u) places.at[i] = 0u;
     if (look) {
         Grid g = grid.at[0];
         vec3 x = vec3(own_positions.at[i * stride], own_positions.at[i * stride + 1u], own_positions.at[i * stride + 2u]);
@@ -42,10 +42,10 @@ void main() {
         if (leaf != NONE && !is_boundary_node(leaf)) {
             places.at[i] = 1u;
         } else if (leaf != NONE) {
-            located = uint(slice == 0u);
+            located = uint(part == 0u);
             Sought sought = sought_at(g, x, normalise(g, x), 0.0);
             uvec2 range = entry_range(leaf);
-            uint begin = min(range.y, range.x + slice * SLICE), end = min(range.y, begin + SLICE);
+            uint begin = min(range.y, range.x + part * PART_LENGTH), end = min(range.y, begin + PART_LENGTH);
             bool inside = false;
             for (; begin < end && !inside; begin += 32u) {
                 for (uint near = near_among(begin, end, sought); near != 0u && !inside; near &= near - 1u) {

@@ -27,7 +27,7 @@ STRUCTURE(6)
 Grid g;
 RenderView view;
 RenderPlan plan;
-vec3 origin, inverse_way;
+vec3 origin, inverse_direction;
 float first, last;
 float entered, left;
 
@@ -38,8 +38,8 @@ struct Slabs {
 };
 
 Slabs slabs_of(vec3 lo, vec3 hi) {
-    precise vec3 a = ((lo - plan.slack.xyz) - origin) * inverse_way;
-    precise vec3 b = ((hi + plan.slack.xyz) - origin) * inverse_way;
+    precise vec3 a = ((lo - plan.slack.xyz) - origin) * inverse_direction;
+    precise vec3 b = ((hi + plan.slack.xyz) - origin) * inverse_direction;
     return Slabs(min(a, b), max(a, b));
 }
 
@@ -143,7 +143,7 @@ bool visit_leaf(Node node) {
 bool starts_within() { return find_leaf(g.level, quantize(g, origin)) != NONE; }
 
 bool visit_all() {
-    flip = uint(inverse_way.x < 0.0) << 2 | uint(inverse_way.y < 0.0) << 1 | uint(inverse_way.z < 0.0);
+    flip = uint(inverse_direction.x < 0.0) << 2 | uint(inverse_direction.y < 0.0) << 1 | uint(inverse_direction.z < 0.0);
     bool ended = true;
     [[dont_unroll]] for (uint side = 0u; side < 2u && ended && (side == 0u || first <= last); ++side) {
         from_behind = side == 1u;
@@ -158,12 +158,12 @@ bool visit_all() {
 
 // The first of the samples [k, end) that the block's cells are not ahead of; `past`: that lies behind them. Cells are monotone along a ray, so those between
 // the two are the block's.
-uint first_sample(vec3 way, uint k, uint end, bool past) {
+uint first_sample(vec3 direction, uint k, uint end, bool past) {
     uvec3 lo = unpack_cell(plan.first_cell), hi = unpack_cell(plan.last_cell);
-    bvec3 up = greaterThanEqual(way, vec3(0.0));
+    bvec3 up = greaterThanEqual(direction, vec3(0.0));
     while (k < end) {
         uint middle = k + (end - k) / 2u;
-        uvec3 q = quantize(g, sample_at(view, origin, way, middle));
+        uvec3 q = quantize(g, sample_at(view, origin, direction, middle));
         bvec3 below = lessThan(q, lo), above = lessThan(hi, q);
         bool reached = past ? any(mix(below, above, up)) : !any(mix(above, below, up));
         if (reached) end = middle;
@@ -173,9 +173,9 @@ uint first_sample(vec3 way, uint k, uint end, bool past) {
 }
 
 // Where a ray that stands so goes on in the block, which it meets in the samples of `state`.
-RayState go_on(RayState state, RayState before, vec3 way) {
-    state.next = first_sample(way, max(state.next, before.next), state.end, false);
-    state.end = first_sample(way, state.next, state.end, true);
+RayState go_on(RayState state, RayState before, vec3 direction) {
+    state.next = first_sample(direction, max(state.next, before.next), state.end, false);
+    state.end = first_sample(direction, state.next, state.end, true);
     bool met = state.next < state.end;
     if (!met) state.next = state.end = before.next;
     state.last = state.next == before.next ? before.last : NONE;
@@ -194,9 +194,9 @@ void main() {
         bool opaque = PART != 0u && colors.at[place].w >= view.termination;
         if (PART == 0u) colors.at[place] = vec4(0.0);
         g = grid.at[0];
-        vec3 way;
-        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, way);
-        inverse_way = inverse_of(way);
+        vec3 direction;
+        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, direction);
+        inverse_direction = inverse_of(direction);
         first = 3.40282347e38;
         last = -1.0;
         bool within = all(lessThanEqual(g.lo.xyz, origin)) && all(lessThanEqual(origin, g.hi.xyz));
@@ -209,7 +209,7 @@ void main() {
             state.next = uint(begin);
             state.end = uint(end);
         }
-        if (PART != 0u) state = go_on(state, states.at[i], way);
+        if (PART != 0u) state = go_on(state, states.at[i], direction);
     }
     states.at[i] = state;
 }

@@ -37,7 +37,7 @@ const uint WALK = 6u;   // steps of a walk across faces before the structure is 
 const uint BURST = 32u; // passes before rays that wait for the structure are served
 
 // The ray, and where it stands.
-vec3 origin, way, inverse_way, halfway;
+vec3 origin, direction, inverse_direction, halfway;
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
@@ -89,7 +89,7 @@ vec3 shade(vec3 n) {
     float r = inverse_sqrt(square);
     precise float m = min(square * r, 1.0);
     precise float c = abs(dot_product(n, view.to_light.xyz)) * r;
-    precise float g = 1.0 - min(abs(dot_product(n, way)) * r, 1.0);
+    precise float g = 1.0 - min(abs(dot_product(n, direction)) * r, 1.0);
     precise float h = min(abs(dot_product(n, halfway)) * r, 1.0);
     for (int i = 0; i < 5; ++i) {
         precise float hh = h * h;
@@ -126,7 +126,7 @@ void add_surfaces(uint k, float before, float value) {
         precise float rise = clamp(value - before, -1e37, 1e37);
         precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - before) * reciprocal(rise), 0.0, 1.0);
         precise float s = ((float(k) - 0.5) + part) * view.step_size;
-        precise vec3 at = origin + way * s;
+        precise vec3 at = origin + direction * s;
         vec4 b = max(barycentric(sides_of(stand, normalise(g, at))), vec4(0.0));
         precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
         vec4 color = lookup(iso);
@@ -149,11 +149,11 @@ void pass_by() {
 // Passes by samples where no primitive comes near, those in one cell of the octree at once: rays beside the mesh catch up with rays in it.
 void pass_empty(Grid g, inout uint work) {
     for (; state.next < state.end && !is_to_look(); ++work) {
-        uvec3 finest = quantize(g, sample_at(view, origin, way, state.next));
+        uvec3 finest = quantize(g, sample_at(view, origin, direction, state.next));
         uint level = empty_level(g.level, morton(finest));
         if (level == 0u) return;
         uint end = SKIP != 0u ? min(state.end, state.check) : state.end;
-        uint last = sample_behind(g, origin, way, inverse_way, state.next, end, finest, level) - 1u;
+        uint last = sample_behind(g, origin, direction, inverse_direction, state.next, end, finest, level) - 1u;
         samples += last - state.next;
         state.next = last;
         pass_by();
@@ -193,15 +193,15 @@ void main() {
         pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
         uint place = pixel.y * plan.size[0] + pixel.x;
         sum = colors.at[place];
-        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, way);
+        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, direction);
         halfway = vec3(0.0);
         if (SHADING != 0u) {
-            precise vec3 h = view.to_light.xyz - way;
+            precise vec3 h = view.to_light.xyz - direction;
             float square = max(dot_product(h, h), 1e-12);
             precise vec3 unit = h * inverse_sqrt(square);
             halfway = unit;
         }
-        inverse_way = inverse_of(way);
+        inverse_direction = inverse_of(direction);
         bool stands = state.hint != NONE && state.cursor == 0u;
         if (stands) enter(state.hint);
         ahead = 1u;
@@ -211,7 +211,7 @@ void main() {
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
             // As far as the walk leads, without a look at the tree: a pass is a sample, after a step if one is needed.
             for (uint pass = 0u; pass < BURST && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
-                vec3 x = normalise(g, sample_at(view, origin, way, state.next));
+                vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
                 Sides sides = sides_of(stand, x);
                 if (!sides.clear) {
                     stands = ++misses < WALK && go_on(sides);
@@ -226,7 +226,7 @@ void main() {
             if (!stands) pass_empty(g, work);
             if (state.next < state.end && is_to_look()) {
                 bool hidden;
-                uint behind = stretch_end(g, origin, way, inverse_way, state.next, state.end, hidden);
+                uint behind = stretch_end(g, origin, direction, inverse_direction, state.next, state.end, hidden);
                 if (!hidden) {
                     state.check = behind;
                 } else if (ISO != 0u) {
@@ -241,7 +241,7 @@ void main() {
             }
 #endif
             if (stands || state.next >= state.end || is_to_look()) continue;
-            vec3 at = sample_at(view, origin, way, state.next);
+            vec3 at = sample_at(view, origin, direction, state.next);
             vec3 x = normalise(g, at);
             misses = 0u;
             uint owner = NONE;

@@ -47,9 +47,9 @@ struct RenderView {
     vec4 origin;     // Origin of the ray of pixel (0, 0).
     vec4 origin_x;   // What one pixel to the right adds to it.
     vec4 origin_y;   // What one pixel down adds to it.
-    vec4 way;        // Direction of the ray of pixel (0, 0), of any length.
-    vec4 way_x;      // What one pixel to the right adds to it.
-    vec4 way_y;      // What one pixel down adds to it.
+    vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
+    vec4 direction_x;      // What one pixel to the right adds to it.
+    vec4 direction_y;      // What one pixel down adds to it.
     vec4 to_light;   // Unit vector to the light.
     vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
     float step_size; // Distance of two samples.

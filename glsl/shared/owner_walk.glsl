@@ -11,7 +11,7 @@ uint middle_of(uvec2 range) { return listed_tet(range.x + (range.y - range.x) / 
 
 // The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
 Best walked_through(Grid g, uvec2 range, vec3 at, vec3 x) {
-    Room room;
+    LeafCell room;
     room.half_size = half_cell(g, g.level);
     room.centre = cell_centre(room.half_size, quantize(g, at) >> (MAX_LEVEL - g.level));
     return walk_from_seed(listed_tet(range.x), room, x);

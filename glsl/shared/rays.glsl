@@ -16,7 +16,7 @@ float inverse_sqrt(float x) {
 void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction) {
     vec2 at = vec2(pixel);
     precise vec3 o = (view.origin.xyz + at.x * view.origin_x.xyz) + at.y * view.origin_y.xyz;
-    precise vec3 w = (view.way.xyz + at.x * view.way_x.xyz) + at.y * view.way_y.xyz;
+    precise vec3 w = (view.direction.xyz + at.x * view.direction_x.xyz) + at.y * view.direction_y.xyz;
     float r = inverse_sqrt(dot_product(w, w));
     precise vec3 d = w * r;
     origin = o;
@@ -25,12 +25,12 @@ void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction)
 
 const float LEAST = 1e-20; // of a component of a direction, so that its reciprocal is finite
 
-vec3 inverse_of(vec3 way) {
+vec3 inverse_of(vec3 direction) {
     vec3 r;
     for (uint c = 0u; c < 3u; ++c) {
-        bool parallel = abs(way[c]) < LEAST;
-        bool negative = (floatBitsToUint(way[c]) & 0x80000000u) != 0u;
-        r[c] = parallel ? (negative ? -1e20 : 1e20) : reciprocal(way[c]);
+        bool parallel = abs(direction[c]) < LEAST;
+        bool negative = (floatBitsToUint(direction[c]) & 0x80000000u) != 0u;
+        r[c] = parallel ? (negative ? -1e20 : 1e20) : reciprocal(direction[c]);
     }
     return r;
 }
@@ -38,9 +38,9 @@ vec3 inverse_of(vec3 way) {
 const float MAX_SAMPLES = 8388608.0; // of a ray: beyond, k + 1/2 is not exact, and the march keeps flags in numbers from bit 30 on
 
 // Where a sample lies.
-vec3 sample_at(RenderView view, vec3 origin, vec3 way, uint k) {
+vec3 sample_at(RenderView view, vec3 origin, vec3 direction, uint k) {
     precise float t = (float(k) + 0.5) * view.step_size;
-    precise vec3 at = origin + way * t;
+    precise vec3 at = origin + direction * t;
     return at;
 }
 

@@ -10,19 +10,19 @@ bool is_visible_node(uint node) { return (flags.at[plan.visible_at + (node >> 5u
 
 // The sample behind those, from `k` on and before `end`, that lie in the same cell of a level as sample `k`, which is in `finest`.
 // Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a cell lies in it.
-uint sample_behind(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, uvec3 finest, uint level) {
+uint sample_behind(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, uint k, uint end, uvec3 finest, uint level) {
     uint shift = MAX_LEVEL - level;
     uvec3 cell = finest >> shift;
     float leave = 3.40282347e38;
     for (uint c = 0u; c < 3u; ++c) {
         if (g.inv[c] == 0.0) continue;
-        precise float t = (cell_side(g, c, level, cell[c] + uint(inverse_way[c] > 0.0)) - origin[c]) * inverse_way[c];
+        precise float t = (cell_side(g, c, level, cell[c] + uint(inverse_direction[c] > 0.0)) - origin[c]) * inverse_direction[c];
         leave = min(leave, t);
     }
     precise float number = leave * view.inverse_step - 0.5;
     uint last = min(whole_of(clamp(number, float(k), float(end - 1u))), end - 1u);
     for (uint i = 0u; i < 2u && last > k; ++i) {
-        if (quantize(g, sample_at(view, origin, way, last)) >> shift == cell) return last + 1u;
+        if (quantize(g, sample_at(view, origin, direction, last)) >> shift == cell) return last + 1u;
         --last;
     }
     return k + 1u;
@@ -30,8 +30,8 @@ uint sample_behind(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint
 
 // The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf.
 // Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a node lies in it.
-uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint end, out bool hidden) {
-    uvec3 finest = quantize(g, sample_at(view, origin, way, k));
+uint stretch_end(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, uint k, uint end, out bool hidden) {
+    uvec3 finest = quantize(g, sample_at(view, origin, direction, k));
     uint code = morton(finest), node = 0u, level = 0u;
     hidden = !is_visible_node(node);
     while (!hidden && level < g.level) {
@@ -42,6 +42,6 @@ uint stretch_end(Grid g, vec3 origin, vec3 way, vec3 inverse_way, uint k, uint e
         node = child_of(node, mask, digit);
         hidden = !is_visible_node(node);
     }
-    return sample_behind(g, origin, way, inverse_way, k, end, finest, level);
+    return sample_behind(g, origin, direction, inverse_direction, k, end, finest, level);
 }
 #endif

@@ -12,7 +12,7 @@ const float GAP = -7.62939453125e-6; // -2^-17
 #include "shared/stride.glsl"
 
 // Cell of a leaf in normalised coordinates.
-struct Room {
+struct LeafCell {
     vec3 centre;
     vec3 half_size;
 };
@@ -96,7 +96,7 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
 }
 
 // Point number k of the cell, the first its centre.
-vec3 room_point(Room room, uint k) {
+vec3 room_point(LeafCell room, uint k) {
     vec3 p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * two_to(-23) - 1.0;
@@ -110,7 +110,7 @@ vec3 room_point(Room room, uint k) {
 
 // Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
 // kernels hold each part once.
-Best walk_from_seed(uint seed, Room room, vec3 x) {
+Best walk_from_seed(uint seed, LeafCell room, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !settled(best); ++way) {

@@ -7,7 +7,7 @@ use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhM
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::sealed::Sealed;
-use crate::query::{BinaryTree, Built, LocateOutput, Located, Rounds, Searched, Structure};
+use crate::query::{BinaryTree, Built, LocateOutput, Located, Rounds, Structure, StructureView};
 
 /// Bits of a code: ten per axis, and one that puts bad cells last.
 const CODE_BITS: u32 = 31;
@@ -220,7 +220,7 @@ impl Lbvh {
 impl Sealed for Lbvh {}
 
 impl Built for Lbvh {
-    fn searched(&self) -> Searched {
-        Searched { mesh: self.mesh.view, structure: Structure::Binary(self.tree) }
+    fn searched(&self) -> StructureView {
+        StructureView { mesh: self.mesh.view, structure: Structure::Binary(self.tree) }
     }
 }

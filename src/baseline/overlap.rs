@@ -16,7 +16,7 @@ use std::mem::offset_of;
 const BUDGET: u32 = 4096;
 
 /// The primitives of one mesh against the tree of the other.
-struct Way<'a> {
+struct Direction<'a> {
     own: &'a DeviceMesh,
     other: &'a DeviceMesh,
     lbvh: &'a Lbvh,
@@ -26,7 +26,7 @@ struct Way<'a> {
     status: BufferRef,
 }
 
-impl Way<'_> {
+impl Direction<'_> {
     fn cmd_search(&self, r: &mut Recorder<'_>) -> Result<()> {
         let (own, other, tree) = (self.own.input(), self.other.input(), &self.lbvh.tree);
         let arguments = LbvhOverlap {
@@ -71,40 +71,40 @@ impl Lbvh {
         }
         let joint = joint_grid(mesh.grid(), other_mesh.grid(), valid);
         let carve = |a: &mut Arena| {
-            let mut way = |m: &DeviceMesh| {
+            let mut direction = |m: &DeviceMesh| {
                 let tets = u64::from(m.input().tets);
                 Ok((a.words(tets)?, a.words(tets.div_ceil(32))?, a.take(size_of::<OverlapStatus>() as u64)?))
             };
-            Ok([way(mesh)?, way(other_mesh)?])
+            Ok([direction(mesh)?, direction(other_mesh)?])
         };
         let memory = gpu.buffer("olbvh.lbvh.overlap", Arena::measure(carve)?)?;
         let [forth, back] = carve(&mut Arena::new(memory.all()))?;
-        let way = |own, other: (_, _), (places, hits, status)| {
+        let direction = |own, other: (_, _), (places, hits, status)| {
             let (other, lbvh): (&DeviceMesh, _) = other;
             let frame = gpu.upload::<NodeFrame>("olbvh.lbvh.overlap_frame", &[node_frame(other.grid(), &joint)])?;
-            Ok::<_, crate::Error>(Way { own, other, lbvh, frame, places, hits, status })
+            Ok::<_, crate::Error>(Direction { own, other, lbvh, frame, places, hits, status })
         };
-        let ways = [way(mesh, (other_mesh, other), forth)?, way(other_mesh, (mesh, self), back)?];
+        let directions = [direction(mesh, (other_mesh, other), forth)?, direction(other_mesh, (mesh, self), back)?];
         let all = u64::from(mesh.input().tets) + u64::from(other_mesh.input().tets);
         let statuses = loop {
             let ((), time) = gpu.submit("olbvh.lbvh.overlap", |r| {
-                for way in &ways {
+                for direction in &directions {
                     if done.submissions == 0 {
-                        for part in [way.places, way.hits, way.status] {
+                        for part in [direction.places, direction.hits, direction.status] {
                             r.fill(part, 0);
                         }
                     } else {
-                        r.fill(way.status.part(offset_of!(OverlapStatus, unfinished) as u64, 4), 0);
+                        r.fill(direction.status.part(offset_of!(OverlapStatus, unfinished) as u64, 4), 0);
                     }
                 }
                 r.barrier("lbvh.clear → lbvh.overlap");
-                r.stage("lbvh.overlap", |r| ways.iter().try_for_each(|w| w.cmd_search(r)))
+                r.stage("lbvh.overlap", |r| directions.iter().try_for_each(|w| w.cmd_search(r)))
             })?;
             done.submissions += 1;
             done.stages.extend(time.stages);
             let mut statuses = [OverlapStatus::default(); 2];
-            for (status, way) in statuses.iter_mut().zip(&ways) {
-                *status = gpu.download(&memory, way.status)?.first().copied().unwrap_or_default();
+            for (status, direction) in statuses.iter_mut().zip(&directions) {
+                *status = gpu.download(&memory, direction.status)?.first().copied().unwrap_or_default();
             }
             let unfinished = statuses.iter().map(|s| u64::from(s.unfinished)).sum::<u64>();
             report(all - unfinished, all);
@@ -112,8 +112,8 @@ impl Lbvh {
                 break statuses;
             }
         };
-        let hits = |way: &Way<'_>| Ok::<_, crate::Error>(set_bits(gpu.download(&memory, way.hits)?));
-        (done.overlap.a, done.overlap.b) = (hits(&ways[0])?, hits(&ways[1])?);
+        let hits = |direction: &Direction<'_>| Ok::<_, crate::Error>(set_bits(gpu.download(&memory, direction.hits)?));
+        (done.overlap.a, done.overlap.b) = (hits(&directions[0])?, hits(&directions[1])?);
         for (effort, status) in done.overlap.effort.iter_mut().zip(statuses) {
             effort.narrow = wide(status.narrow);
         }

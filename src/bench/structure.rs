@@ -6,7 +6,7 @@ use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateOptions, Located, Overlapped, Party, Path};
+use crate::query::{self, LocateOptions, Located, OverlapInput, Overlapped, Path};
 
 /// Which structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -129,7 +129,7 @@ pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> 
     let silent = &|_, _| {};
     match (a.structure, b.structure) {
         (Structure::Octree(tree), Structure::Octree(other)) => {
-            let [a, b] = [Party { mesh: a.mesh, tree }, Party { mesh: b.mesh, tree: other }];
+            let [a, b] = [OverlapInput { mesh: a.mesh, tree }, OverlapInput { mesh: b.mesh, tree: other }];
             query::overlap(a, b, false, silent).map(Some)
         }
         (Structure::Lbvh(tree), Structure::Lbvh(other)) => tree.overlap(a.mesh, other, b.mesh, silent).map(Some),

@@ -98,7 +98,7 @@ fn samples(plan: &Plan, bounds: &Bounds, most: usize) -> Vec<[f32; 3]> {
         let corner = [8 * (b % across), 8 * (b / across)];
         let rays: Vec<_> = (0..64).map(|i| plan.rays.ray(corner[0] + i % 8, corner[1] + i / 8)).collect();
         let at = move |k: u32| (k as f32 + 0.5) * plan.step;
-        let point = move |(from, way): &([f32; 3], [f32; 3]), t: f32| [0, 1, 2].map(|c| from[c] + way[c] * t);
+        let point = move |(from, direction): &([f32; 3], [f32; 3]), t: f32| [0, 1, 2].map(|c| from[c] + direction[c] * t);
         (0..steps).flat_map(move |k| rays.iter().map(|ray| point(ray, at(k))).collect::<Vec<_>>()).filter(in_bounds)
     };
     order.into_iter().flat_map(block).take(most).collect()

@@ -88,7 +88,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.build(|| Placed::whole(gpu, mesh, options));
         match whole.and_then(|placed| job.ask(&placed, &all)) {
-            Err(e) if e.is_for_want_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
             other => return other.map(|()| job.end()),
         }
     }
@@ -105,7 +105,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
         if need <= memory {
             let placed = job.took.build(|| block.place(gpu, &source));
             match placed.and_then(|placed| job.ask(&placed, &ids)) {
-                Err(e) if e.is_for_want_of_room() => why = Some(e),
+                Err(e) if e.is_lack_of_room() => why = Some(e),
                 Err(e) => return Err(e),
                 Ok(()) => continue,
             }

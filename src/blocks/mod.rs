@@ -50,7 +50,7 @@ pub struct InBlocks<T = ()> {
 
 impl<T> InBlocks<T> {
     /// The answer, and the rest.
-    pub fn apart(self) -> (T, InBlocks) {
+    pub fn into_parts(self) -> (T, InBlocks) {
         let Self { answer, trees, peak, build_seconds } = self;
         (answer, InBlocks { answer: (), trees, peak, build_seconds })
     }

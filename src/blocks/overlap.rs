@@ -7,7 +7,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::options::BuildOptions;
-use crate::query::{self, Overlapped, Party};
+use crate::query::{self, OverlapInput, Overlapped};
 use std::cell::OnceCell;
 use std::rc::Rc;
 
@@ -60,10 +60,10 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
         let whole = |mesh| Placed::whole(gpu, mesh, options);
         let found = took.build(|| whole(meshes[0])).and_then(|a| {
             let b = took.build(|| whole(meshes[1]))?;
-            query::overlap(party(&a), party(&b), pairs, report)
+            query::overlap(input_of(&a), input_of(&b), pairs, report)
         });
         match found {
-            Err(e) if e.is_for_want_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
@@ -86,7 +86,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
         let mut why = None;
         if need <= memory {
             match visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took) {
-                Err(e) if e.is_for_want_of_room() => why = Some(e),
+                Err(e) if e.is_lack_of_room() => why = Some(e),
                 Err(e) => return Err(e),
                 Ok(found) => {
                     merge(&mut all, found);
@@ -117,8 +117,8 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
     Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(all))
 }
 
-fn party(placed: &Placed) -> Party<'_> {
-    Party { mesh: &placed.mesh, tree: &placed.tree }
+fn input_of(placed: &Placed) -> OverlapInput<'_> {
+    OverlapInput { mesh: &placed.mesh, tree: &placed.tree }
 }
 
 /// Whether the cells of two blocks are near enough for anything in them to touch.
@@ -146,7 +146,7 @@ fn visit(
         }
     }
     let [Some((_, a)), Some((_, b))] = placed else { return Ok(Overlapped::default()) };
-    let mut found = query::overlap(party(a), party(b), pairs, &|_, _| {})?;
+    let mut found = query::overlap(input_of(a), input_of(b), pairs, &|_, _| {})?;
     log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
     found.overlap.a.iter_mut().for_each(|t| *t = a.tet(*t));
     found.overlap.b.iter_mut().for_each(|t| *t = b.tet(*t));

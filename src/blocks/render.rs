@@ -50,7 +50,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
     if least_bytes(gpu, mesh, options)? <= memory {
         let placed = took.build(|| Placed::whole(gpu, mesh, options));
         match placed.and_then(|placed| render_whole(&placed, asked, report)) {
-            Err(e) if e.is_for_want_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
+            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
@@ -112,7 +112,7 @@ impl Job<'_> {
         let mut why = None;
         if need <= self.memory {
             match self.draw(block, &met, rays) {
-                Err(e) if e.is_for_want_of_room() => why = Some(e),
+                Err(e) if e.is_lack_of_room() => why = Some(e),
                 other => return other.map(|()| None),
             }
         }
@@ -165,15 +165,15 @@ impl Job<'_> {
         // More than rounding takes samples out of their cells.
         let more = self.source.extent() / 1024.0;
         let meets = |x: u32, y: u32| {
-            let (origin, way) = plan.rays.ray(x, y);
+            let (origin, direction) = plan.rays.ray(x, y);
             let mut reach = [0.0, f64::MAX];
             for c in 0..3 {
-                let (from, way) = (f64::from(origin[c]), f64::from(way[c]));
+                let (from, direction) = (f64::from(origin[c]), f64::from(direction[c]));
                 let [a, b] = [lo[c] - more - from, hi[c] + more - from];
-                if way == 0.0 {
+                if direction == 0.0 {
                     reach[1] = if a <= 0.0 && 0.0 <= b { reach[1] } else { -1.0 };
                 } else {
-                    reach = [reach[0].max((a / way).min(b / way)), reach[1].min((a / way).max(b / way))];
+                    reach = [reach[0].max((a / direction).min(b / direction)), reach[1].min((a / direction).max(b / direction))];
                 }
             }
             reach[0] <= reach[1]
@@ -195,9 +195,9 @@ fn low_first(plan: &Plan, grid: &Grid, axis: usize, last: u32) -> Option<bool> {
     let [width, height] = plan.size;
     // Cells are monotone along a ray, so where it begins and its direction tell what it can meet.
     let goes = |x: u32, y: u32| {
-        let (origin, way) = plan.rays.ray(x, y);
+        let (origin, direction) = plan.rays.ray(x, y);
         let low = grid.quantize(origin)[axis] <= last;
-        [way[axis] > 0.0 && low, way[axis] < 0.0 && !low]
+        [direction[axis] > 0.0 && low, direction[axis] < 0.0 && !low]
     };
     let either = |a: [bool; 2], b: [bool; 2]| [a[0] || b[0], a[1] || b[1]];
     let row = |y: u32| (0..width).fold([false; 2], |all, x| either(all, goes(x, y)));

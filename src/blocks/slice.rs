@@ -63,7 +63,7 @@ pub fn slice(
         let sliced = whole
             .and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink).map(|_| ()));
         match sliced {
-            Err(e) if e.is_for_want_of_room() && tally.get() == Tally::default() => {
+            Err(e) if e.is_lack_of_room() && tally.get() == Tally::default() => {
                 log::info!("in blocks, since the whole does not fit: {e}");
             }
             other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
@@ -117,7 +117,7 @@ impl Job<'_> {
                 Err(None)
             };
             match tried {
-                Err(Some(e)) if !e.is_for_want_of_room() => return Err(e),
+                Err(Some(e)) if !e.is_lack_of_room() => return Err(e),
                 Err(why) => {
                     let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory)) else {
                         return Err(refusal(self.gpu, block.tets.len(), need, why));

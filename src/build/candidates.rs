@@ -1,7 +1,7 @@
 //! Stage 2, candidates: how many there are, which are entries, and coarser levels until those fit.
 
 use super::mesh::{MeshArrays, MeshInput, MeshView};
-use super::plan::{CountScratch, FilterScratch, SHARE, SeedScratch, TreeMemory, TryScratch, filtered};
+use super::plan::{CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, TreeMemory, filtered};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{Count as CountCells, CountSpec, Filter, FilterSpec, Fit, FitSpec, Mark, MarkSpec, SettleSeeds, SettleSeedsSpec};
@@ -45,13 +45,13 @@ pub(crate) fn cmd_fit(
     scratch: &CountScratch,
     filter: &FilterScratch,
 ) -> Result<()> {
-    let Some(tries) = filter.tries else { return Ok(()) };
+    let Some(coarser) = filter.coarser else { return Ok(()) };
     let (TreeMemory { grid, status, capacity, .. }, tets) = (*tree, mesh.input.tets);
-    let TryScratch { live, groups, shares: tried_shares, entries: tried_entries } = tries;
+    let CoarserScratch { live, groups, shares: tried_shares, entries: tried_entries } = coarser;
     let (shares, entries, capacity, levels) = (scratch.total, filter.entries, capacity.entries, capacity.level);
     let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
     let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
-    let over = Over { total: tried_shares, tries: Some(tries), marks: filter.seeds.map(|seeds| seeds.marks) };
+    let over = Over { total: tried_shares, coarser: Some(coarser), marks: filter.seeds.map(|seeds| seeds.marks) };
     r.stage("build.fit", |r| {
         r.barrier("codes.scan → fit");
         r.dispatch(&fit, spec, Groups::Count(1))?;
@@ -71,19 +71,19 @@ pub(crate) fn cmd_fit(
 struct Over {
     /// Word for the number of shares.
     total: BufferRef,
-    tries: Option<TryScratch>,
+    coarser: Option<CoarserScratch>,
     /// What a finer level has marked.
     marks: Option<BufferRef>,
 }
 
 impl Over {
     fn all(scratch: &CountScratch) -> Self {
-        Self { total: scratch.total, tries: None, marks: None }
+        Self { total: scratch.total, coarser: None, marks: None }
     }
 
     /// Of the dispatch over so many items, one of the three that [`Fit`] plans.
     fn groups(&self, slot: u64, items: u32, workgroup: u32) -> Groups {
-        self.tries.map_or(Groups::Count(items.div_ceil(workgroup)), |tries| Groups::Indirect(tries.groups.part(12 * slot, 12)))
+        self.coarser.map_or(Groups::Count(items.div_ceil(workgroup)), |coarser| Groups::Indirect(coarser.groups.part(12 * slot, 12)))
     }
 }
 
@@ -102,7 +102,7 @@ fn count_candidates(
     let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
     let spec = CountSpec { workgroup, share, clear, ..Default::default() };
     r.dispatch(&count, spec, over.groups(0, tets + 1, workgroup))?;
-    let all = over.tries.map_or(Count::host(tets + 1), |tries| Count::device(tets + 1, tries.live));
+    let all = over.coarser.map_or(Count::host(tets + 1), |coarser| Count::device(tets + 1, coarser.live));
     cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
 }
 
@@ -178,6 +178,6 @@ fn filter_candidates(
         };
         r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
     }
-    let entries = over.tries.map_or(filter.entries, |tries| tries.entries);
+    let entries = over.coarser.map_or(filter.entries, |coarser| coarser.entries);
     cmd_exclusive_scan(r, counts, counts, entries, all, &filter.scan)
 }

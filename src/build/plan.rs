@@ -32,7 +32,7 @@ impl Capacity {
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
     }
 
-    /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with lists where the boundary is; the trees of
+    /// WorkgroupLimits for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with lists where the boundary is; the trees of
     /// others get coarser.
     pub fn usual(tets: u32, level: u32) -> Self {
         Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).min(MAX_ENTRIES), level) }
@@ -161,7 +161,7 @@ pub struct FilterScratch {
     pub(crate) arguments: BufferRef,
     pub(crate) seeds: Option<SeedScratch>,
     /// Where entries may be too many.
-    pub(crate) tries: Option<TryScratch>,
+    pub(crate) coarser: Option<CoarserScratch>,
     pub(crate) scan: ScanScratch,
 }
 
@@ -184,7 +184,7 @@ impl FilterScratch {
             entries: arena.words(1)?,
             arguments: arena.words(3)?,
             seeds,
-            tries: if capacity.entries < capacity.candidates { Some(TryScratch::carve(arena)?) } else { None },
+            coarser: if capacity.entries < capacity.candidates { Some(CoarserScratch::carve(arena)?) } else { None },
             scan: ScanScratch::carve(gpu, arena, most)?,
         }))
     }
@@ -192,7 +192,7 @@ impl FilterScratch {
 
 /// What it takes to filter coarser levels until the entries fit.
 #[derive(Clone, Copy, Debug)]
-pub struct TryScratch {
+pub struct CoarserScratch {
     /// Tetrahedra of the try and one, or 0 where there is none.
     pub(crate) live: BufferRef,
     /// Of its three dispatches over tetrahedra.
@@ -201,7 +201,7 @@ pub struct TryScratch {
     pub(crate) entries: BufferRef,
 }
 
-impl TryScratch {
+impl CoarserScratch {
     fn carve(arena: &mut Arena) -> Result<Self> {
         Ok(Self { live: arena.words(1)?, groups: arena.words(9)?, shares: arena.words(1)?, entries: arena.words(1)? })
     }

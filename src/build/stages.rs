@@ -83,7 +83,7 @@ pub(crate) fn cmd_codes(
         if let Some(filter) = filter {
             let shares = Count::device(filter.most, counts.total);
             let later = shares.behind(tets).arguments(r, target.each, filter.arguments)?;
-            if filter.tries.is_none() {
+            if filter.coarser.is_none() {
                 r.barrier("codes.filter → codes.emit");
             }
             let (hits, places) = (filter.hits, filter.counts);

@@ -11,8 +11,8 @@ use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::{finer, too_large};
 use crate::reference::grid::MAX_LEVEL;
-use crate::reference::quarters::taken_apart;
-use crate::tree::{Memory, TreeArrays};
+use crate::reference::quarters::split_entries;
+use crate::tree::{TreeArrays, TreeBytes};
 use bytemuck::Pod;
 
 /// An OLBVH in device memory.
@@ -63,7 +63,7 @@ impl Tree {
                     room = if finer.status.level < level { finer.status.level } else { room };
                     tree = Self { stages, ..finer };
                 }
-                Err(e) if e.is_for_want_of_room() => room = level - 1,
+                Err(e) if e.is_lack_of_room() => room = level - 1,
                 Err(e) => return Err(e),
             }
         }
@@ -189,7 +189,7 @@ impl Tree {
             None => None,
         };
         let entries = self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?;
-        let (p, quarters) = taken_apart(entries, &self.grid);
+        let (p, quarters) = split_entries(entries, &self.grid);
         Ok(TreeArrays {
             assign: self.options.assign,
             lists: self.options.lists,
@@ -241,9 +241,9 @@ impl Tree {
     }
 
     /// Bytes of each array.
-    pub fn sizes(&self) -> Memory {
+    pub fn sizes(&self) -> TreeBytes {
         let BuildStatus { entries, nodes, internal, level, .. } = self.status;
-        Memory::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes)
+        TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes)
     }
 
     /// Bytes of scratch memory that the build used beside the tree.

@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh};
-use crate::query::{LocateOptions, Party, Path, locate, overlap, render, slice};
+use crate::query::{LocateOptions, OverlapInput, Path, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Prepared, RenderSettings, TransferFunction};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -256,7 +256,7 @@ pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a
         let [a, b] = [handle(a, "a")?, handle(b, "b")?];
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
         let hits = [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?];
-        let [one, other] = [a, b].map(|t| Party { mesh: &t.mesh.device, tree: &t.tree });
+        let [one, other] = [a, b].map(|t| OverlapInput { mesh: &t.mesh.device, tree: &t.tree });
         let found = overlap(one, other, false, &|_, _| {})?.overlap;
         for ((bits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
             bits.fill(0);

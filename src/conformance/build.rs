@@ -11,8 +11,8 @@ use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::primitives::Arena;
-use crate::reference::quarters::taken_apart;
-use crate::tree::{Memory, TreeArrays};
+use crate::reference::quarters::split_entries;
+use crate::tree::{TreeArrays, TreeBytes};
 
 /// Which interface builds, within what.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -68,7 +68,7 @@ pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &Devic
         return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), u32::MAX, 10)?);
     }
     let (capacity, expected) = within(case.way, twin, &options)?;
-    let budget = (case.way == Way::Nothing).then(|| Memory::most(&twin.sizes.entries, 0, case.boxes).total() - 1);
+    let budget = (case.way == Way::Nothing).then(|| TreeBytes::most(&twin.sizes.entries, 0, case.boxes).total() - 1);
     recorded(gpu, device, &BuildOptions { budget, ..options }, &capacity, &expected)
 }
 
@@ -153,7 +153,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let n = expected.codes().len();
     compare("build.sort", "codes", expected.codes(), in_scratch(scratch.sorted.codes, n))?;
     let grid = one::<Grid>(&words(tree.grid, size_of::<Grid>() / 4))?;
-    let (p, quarters) = taken_apart(words(tree.p, n), &grid);
+    let (p, quarters) = split_entries(words(tree.p, n), &grid);
     compare("build.sort", "P", &expected_tree.p, &p)?;
     compare_status(&expected.status, &status)?;
     let (nodes, internal) = (status.nodes as usize, status.internal as usize);

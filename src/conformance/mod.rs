@@ -41,7 +41,7 @@ mod twin;
 pub use failure::Failure;
 pub use lab::{Lab, Outcome, Report};
 #[doc(hidden)]
-pub use overlap::{Both, check_overlap};
+pub use overlap::{HostAndDevice, check_overlap};
 
 use build::BuildCase;
 use locate::LocateCase;

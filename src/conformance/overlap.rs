@@ -8,10 +8,10 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::{Party, overlap};
+use crate::query::{OverlapInput, overlap};
 use crate::reference::boundary::{Topology, topology};
 use crate::reference::build::build;
-use crate::reference::overlap::{Side, overlap as reference};
+use crate::reference::overlap::{OverlapSide, overlap as reference};
 use crate::tree::TreeArrays;
 
 /// A mesh against another.
@@ -44,7 +44,7 @@ impl Other {
 
 /// A mesh on host and device.
 #[derive(Debug)]
-pub struct Both {
+pub struct HostAndDevice {
     mesh: Mesh,
     topology: Topology,
     host: TreeArrays,
@@ -52,7 +52,7 @@ pub struct Both {
     tree: Tree,
 }
 
-impl Both {
+impl HostAndDevice {
     /// With its tree on either.
     ///
     /// # Errors
@@ -65,23 +65,23 @@ impl Both {
     }
 
     fn sides(&self) -> Sides<'_> {
-        (Side { mesh: &self.mesh, topology: &self.topology, tree: &self.host }, self.party())
+        (OverlapSide { mesh: &self.mesh, topology: &self.topology, tree: &self.host }, self.input())
     }
 
     /// The mesh and the tree of the device.
-    pub fn party(&self) -> Party<'_> {
-        Party { mesh: &self.device, tree: &self.tree }
+    pub fn input(&self) -> OverlapInput<'_> {
+        OverlapInput { mesh: &self.device, tree: &self.tree }
     }
 }
 
 /// What is compared: a mesh as the reference has it, and as the device does.
-type Sides<'a> = (Side<'a>, Party<'a>);
+type Sides<'a> = (OverlapSide<'a>, OverlapInput<'a>);
 
 pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
-    let own = (Side { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, Party { mesh: device, tree: &tree });
+    let own = (OverlapSide { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, OverlapInput { mesh: device, tree: &tree });
     let other = match case.other {
         Other::Grid => kuhn_jittered([6, 5, 4], 0.3, 9)?,
         Other::Itself => {
@@ -91,7 +91,7 @@ pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &Dev
             mesh
         }
     };
-    let other = Both::new(gpu, other, &options)?;
+    let other = HostAndDevice::new(gpu, other, &options)?;
     compare_overlaps(own, other.sides())?;
     compare_overlaps(other.sides(), own)?;
     Ok(())
@@ -101,7 +101,7 @@ pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &Dev
 ///
 /// # Errors
 /// What differs, or why there is no answer.
-pub fn check_overlap(a: &Both, b: &Both) -> std::result::Result<usize, String> {
+pub fn check_overlap(a: &HostAndDevice, b: &HostAndDevice) -> std::result::Result<usize, String> {
     compare_overlaps(a.sides(), b.sides()).map_err(|stop| match stop {
         Stop::Failed(failure) => failure.to_string(),
         Stop::Skipped(why) => why,

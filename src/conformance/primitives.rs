@@ -4,7 +4,7 @@ use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::Gpu;
-use crate::kernels::{Room, Row, SortTarget, Target, TileTarget};
+use crate::kernels::{Row, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
@@ -38,7 +38,7 @@ impl TargetKind {
     }
 
     /// The target on a device with this room; `None`: the device's own.
-    pub(crate) fn target(self, room: &Room) -> Option<Target> {
+    pub(crate) fn target(self, room: &WorkgroupLimits) -> Option<Target> {
         let subgroup = room.subgroup;
         match self {
             Self::Device => None,

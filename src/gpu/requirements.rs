@@ -1,6 +1,6 @@
 //! What a device must offer, told before a device exists.
 
-use crate::kernels::Room;
+use crate::kernels::WorkgroupLimits;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
@@ -63,7 +63,7 @@ pub struct DeviceReport {
     /// Subgroup size.
     pub subgroup: u32,
     /// What a workgroup may have.
-    pub room: Room,
+    pub room: WorkgroupLimits,
     /// The vendor by its number: a PCI one, or one that Khronos gave.
     pub vendor: u32,
     /// The driver by its number, `VkDriverId`.
@@ -268,7 +268,11 @@ impl DeviceReport {
             api: format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
             version: [version, properties.driver_version],
             subgroup,
-            room: Room { subgroup, invocations: invocations / subgroup * subgroup, shared_bytes: limits.max_compute_shared_memory_size },
+            room: WorkgroupLimits {
+                subgroup,
+                invocations: invocations / subgroup * subgroup,
+                shared_bytes: limits.max_compute_shared_memory_size,
+            },
             vendor: properties.vendor_id,
             driver_id: driver.driver_id.as_raw(),
             kind: match properties.device_type {

@@ -6,7 +6,7 @@ mod rows;
 mod target;
 pub use rows::Row;
 pub(crate) use target::LONGEST_LOOP;
-pub use target::{Room, SortTarget, Target, TileTarget};
+pub use target::{SortTarget, Target, TileTarget, WorkgroupLimits};
 
 fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
     out[at..at + bytes.len()].copy_from_slice(bytes);

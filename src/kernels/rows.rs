@@ -5,7 +5,7 @@
 //! the WebGPU sorts, which found 256 × 15 good on Apple as well. Workgroups of the other kernels follow from what a core holds: small ones where
 //! registers are few or subgroups narrow. `olbvh tune` finds out what is better on the device at hand.
 
-use super::target::{Room, SortTarget, Target, TileTarget};
+use super::target::{SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::gpu::DeviceReport;
 use crate::options::named;
 use ash::vk::DriverId;
@@ -78,7 +78,7 @@ impl Row {
     }
 
     /// The row's target on a device with this room.
-    pub fn target(self, room: &Room) -> Target {
+    pub fn target(self, room: &WorkgroupLimits) -> Target {
         let Numbers { scan, spine, sort, each, run, query } = self.numbers();
         let tiles = |(workgroup, rows)| TileTarget { workgroup, rows };
         let (serial, workgroup, rows, digit_bits) = sort;
@@ -131,7 +131,7 @@ mod tests {
         for row in Row::EVERY {
             assert_eq!(row.name().parse::<Row>().unwrap(), row);
             for subgroup in [4, 8, 16, 32, 64, 128] {
-                let room = Room::least(subgroup);
+                let room = WorkgroupLimits::least(subgroup);
                 let target = row.target(&room);
                 target.check(&room).unwrap();
                 target.check_scale().unwrap();
@@ -143,14 +143,14 @@ mod tests {
     #[test]
     fn rows_keep_their_digits_where_subgroups_are_the_vendors() {
         for (row, subgroup) in [(Row::Nvidia, 32), (Row::Amd, 64), (Row::Amd, 32), (Row::Intel, 16), (Row::Apple, 32), (Row::Arm, 16)] {
-            assert_eq!(row.target(&Room::least(subgroup)).sort.digit_bits, 8, "{row:?}");
+            assert_eq!(row.target(&WorkgroupLimits::least(subgroup)).sort.digit_bits, 8, "{row:?}");
         }
-        assert_eq!(Row::Cpu.target(&Room::least(8)).sort, SortTarget { serial: true, workgroup: 8, rows: 8192, digit_bits: 11 });
+        assert_eq!(Row::Cpu.target(&WorkgroupLimits::least(8)).sort, SortTarget { serial: true, workgroup: 8, rows: 8192, digit_bits: 11 });
     }
 
     #[test]
     fn what_does_not_fit_is_named() {
-        let room = Room::least(32);
+        let room = WorkgroupLimits::least(32);
         let target = Row::Portable.target(&room);
         let refused = |change: fn(&mut Target)| {
             let mut target = target.clone();

@@ -10,7 +10,7 @@ const SHARED_BYTES: u32 = 16 << 10;
 
 /// What a workgroup may have on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Room {
+pub struct WorkgroupLimits {
     /// Subgroup size that pipelines are compiled for.
     pub subgroup: u32,
     /// Most invocations of a workgroup.
@@ -19,7 +19,7 @@ pub struct Room {
     pub shared_bytes: u32,
 }
 
-impl Room {
+impl WorkgroupLimits {
     /// What every device has that qualifies.
     pub fn least(subgroup: u32) -> Self {
         Self { subgroup, invocations: 256, shared_bytes: SHARED_BYTES }
@@ -113,7 +113,7 @@ pub struct Target {
 
 impl Target {
     /// The nearest that a workgroup has room for: workgroups of whole subgroups, digits that fit shared memory.
-    pub(super) fn fit(mut self, room: &Room) -> Self {
+    pub(super) fn fit(mut self, room: &WorkgroupLimits) -> Self {
         let subgroup = room.subgroup.max(1);
         let most = (room.invocations / subgroup * subgroup).max(subgroup);
         for size in
@@ -131,8 +131,8 @@ impl Target {
     ///
     /// # Errors
     /// [`Error::Invalid`] that names the first choice that does not fit, and what would.
-    pub fn check(&self, room: &Room) -> Result<()> {
-        let Room { subgroup, invocations, shared_bytes } = *room;
+    pub fn check(&self, room: &WorkgroupLimits) -> Result<()> {
+        let WorkgroupLimits { subgroup, invocations, shared_bytes } = *room;
         let wrong = |what: &str| Err(Error::Invalid(format!("target `{}`: {what}", self.name)));
         let workgroups = [
             ("scan.workgroup", self.scan.workgroup),

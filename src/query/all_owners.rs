@@ -1,7 +1,7 @@
 //! Every tetrahedron that contains a point (SPEC 3.1): counted, then written within what memory there is.
 
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
-use super::{Scene, slices};
+use super::{Scene, list_parts};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
@@ -73,19 +73,19 @@ pub fn cmd_list_owners(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, 
     cmd_walk_lists(r, scene, input, memory, Some(found))
 }
 
-/// Walks the lists in slices: counts, or writes to `found`.
+/// Walks the lists in parts: counts, or writes to `found`.
 fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memory: &OwnersMemory, found: Option<BufferRef>) -> Result<()> {
     let (tree, mesh) = (&scene.tree, &scene.mesh);
     let workgroup = r.gpu().target().query;
     let fill = u32::from(found.is_some());
     let places = if fill == 0 { memory.counts } else { memory.ends };
     let found = found.unwrap_or_else(|| r.gpu().nothing());
-    let (length, slices) = slices(scene.longest_leaf);
-    let spec = LocateAllSpec { workgroup, fill, slice: length, lists: tree.lists as u32, ..Default::default() };
+    let (length, parts) = list_parts(scene.longest_leaf);
+    let spec = LocateAllSpec { workgroup, fill, part_length: length, lists: tree.lists as u32, ..Default::default() };
     r.stage("query.locate_all", |r| {
-        for slice in 0..slices {
-            if slice > 0 {
-                r.barrier("locate_all.slice → locate_all.slice");
+        for part in 0..parts {
+            if part > 0 {
+                r.barrier("locate_all.part → locate_all.part");
             }
             let arguments = LocateAll {
                 grid: tree.grid,
@@ -103,7 +103,7 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
                 neighbours: mesh.arrays.neighbours,
                 count: input.count,
                 stride: input.stride,
-                slice,
+                part,
                 capacity: u32::try_from(found.size / 4).unwrap_or(u32::MAX),
             };
             r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup)))?;

@@ -1,13 +1,13 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, values of fields.
 
 use super::order::{PointOrder, cmd_sort_points};
-use super::{Scene, slices};
+use super::{Scene, list_parts};
 use crate::build::{DeviceMesh, Tree, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
-use crate::options::{RUN, TOLERANCE};
+use crate::options::{POINT_RUN, TOLERANCE};
 use crate::primitives::Arena;
 use crate::reference::locate::CHUNK;
 
@@ -17,7 +17,7 @@ pub enum Path {
     /// By descent over child masks.
     #[default]
     Descent,
-    /// By runs of [`RUN`] points, each looked for first around the owner of the one before, up to a few cells away; where it is not there, by descent. For
+    /// By runs of [`POINT_RUN`] points, each looked for first around the owner of the one before, up to a few cells away; where it is not there, by descent. For
     /// points of which each is near to the one before. In a mesh whose cells do not overlap, the owners are those of [`Path::Descent`].
     Runs,
     /// The same along [`PointInput::order`], such as that of [`super::cmd_sort_points`]; [`locate`] makes it itself. For points in no order.
@@ -111,9 +111,9 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let groups = |run: u32| Groups::Count(count.div_ceil(run).div_ceil(workgroup));
     let (run, guide, guides) = match options.path {
         Path::Descent | Path::Traversal(_) => (1, Guide::Hints, hints),
-        Path::Runs => (RUN, Guide::Nothing, None),
+        Path::Runs => (POINT_RUN, Guide::Nothing, None),
         Path::Sorted if order.is_none() => return Err(Error::Invalid("points to be located in an order that is not given".into())),
-        Path::Sorted => (RUN, Guide::Order, order),
+        Path::Sorted => (POINT_RUN, Guide::Order, order),
     };
     r.stage("query.locate", |r| {
         if let Path::Traversal(stack) = options.path {
@@ -140,14 +140,14 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 groups(1),
             );
         }
-        let (length, slices) = slices(scene.longest_leaf);
+        let (length, parts) = list_parts(scene.longest_leaf);
         let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;
         let guides = guides.unwrap_or_else(|| r.gpu().nothing());
-        for slice in 0..slices {
-            if slice > 0 {
-                r.barrier("locate.slice → locate.slice");
+        for part in 0..parts {
+            if part > 0 {
+                r.barrier("locate.part → locate.part");
             }
-            let last = u32::from(slice + 1 == slices);
+            let last = u32::from(part + 1 == parts);
             let arguments = Locate {
                 grid,
                 masks,
@@ -164,13 +164,13 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 neighbours,
                 count,
                 stride,
-                slice,
+                part,
                 last,
                 tolerance,
             };
-            // What runs have left to later slices is located point by point.
-            let (run, guide) = if slice == 0 { (run, guide) } else { (1, 0) };
-            let spec = LocateSpec { workgroup, guide, slice: length, lists, run, ..Default::default() };
+            // What runs have left to later parts is located point by point.
+            let (run, guide) = if part == 0 { (run, guide) } else { (1, 0) };
+            let spec = LocateSpec { workgroup, guide, part_length: length, lists, run, ..Default::default() };
             r.dispatch(&arguments, spec, groups(run))?;
         }
         Ok(())

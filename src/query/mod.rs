@@ -11,7 +11,7 @@ mod volume;
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
 pub use order::{PointOrder, cmd_sort_points};
-pub use overlap::{OverlapMemory, Overlapped, PairMemory, Party, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
+pub use overlap::{OverlapInput, OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub use visible::{cmd_visible, visible_bytes};
@@ -21,7 +21,7 @@ pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups};
-use crate::reference::locate::SLICE;
+use crate::reference::locate::LIST_PART;
 
 /// A binary tree in device memory: what the LBVH baseline is to the queries.
 #[derive(Clone, Copy, Debug)]
@@ -65,7 +65,7 @@ impl Items for Groups {
 macro_rules! dispatch {
     ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
      { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
-        let $crate::query::Searched { mesh, structure } = $searched;
+        let $crate::query::StructureView { mesh, structure } = $searched;
         let workgroup = $r.gpu().target().query;
         let groups = $crate::query::Items::groups($items, workgroup);
         match *structure {
@@ -107,14 +107,14 @@ impl Rounds {
 
 /// A mesh and what finds its cells.
 #[derive(Clone, Copy, Debug)]
-pub struct Searched {
+pub struct StructureView {
     /// The mesh.
     pub mesh: MeshView,
     /// What finds its cells.
     pub structure: Structure,
 }
 
-impl Searched {
+impl StructureView {
     /// A mesh in memory of our own, and what was built over it.
     ///
     /// # Errors
@@ -139,10 +139,10 @@ impl Searched {
     }
 }
 
-/// What owning calls find cells with: a tree or an LBVH, there as long as the call, which a [`Searched`] or a [`Scene`] alone does not see to.
+/// What owning calls find cells with: a tree or an LBVH, there as long as the call, which a [`StructureView`] or a [`Scene`] alone does not see to.
 pub trait Built: sealed::Sealed {
     /// It and its mesh, as recorded functions take them.
-    fn searched(&self) -> Searched;
+    fn searched(&self) -> StructureView;
 }
 
 pub(crate) mod sealed {
@@ -153,12 +153,12 @@ pub(crate) mod sealed {
 impl sealed::Sealed for Tree {}
 
 impl Built for Tree {
-    fn searched(&self) -> Searched {
-        Searched { mesh: *self.mesh(), structure: Structure::Octree(*self.memory()) }
+    fn searched(&self) -> StructureView {
+        StructureView { mesh: *self.mesh(), structure: Structure::Octree(*self.memory()) }
     }
 }
 
-impl From<&Scene> for Searched {
+impl From<&Scene> for StructureView {
     fn from(scene: &Scene) -> Self {
         Self { mesh: scene.mesh, structure: Structure::Octree(scene.tree) }
     }
@@ -172,17 +172,17 @@ pub struct Scene {
     /// The tree over it.
     pub tree: TreeMemory,
     /// Entries of the longest leaf: lists are searched slice by slice, up to there, so a smaller number loses points. A host that does not read
-    /// [`crate::layout::BuildStatus::longest_leaf`] back gives the number of tetrahedra, which no list exceeds; that costs up to [`MOST_SLICES`] dispatches.
+    /// [`crate::layout::BuildStatus::longest_leaf`] back gives the number of tetrahedra, which no list exceeds; that costs up to [`MAX_LIST_PARTS`] dispatches.
     pub longest_leaf: u32,
 }
 
-/// Dispatches that the longest list takes: slices are longer than [`SLICE`] rather than more.
-pub const MOST_SLICES: u32 = 16;
+/// Dispatches that the longest list takes: slices are longer than [`LIST_PART`] rather than more.
+pub const MAX_LIST_PARTS: u32 = 16;
 
 /// Entries of a list that one dispatch searches, and how many dispatches that makes of the longest.
-fn slices(longest: u32) -> (u32, u32) {
-    let slice = SLICE.max(longest.div_ceil(MOST_SLICES).next_power_of_two());
-    (slice, longest.div_ceil(slice).max(1))
+fn list_parts(longest: u32) -> (u32, u32) {
+    let part = LIST_PART.max(longest.div_ceil(MAX_LIST_PARTS).next_power_of_two());
+    (part, longest.div_ceil(part).max(1))
 }
 
 impl Scene {
@@ -202,10 +202,11 @@ mod tests {
 
     #[test]
     fn few_slices_hold_the_longest_list() {
-        for longest in [0, 1, SLICE, SLICE + 1, MOST_SLICES * SLICE, MOST_SLICES * SLICE + 1, 12_290_298, 536_870_911] {
-            let (slice, count) = slices(longest);
-            assert!(slice >= SLICE && count <= MOST_SLICES && slice * count >= longest, "{longest}: {count} of {slice}");
-            assert!(longest > MOST_SLICES * SLICE || (slice, count) == (SLICE, longest.div_ceil(SLICE).max(1)), "{longest}");
+        for longest in [0, 1, LIST_PART, LIST_PART + 1, MAX_LIST_PARTS * LIST_PART, MAX_LIST_PARTS * LIST_PART + 1, 12_290_298, 536_870_911]
+        {
+            let (part, count) = list_parts(longest);
+            assert!(part >= LIST_PART && count <= MAX_LIST_PARTS && part * count >= longest, "{longest}: {count} of {part}");
+            assert!(longest > MAX_LIST_PARTS * LIST_PART || (part, count) == (LIST_PART, longest.div_ceil(LIST_PART).max(1)), "{longest}");
         }
     }
 }

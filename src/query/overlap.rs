@@ -30,7 +30,7 @@ const ROUNDS: u32 = 3;
 
 /// A mesh and its tree.
 #[derive(Clone, Copy, Debug)]
-pub struct Party<'a> {
+pub struct OverlapInput<'a> {
     /// The mesh.
     pub mesh: &'a DeviceMesh,
     /// Its tree.
@@ -151,7 +151,7 @@ impl Job<'_> {
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`] for more pairs than 32 bits count, a failed Vulkan call, or [`Error::Invalid`] for pairs in a tree without
 /// the lists that they are found by.
-pub fn overlap(a: Party<'_>, b: Party<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+pub fn overlap(a: OverlapInput<'_>, b: OverlapInput<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
     b.mesh.check_device(a.mesh.gpu())?;
     let scenes = [Scene::new(a.mesh, a.tree)?, Scene::new(b.mesh, b.tree)?];
     let mut job = Job { gpu: a.tree.gpu(), scenes, report, done: Overlapped::default() };

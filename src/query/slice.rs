@@ -12,7 +12,7 @@ mod stack;
 pub(crate) use stack::Slicing;
 pub use stack::{Sliced, slice};
 
-use super::{Rounds, Searched, Structure, dispatch};
+use super::{Rounds, Structure, StructureView, dispatch};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -24,7 +24,7 @@ use crate::mesh::On;
 use crate::options::TOLERANCE;
 use crate::primitives::{Arena, Count};
 use crate::reference::vertices::CellRange;
-use crate::slicing::{Extrapolate, RUN, Rows, VoxelGrid, WALK};
+use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 
 /// Candidates that a run of voxels may test in one dispatch.
@@ -111,7 +111,13 @@ impl SliceMemory {
 /// # Errors
 /// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, or for memory of fewer voxels or of narrower rows. Boxes that are flat or too large for the mesh,
 /// which the device alone knows, are told by [`SliceStatus::refused`].
-pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, memory: &SliceMemory, rounds: Rounds) -> Result<()> {
+pub fn cmd_slice(
+    r: &mut Recorder<'_>,
+    searched: &StructureView,
+    input: &SliceInput<'_>,
+    memory: &SliceMemory,
+    rounds: Rounds,
+) -> Result<()> {
     input.voxels.check()?;
     let ([width, height], Rows { layer, first, count }) = (input.voxels.size, input.rows);
     let rows = u64::from(layer) * u64::from(height) + u64::from(first) + u64::from(count);
@@ -141,7 +147,7 @@ pub fn cmd_slice(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'
     cmd_values(r, searched, memory, input)
 }
 
-fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
+fn cmd_plan(r: &mut Recorder<'_>, searched: &StructureView, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
     let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
     let Rows { layer, first, count: rows } = input.rows;
     let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, input.part.unwrap_or(CellRange::WHOLE).words());
@@ -150,10 +156,16 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &SliceInput<'_>, m
     r.dispatch(&arguments, SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
 }
 
-fn cmd_locate_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, asked: &SliceInput<'_>, begins: u32) -> Result<()> {
+fn cmd_locate_voxels(
+    r: &mut Recorder<'_>,
+    searched: &StructureView,
+    memory: &SliceMemory,
+    asked: &SliceInput<'_>,
+    begins: u32,
+) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let items = asked.runs();
-    let (run, walk, part, lists) = (RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
+    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
     let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
     let (buffer, field, on_cells) = of_field(r, asked);
     r.stage("query.slice_locate", |r| {
@@ -178,7 +190,7 @@ fn of_field(r: &Recorder<'_>, input: &SliceInput<'_>) -> (BufferRef, u32, u32) {
     (buffer, u32::from(input.field.is_some()), u32::from(on == On::Cells))
 }
 
-fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
+fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let (boundary, voxels) = (arrays.boundary, part.count());
     let workgroup = r.gpu().target().query;
@@ -186,7 +198,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
         let SliceMemory { answers, status, plan: plans, runs, touches: states, .. } = *memory;
         let ([width, height], rows) = (part.voxels.size, part.rows.count);
         let collect = SliceCollect { answers, status, plans, runs, states, width, height, rows };
-        let spec = SliceCollectSpec { workgroup, run: RUN, ..Default::default() };
+        let spec = SliceCollectSpec { workgroup, run: VOXEL_RUN, ..Default::default() };
         r.dispatch(&collect, spec, Groups::Count(part.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");
         let listed = Count::device(voxels, plans.part(offset_of!(SlicePlan, listed) as u64, 16));
@@ -203,7 +215,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
     })
 }
 
-fn cmd_values(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
+fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
     let SliceMemory { answers, values, status, plan: plans, touches: states, groups, .. } = *memory;
     let (buffer, field, on_cells) = of_field(r, part);
     let arguments = SliceValues {

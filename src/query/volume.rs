@@ -11,7 +11,7 @@ mod picture;
 pub(crate) use picture::{Canvas, Rays};
 pub use picture::{Drawn, render};
 
-use super::{Rounds, Searched, Structure, cmd_visible, dispatch, visible_bytes};
+use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_bytes};
 use crate::build::Capacity;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
@@ -143,7 +143,13 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 ///
 /// # Errors
 /// [`Error::Invalid`] for memory of fewer pixels, or without room for what is to be skipped; [`Error::TooLarge`] as [`RenderMemory::carve`].
-pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memory: &RenderMemory, rounds: Rounds) -> Result<()> {
+pub fn cmd_render(
+    r: &mut Recorder<'_>,
+    searched: &StructureView,
+    input: &RenderInput,
+    memory: &RenderMemory,
+    rounds: Rounds,
+) -> Result<()> {
     let [width, height] = input.size;
     let rays = rays(input.size)?;
     if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.rays.size {
@@ -171,7 +177,7 @@ pub fn cmd_render(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput
 }
 
 /// Where the marks of the nodes lie that are not skipped, if any are.
-fn visible(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
+fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
     let (Some(_), Structure::Octree(tree)) = (input.shown, searched.structure) else { return Ok(None) };
     let bits = visible_bytes(tree.capacity.nodes);
     match memory.visible {
@@ -181,7 +187,13 @@ fn visible(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> R
 }
 
 /// The view as the kernels need it, and which nodes are to be seen.
-fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memory: &RenderMemory, visible: Option<Visible>) -> Result<()> {
+fn cmd_plan(
+    r: &mut Recorder<'_>,
+    searched: &StructureView,
+    input: &RenderInput,
+    memory: &RenderMemory,
+    visible: Option<Visible>,
+) -> Result<()> {
     if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.shown, &searched.structure) {
         let bits = visible_bytes(tree.capacity.nodes);
         r.copy(tree.flags.part(0, bits), flags);
@@ -206,7 +218,7 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, memo
 
 fn cmd_intervals(
     r: &mut Recorder<'_>,
-    searched: &Searched,
+    searched: &StructureView,
     rays: u32,
     input: &RenderInput,
     memory: &RenderMemory,
@@ -228,7 +240,7 @@ fn cmd_intervals(
 
 fn cmd_march(
     r: &mut Recorder<'_>,
-    searched: &Searched,
+    searched: &StructureView,
     rays: u32,
     input: &RenderInput,
     memory: &RenderMemory,

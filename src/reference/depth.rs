@@ -6,7 +6,7 @@ use super::vertices::Vertices;
 use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, usual_capacity};
-use crate::tree::Memory;
+use crate::tree::TreeBytes;
 use rayon::prelude::*;
 
 /// Number of levels, and of values of `α_P`.
@@ -77,7 +77,7 @@ impl Sizes {
         let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {
             self.entries[l as usize] <= most
-                && options.budget.is_none_or(|budget| Memory::most(&self.entries, l, options.boxes).total() <= budget)
+                && options.budget.is_none_or(|budget| TreeBytes::most(&self.entries, l, options.boxes).total() <= budget)
         };
         (0..=wanted).rev().find(fits).ok_or_else(|| too_large(&self.entries, options))
     }
@@ -114,7 +114,7 @@ pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
             format!("a tree of a single node has {root} entries, the capacity is {capacity}")
         }
         (_, Some(budget)) => {
-            let bytes = Memory::most(entries, 0, options.boxes).total();
+            let bytes = TreeBytes::most(entries, 0, options.boxes).total();
             format!("a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes")
         }
         _ => format!("a tree of a single node has {root} entries, more than there is room for"),

@@ -39,9 +39,9 @@ pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
 }
 
 /// Entries of a leaf without boundary primitives that are asked whether they touch its cell.
-pub const ASKED: usize = 16;
+pub const MAX_TOUCH_TESTS: usize = 16;
 
-/// Boundary flag of a leaf: set if one of its primitives is one; also if none of the first [`ASKED`] primitives touches the cell. The bounding box
+/// Boundary flag of a leaf: set if one of its primitives is one; also if none of the first [`MAX_TOUCH_TESTS`] primitives touches the cell. The bounding box
 /// of an inner primitive can reach out of the mesh into cells where no boundary primitive is listed, and those are outside as a whole. A cell that
 /// is touched and holds no part of the surface is full of mesh, and only such a leaf's flag is 0 (SPEC 2.3). Under `Lists::Boundary` cells outside
 /// are not listed: only the owners of their centres would be.
@@ -54,16 +54,16 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
     let centre = cell_centre(half, unmorton(code));
     let axes = [[half[0], 0.0, 0.0], [0.0, half[1], 0.0], [0.0, 0.0, half[2]]];
     let touches = |&p: &u32| box_touches(&vertices.tet(mesh.tets[p as usize]).v.map(|v| sub(v, centre)), &axes, [0.0; 3]);
-    !listed.is_empty() && !listed.iter().take(ASKED).any(touches)
+    !listed.is_empty() && !listed.iter().take(MAX_TOUCH_TESTS).any(touches)
 }
 
 /// Lists longer than this are not asked for their octants.
-pub const OCTANTS_ASKED: usize = 16_384;
+pub const MAX_LIST_FOR_OCTANTS: usize = 16_384;
 
 /// The mask of a leaf with entries `listed`: bit d says that one of them is near to the octant of its cell with the 3-bit Morton digit d. All octants of
 /// leaves without boundary primitives, of long lists, and where entries have no quarters. In the others no point has an owner (tolerances below 2^-12).
 pub fn octants(listed: Range<usize>, boundary: bool, quarters: &[u16], grid: &Grid) -> u32 {
-    if !boundary || quarters.is_empty() || listed.len() > OCTANTS_ASKED {
+    if !boundary || quarters.is_empty() || listed.len() > MAX_LIST_FOR_OCTANTS {
         return if listed.is_empty() { 0 } else { ALL_OCTANTS };
     }
     listed.fold(0, |mask, i| mask | octants_near(grid, quarters[i].into()))

@@ -8,15 +8,15 @@ use super::quarters::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
-use super::walk::{HINTED, Room, STRIDE, Walked, Walker, weighed};
+use super::walk::{HINTED, LeafCell, STRIDE, Walked, Walker, weighed};
 use crate::mesh::{Field, Mesh, On};
-use crate::options::{Lists, RUN, TOLERANCE};
+use crate::options::{Lists, POINT_RUN, TOLERANCE};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
 /// Entries of a list that one dispatch searches.
-pub const SLICE: u32 = 16_384;
+pub const LIST_PART: u32 = 16_384;
 
 /// Points that are sorted and located together where there are more.
 pub const CHUNK: usize = 1 << 20;
@@ -96,22 +96,22 @@ impl<'a> Locator<'a> {
         self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
     }
 
-    /// Points in runs of [`RUN`] along `order`, each with the owner of the one before as its hint. Where that one was looked for in a list longer than
-    /// [`SLICE`], there is none.
+    /// Points in runs of [`POINT_RUN`] along `order`, each with the owner of the one before as its hint. Where that one was looked for in a list longer than
+    /// [`LIST_PART`], there is none.
     pub fn locate_in_runs(&self, points: &[[f32; 3]], order: &[u32]) -> Vec<Location> {
         let run = |places: &[u32]| {
             let mut hint = NONE;
             let next = |&i: &u32| {
                 let p = points[i as usize];
-                let strode = self.stride_to(p, hint, HINTED);
-                let location = strode.unwrap_or_else(|| self.locate(p));
-                hint = if strode.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
+                let stride_from_middle = self.stride_to(p, hint, HINTED);
+                let location = stride_from_middle.unwrap_or_else(|| self.locate(p));
+                hint = if stride_from_middle.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
                 (i, location)
             };
             places.iter().map(next).collect::<Vec<_>>()
         };
         let mut located = vec![Location::NOWHERE; points.len()];
-        for (i, location) in order.par_chunks(RUN as usize).flat_map_iter(run).collect::<Vec<_>>() {
+        for (i, location) in order.par_chunks(POINT_RUN as usize).flat_map_iter(run).collect::<Vec<_>>() {
             located[i as usize] = location;
         }
         located
@@ -121,7 +121,9 @@ impl<'a> Locator<'a> {
     fn searches_long_list(&self, p: [f32; 3]) -> bool {
         let leaf = place(&self.tree.grid, p).and_then(|(cell, x)| Some((self.tree.find_leaf(cell)?, x)));
         leaf.is_some_and(|(leaf, x)| {
-            self.tree.primitives(leaf).len() > SLICE as usize && self.tree.seed(leaf).is_none() && self.strode(leaf, x).is_none()
+            self.tree.primitives(leaf).len() > LIST_PART as usize
+                && self.tree.seed(leaf).is_none()
+                && self.stride_from_middle(leaf, x).is_none()
         })
     }
 
@@ -200,23 +202,23 @@ impl<'a> Locator<'a> {
     }
 
     /// The cell of a leaf, from one of its finest cells.
-    fn room(&self, finest: [u32; 3]) -> Room {
+    fn room(&self, finest: [u32; 3]) -> LeafCell {
         let (grid, level) = (&self.tree.grid, self.tree.grid.level);
         let half = half_cell(grid, level);
-        Room { centre: cell_centre(half, finest.map(|q| q >> (MAX_LEVEL - level))), half }
+        LeafCell { centre: cell_centre(half, finest.map(|q| q >> (MAX_LEVEL - level))), half }
     }
 
     /// The owner among the primitives of a leaf, listed or not.
     fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Location {
         let walk = |seed| self.walker().walk(seed, &self.room(finest), x).best;
-        let walked = self.strode(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
+        let walked = self.stride_from_middle(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
         let best = walked.unwrap_or_else(|| self.listed(leaf, finest, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
     }
 
     /// By a stride from the middle of the list, where leaves within the mesh have none.
-    fn strode(&self, leaf: u32, x: Vec3) -> Option<u32> {
+    fn stride_from_middle(&self, leaf: u32, x: Vec3) -> Option<u32> {
         let list = self.tree.primitives(leaf);
         let middle = *list.get(list.len() / 2).filter(|_| self.tree.lists == Lists::Boundary)?;
         self.walker().stride_to(middle, x, STRIDE)

@@ -33,7 +33,7 @@ use rayon::prelude::*;
 
 /// A mesh with its topology and tree.
 #[derive(Clone, Copy)]
-pub struct Side<'a> {
+pub struct OverlapSide<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
     /// Its topology.
@@ -122,8 +122,8 @@ fn boxes_meet(a: &(Vec3, Vec3), b: &(Vec3, Vec3)) -> bool {
 
 /// One direction: the primitives of `own` against the tree of `other`.
 struct Direction<'a> {
-    own: Side<'a>,
-    other: Side<'a>,
+    own: OverlapSide<'a>,
+    other: OverlapSide<'a>,
     own_joint: &'a [Vec3],
     other_joint: &'a [Vec3],
     frame: NodeFrame,
@@ -254,7 +254,7 @@ impl Direction<'_> {
 
 /// Step 1 of one direction: the places of the vertices that valid cells use.
 fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
-    let Side { mesh, topology, .. } = direction.own;
+    let OverlapSide { mesh, topology, .. } = direction.own;
     let mut used = vec![false; mesh.points.len()];
     for (t, ids) in (0..).zip(&mesh.tets) {
         if topology.is_valid(t) {
@@ -272,7 +272,7 @@ fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
 
 /// Steps 1 to 3 of one direction, `around`: primitives of its own around a vertex of the other mesh.
 fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Effort) -> Vec<u32> {
-    let Side { mesh, topology, .. } = direction.own;
+    let OverlapSide { mesh, topology, .. } = direction.own;
     let one = |t: u32| {
         let mut effort = Effort::default();
         if !topology.is_valid(t) {
@@ -308,7 +308,7 @@ impl Effort {
 }
 
 /// Overlap of A and B, with all pairs if `pairs`. The trees must have been built over these meshes, that of B with `Lists::All` if pairs are wanted.
-pub fn overlap(a: Side, b: Side, pairs: bool) -> Overlap {
+pub fn overlap(a: OverlapSide, b: OverlapSide, pairs: bool) -> Overlap {
     let mut overlap = Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() };
     let valid = [a, b].map(|s| s.topology.valid_cells() > 0);
     if valid.contains(&false) {

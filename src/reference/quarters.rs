@@ -52,7 +52,7 @@ pub fn quarters_near(grid: &Grid, code: u32, cells: &CellRange) -> u32 {
 }
 
 /// Primitives and quarters of entries as a device holds them, in a tree with this grid.
-pub fn taken_apart(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
+pub fn split_entries(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
     if grid.ids == u32::MAX {
         return (entries, Vec::new());
     }

@@ -37,7 +37,7 @@ const GAP: f32 = -two_to(-17);
 
 /// Cell of a leaf in normalised coordinates.
 #[derive(Clone, Copy, Debug)]
-pub struct Room {
+pub struct LeafCell {
     /// Centre.
     pub centre: Vec3,
     /// Half the size.
@@ -249,7 +249,7 @@ impl Walker<'_> {
     }
 
     /// Walks to a point x of a cell that is full of mesh, from its seed.
-    pub fn walk(&self, seed: u32, room: &Room, x: Vec3) -> Walked {
+    pub fn walk(&self, seed: u32, room: &LeafCell, x: Vec3) -> Walked {
         let mut walked = Walked::default();
         if self.towards(seed, x, &mut walked) {
             return walked;
@@ -267,7 +267,7 @@ impl Walker<'_> {
     }
 }
 
-impl Room {
+impl LeafCell {
     /// Point number `k` of the cell, the first its centre.
     fn point(&self, k: u32) -> Vec3 {
         [0, 1, 2].map(|c| {

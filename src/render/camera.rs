@@ -163,13 +163,20 @@ impl Camera {
                 origin: f(base),
                 origin_x: f(near_dx),
                 origin_y: f(near_dy),
-                way: f(self.forward + first),
-                way_x: f(dx),
-                way_y: f(dy),
+                direction: f(self.forward + first),
+                direction_x: f(dx),
+                direction_y: f(dy),
             }
         } else {
             let base = self.eye + self.forward * nearest + first;
-            RayGrid { origin: f(base), origin_x: f(dx), origin_y: f(dy), way: f(self.forward), way_x: [0.0; 3], way_y: [0.0; 3] }
+            RayGrid {
+                origin: f(base),
+                origin_x: f(dx),
+                origin_y: f(dy),
+                direction: f(self.forward),
+                direction_x: [0.0; 3],
+                direction_y: [0.0; 3],
+            }
         }
     }
 }
@@ -195,20 +202,20 @@ pub struct RayGrid {
     /// What one pixel down adds to it.
     pub origin_y: [f32; 3],
     /// Direction of the ray of pixel (0, 0), of any length.
-    pub way: [f32; 3],
+    pub direction: [f32; 3],
     /// What one pixel to the right adds to it.
-    pub way_x: [f32; 3],
+    pub direction_x: [f32; 3],
     /// What one pixel down adds to it.
-    pub way_y: [f32; 3],
+    pub direction_y: [f32; 3],
 }
 
 impl RayGrid {
     /// Origin and unit direction of the ray of pixel (x, y), row 0 on top. Per component `(origin + x·origin_x) + y·origin_y`, and
-    /// w = `(way + x·way_x) + y·way_y` likewise; direction = w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
+    /// w = `(direction + x·direction_x) + y·direction_y` likewise; direction = w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
     pub fn ray(&self, x: u32, y: u32) -> ([f32; 3], [f32; 3]) {
         let (x, y) = (x as f32, y as f32);
         let origin = [0, 1, 2].map(|c| (self.origin[c] + x * self.origin_x[c]) + y * self.origin_y[c]);
-        let w = [0, 1, 2].map(|c| (self.way[c] + x * self.way_x[c]) + y * self.way_y[c]);
+        let w = [0, 1, 2].map(|c| (self.direction[c] + x * self.direction_x[c]) + y * self.direction_y[c]);
         let r = super::inverse_sqrt((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]);
         (origin, w.map(|v| v * r))
     }

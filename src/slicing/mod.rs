@@ -29,7 +29,7 @@ pub const TOUCHED: u8 = 1;
 pub const INSIDE: u8 = 2;
 
 /// Most voxels below each other in a layer whose centres are located together, each from the owner of the one before.
-pub const RUN: u32 = 64;
+pub const VOXEL_RUN: u32 = 64;
 /// Steps of a walk across faces before the tree is asked.
 pub const WALK: u32 = 6;
 /// Most voxels along an axis: numbers up to this are exact in single precision.
@@ -195,18 +195,18 @@ impl Rows {
         })
     }
 
-    /// Number of runs in each column: those of [`RUN`] rows that a layer has, none in two layers (where rows begin in the middle of a layer and go on
+    /// Number of runs in each column: those of [`VOXEL_RUN`] rows that a layer has, none in two layers (where rows begin in the middle of a layer and go on
     /// in others, as if layers began there).
     pub fn runs(self, height: u32) -> u32 {
         let most = self.count.min(height).max(1);
-        self.count / most * most.div_ceil(RUN) + (self.count % most).div_ceil(RUN)
+        self.count / most * most.div_ceil(VOXEL_RUN) + (self.count % most).div_ceil(VOXEL_RUN)
     }
 
     /// The rows of run number i.
     pub fn run(self, i: u32, height: u32) -> Range<u32> {
         let most = self.count.min(height).max(1);
-        let (of_layer, in_layer) = (i / most.div_ceil(RUN) * most, i % most.div_ceil(RUN) * RUN);
-        of_layer + in_layer..self.count.min(of_layer + most.min(in_layer + RUN))
+        let (of_layer, in_layer) = (i / most.div_ceil(VOXEL_RUN) * most, i % most.div_ceil(VOXEL_RUN) * VOXEL_RUN);
+        of_layer + in_layer..self.count.min(of_layer + most.min(in_layer + VOXEL_RUN))
     }
 
     /// Row and layer of the i-th row.
@@ -254,13 +254,13 @@ impl Tally {
 }
 
 /// The parts in which a stack is sliced: as many rows as make at most `most` voxels, at least one; several layers only if whole, and parts of a layer by
-/// [`RUN`] rows if so many fit: then runs begin at the same rows whatever `most` is, and owners are the same where cells overlap, too.
+/// [`VOXEL_RUN`] rows if so many fit: then runs begin at the same rows whatever `most` is, and owners are the same where cells overlap, too.
 pub fn bands(grid: &VoxelGrid, most: u64) -> impl Iterator<Item = Rows> + use<> {
     let [w, h] = grid.size;
     let layers = grid.layers;
     let whole = (most / grid.layer_voxels().max(1)).min(u64::from(u32::MAX / h.max(1))).min(u64::from(layers)) as u32;
     let fit = (most / u64::from(w.max(1))).clamp(1, u64::from(h.max(1))) as u32;
-    let rows = if fit < h && fit > RUN { fit / RUN * RUN } else { fit };
+    let rows = if fit < h && fit > VOXEL_RUN { fit / VOXEL_RUN * VOXEL_RUN } else { fit };
     let step = whole.max(1);
     (0..layers).step_by(step as usize).flat_map(move |layer| {
         let of_layer = move |first| Rows { layer, first, count: if step > 1 { h * step.min(layers - layer) } else { rows.min(h - first) } };
@@ -298,7 +298,7 @@ mod tests {
             let whole = runs(u64::from(u32::MAX));
             let all: Vec<[u32; 2]> = (0..layers).flat_map(|k| (0..size[1]).map(move |y| [y, k])).collect();
             assert_eq!(whole.concat(), all);
-            assert!(whole.iter().all(|run| !run.is_empty() && run.len() <= RUN as usize && run.iter().all(|at| at[1] == run[0][1])));
+            assert!(whole.iter().all(|run| !run.is_empty() && run.len() <= VOXEL_RUN as usize && run.iter().all(|at| at[1] == run[0][1])));
             for rows in [64, 65, 127, 128, 199, 200, 399, 400, 1000] {
                 assert_eq!(runs(rows * u64::from(size[0])), whole, "{size:?}, {layers} layers, {rows} rows at a time");
             }

@@ -31,7 +31,7 @@ pub struct TreeStats {
 
 /// Bytes of a tree, per array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct Memory {
+pub struct TreeBytes {
     /// Primitive ids.
     pub p: u64,
     /// Primitive offsets of the leaves.
@@ -48,7 +48,7 @@ pub struct Memory {
     pub boxes: u64,
 }
 
-impl Memory {
+impl TreeBytes {
     /// Of a tree with so many entries, nodes, and nodes that are not leaves, down to `level`.
     pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool) -> Self {
         Self {
@@ -90,9 +90,9 @@ impl Memory {
 
 impl TreeArrays {
     /// Bytes of each array.
-    pub fn memory(&self) -> Memory {
+    pub fn memory(&self) -> TreeBytes {
         let (nodes, internal) = (u64::from(self.nodes()), u64::from(self.internal_nodes()));
-        Memory::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some())
+        TreeBytes::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some())
     }
 
     /// Figures of the tree, which must be a valid one.

@@ -5,7 +5,7 @@ use super::tunables::{TUNABLES, other_sort};
 use crate::bench::Spread;
 use crate::error::{Error, Result};
 use crate::gpu::StageTime;
-use crate::kernels::{Room, Target};
+use crate::kernels::{Target, WorkgroupLimits};
 use std::time::{Duration, Instant};
 
 /// Times of a candidate and of the best so far, taken in turns, that decide.
@@ -153,7 +153,7 @@ impl Searcher<'_> {
     }
 
     /// Every tunable once, each as far as it gains; whether any did.
-    fn round(&mut self, room: &Room) -> Result<bool> {
+    fn round(&mut self, room: &WorkgroupLimits) -> Result<bool> {
         let before = self.kept;
         for tunable in &TUNABLES {
             for up in [true, false] {
@@ -180,7 +180,7 @@ impl Searcher<'_> {
 ///
 /// # Errors
 /// If `start` itself gives wrong answers or does not run, or the device is lost.
-pub fn tune(work: &dyn Work, room: &Room, start: &Target, time: Duration, report: &dyn Fn(&Event, f64)) -> Result<Tuned> {
+pub fn tune(work: &dyn Work, room: &WorkgroupLimits, start: &Target, time: Duration, report: &dyn Fn(&Event, f64)) -> Result<Tuned> {
     work.verify(start)?;
     let begin = Instant::now();
     let mut searcher = Searcher { work, best: start.clone(), kept: 0, tried: 0, refused: 0, begin, time, report };
@@ -261,7 +261,7 @@ mod tests {
     }
 
     fn run(noise: f64, time: Duration) -> (Tuned, Vec<Event>) {
-        let room = Room::least(32);
+        let room = WorkgroupLimits::least(32);
         let fake = Fake { noise, calls: Cell::new(0), verified: RefCell::default() };
         let events = RefCell::new(Vec::new());
         let report = |event: &Event, _: f64| events.borrow_mut().push(event.clone());
@@ -283,7 +283,7 @@ mod tests {
     #[test]
     fn noise_changes_nothing() {
         let (tuned, _) = run(2.0, Duration::from_secs(60));
-        let start = Row::Portable.target(&Room::least(32));
+        let start = Row::Portable.target(&WorkgroupLimits::least(32));
         assert_eq!((tuned.kept, tuned.target), (0, start));
         assert!(tuned.gains.is_empty());
     }

@@ -1,6 +1,6 @@
 //! What can be changed.
 
-use crate::kernels::{Room, Row, Target};
+use crate::kernels::{Row, Target, WorkgroupLimits};
 
 /// One choice of a [`Target`].
 pub struct Tunable {
@@ -114,7 +114,7 @@ impl Tunable {
     }
 
     /// The target with the next value above or below that the device has room for.
-    pub(super) fn step(&self, target: &Target, room: &Room, up: bool) -> Option<Target> {
+    pub(super) fn step(&self, target: &Target, room: &WorkgroupLimits, up: bool) -> Option<Target> {
         let now = self.of(target);
         let usable = |&value: &u32| {
             let mut next = target.clone();
@@ -130,7 +130,7 @@ impl Tunable {
 }
 
 /// The target with the other kind of sort, as its best known row has it.
-pub(super) fn other_sort(target: &Target, room: &Room) -> Target {
+pub(super) fn other_sort(target: &Target, room: &WorkgroupLimits) -> Target {
     let row = if target.sort.serial { Row::Portable } else { Row::Cpu };
     Target { sort: row.target(room).sort, ..target.clone() }
 }
@@ -142,7 +142,7 @@ mod tests {
     #[test]
     fn steps_stay_within_the_room() {
         for subgroup in [4, 8, 32, 64, 128] {
-            let room = Room::least(subgroup);
+            let room = WorkgroupLimits::least(subgroup);
             for row in Row::EVERY {
                 let target = row.target(&room);
                 for tunable in &TUNABLES {

@@ -8,8 +8,8 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
     LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, Path, PointInput, PointOrder, RenderInput, RenderMemory, Rounds,
-    Scene, Searched, Shown, SliceInput, SliceMemory, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners, cmd_list_pairs,
-    cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
+    Scene, Shown, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
+    cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -118,7 +118,7 @@ impl Queries {
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
         cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;
-        let searched = Searched::from(&self.scene);
+        let searched = StructureView::from(&self.scene);
         let field = Some((self.field.all(), On::Points));
         let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest, part: None };
         cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;

@@ -6,7 +6,7 @@ use olbvh::reference::boundary::{Topology, fault_of};
 use olbvh::reference::build::build;
 use olbvh::reference::grid::morton;
 use olbvh::reference::locate::Locator;
-use olbvh::reference::overlap::{Side, overlap};
+use olbvh::reference::overlap::{OverlapSide, overlap};
 use olbvh::tree::TreeArrays;
 
 /// The mesh with its points and cells in no order, and fields that number them.
@@ -77,8 +77,8 @@ impl Built {
         Self(mesh, topology, tree)
     }
 
-    fn side(&self) -> Side<'_> {
-        Side { mesh: &self.0, topology: &self.1, tree: &self.2 }
+    fn side(&self) -> OverlapSide<'_> {
+        OverlapSide { mesh: &self.0, topology: &self.1, tree: &self.2 }
     }
 
     fn names(&self, tets: &[u32]) -> Vec<u32> {

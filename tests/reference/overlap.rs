@@ -6,13 +6,13 @@ use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::Assign;
 use olbvh::reference::boundary::Topology;
-use olbvh::reference::overlap::{Overlap, Side, overlap};
+use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 
 type Prepared = (Mesh, Topology);
 
 fn run(a: &Prepared, b: &Prepared, alpha: f32, assign: Assign, pairs: bool) -> Overlap {
     let (tree_a, tree_b) = (tree(&a.0, &a.1, alpha, assign), tree(&b.0, &b.1, alpha, assign));
-    overlap(Side { mesh: &a.0, topology: &a.1, tree: &tree_a }, Side { mesh: &b.0, topology: &b.1, tree: &tree_b }, pairs)
+    overlap(OverlapSide { mesh: &a.0, topology: &a.1, tree: &tree_a }, OverlapSide { mesh: &b.0, topology: &b.1, tree: &tree_b }, pairs)
 }
 
 /// A mesh turned, scaled and moved at random.

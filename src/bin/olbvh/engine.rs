@@ -17,7 +17,7 @@ use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
 use olbvh::render::Bounds;
 use olbvh::slicing::Band;
-use olbvh::tree::Memory;
+use olbvh::tree::TreeBytes;
 
 /// So much of so much is done.
 pub type Report<'a> = &'a (dyn Fn(u64, u64) + Sync);
@@ -86,7 +86,7 @@ pub struct Summary {
     /// Leaves.
     pub leaves: u64,
     /// Bytes of each array.
-    pub memory: Memory,
+    pub memory: TreeBytes,
     /// Bytes as the paper counts them.
     pub paper_bytes: u64,
     /// Bytes of the neighbour table, which is the mesh's, not the tree's.

@@ -138,7 +138,7 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
-    let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.is_long(each) && s.wanted == s.level && finer <= MAX_LEVEL;
+    let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.wants_finer(each) && s.wanted == s.level && finer <= MAX_LEVEL;
     let hint = if hint { format!("; pictures are drawn sooner with --level {finer}") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
     for (name, n) in s.memory.arrays() {

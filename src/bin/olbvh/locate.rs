@@ -83,11 +83,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let mut seconds;
     let done = if args.all {
-        let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.apart();
+        let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
         Done { found: every_owner(args, format, mesh, &owners)?, took }
     } else {
-        let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.apart();
+        let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();
         let bary: Vec<[f32; 4]> = located.iter().map(|l| l.bary).collect();

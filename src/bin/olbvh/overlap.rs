@@ -66,7 +66,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "overlap");
     let asked = Meshes { meshes: [&a, &b], options, pairs: args.pairs };
     let start = Instant::now();
-    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.apart();
+    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
     let cells = |mesh: &Mesh, tets: &[u32]| {

@@ -119,7 +119,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
-    let (drawn, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.apart();
+    let (drawn, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let Drawn { picture, range: [lo, hi], step } = drawn;
     drop(progress);
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;

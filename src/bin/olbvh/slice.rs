@@ -5,7 +5,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::slice_output::{Layers, Look, materials};
+use crate::slice_output::{Appearance, Layers, materials};
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
@@ -139,7 +139,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
         common.remark(format_args!("{name} does not number materials from 1 to 255; the package has its values over {range:?}"));
     }
-    let look = Look { colors, range, unit: args.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials };
+    let look = Appearance { colors, range, unit: args.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials };
     let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let mut tally = Tally::default();

@@ -9,7 +9,7 @@ use olbvh::slicing::{Band, EMPTY, VoxelGrid};
 use std::path::{Path, PathBuf};
 
 /// How values are shown.
-pub struct Look {
+pub struct Appearance {
     /// Colours over the range.
     pub colors: TransferFunction,
     /// Values at the ends.
@@ -29,7 +29,7 @@ pub fn materials(field: &Field) -> Option<Vec<u8>> {
     all.filter(|_| field.on == On::Cells).map(|all| all.into_iter().collect())
 }
 
-impl Look {
+impl Appearance {
     /// Place of a value in the range, 0…1.
     fn place(&self, value: f32) -> f32 {
         let [lo, hi] = self.range;
@@ -51,13 +51,13 @@ pub struct Layers<'a> {
     count: u32,
     done: u32,
     owners: bool,
-    look: Look,
+    look: Appearance,
     pending: Band,
 }
 
 impl<'a> Layers<'a> {
     /// Begins the result.
-    pub fn create(path: &Path, format: OutputFormat, voxels: &VoxelGrid, mesh: &'a Mesh, owners: bool, look: Look) -> Result<Self> {
+    pub fn create(path: &Path, format: OutputFormat, voxels: &VoxelGrid, mesh: &'a Mesh, owners: bool, look: Appearance) -> Result<Self> {
         let [w, h] = voxels.size;
         let size = [w, h, voxels.layers];
         let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();

@@ -7,7 +7,7 @@ use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::error::Result;
 use crate::primitives::Arena;
-use crate::query::{RenderInput, RenderMemory, Scene, Searched, Shown, cmd_render};
+use crate::query::{RenderInput, RenderMemory, Scene, Shown, StructureView, cmd_render};
 use crate::render::{Bounds, Plan};
 use std::mem::offset_of;
 
@@ -144,7 +144,7 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
             part: None,
         };
         let memory = picture.memory.place(picture.carve(scene))?;
-        let searched = Searched::from(scene);
+        let searched = StructureView::from(scene);
         cmd_render(r, &searched, &input, &memory, picture.rounds.into())
     })
 }

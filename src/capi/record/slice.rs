@@ -4,7 +4,7 @@ use super::scene::OlbvhScene;
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::query::OlbvhVoxels;
 use crate::capi::{OlbvhStatus, border, handle, put};
-use crate::query::{Searched, SliceInput, SliceMemory, cmd_slice};
+use crate::query::{SliceInput, SliceMemory, StructureView, cmd_slice};
 use crate::slicing::{Extrapolate, Rows};
 
 /// Which voxels are sliced, and where the answers go.
@@ -67,6 +67,6 @@ pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const 
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate, part: None };
         let memory = slicing.memory.place(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], rows))?;
-        cmd_slice(r, &Searched::from(scene), &input, &memory, slicing.rounds.into())
+        cmd_slice(r, &StructureView::from(scene), &input, &memory, slicing.rounds.into())
     })
 }

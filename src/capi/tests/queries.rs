@@ -5,7 +5,7 @@ use crate::capi::query::*;
 use crate::gpu::Buffer;
 use crate::mesh::Field;
 use crate::options::TOLERANCE;
-use crate::query::{LocateOptions, Party, locate, locate_all, overlap, render, slice};
+use crate::query::{LocateOptions, OverlapInput, locate, locate_all, overlap, render, slice};
 use crate::render::{Bounds, Plan, Prepared};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
@@ -60,8 +60,8 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
         Ok(())
     };
     slice(&mesh, &tree, field, &voxels().read(), Extrapolate::Linear, &|_, _| {}, &mut sink).unwrap();
-    let party = [Party { mesh: &mesh, tree: &tree }, Party { mesh: &other, tree: &other_tree }];
-    let [sets, pairs] = [false, true].map(|pairs| overlap(party[0], party[1], pairs, &|_, _| {}).unwrap().overlap);
+    let inputs = [OverlapInput { mesh: &mesh, tree: &tree }, OverlapInput { mesh: &other, tree: &other_tree }];
+    let [sets, pairs] = [false, true].map(|pairs| overlap(inputs[0], inputs[1], pairs, &|_, _| {}).unwrap().overlap);
     let bits = |found: &[u32], mesh: &Mesh| {
         let mut words = vec![0; mesh.tets.len().div_ceil(32)];
         found.iter().for_each(|i| words[*i as usize / 32] |= 1 << (i % 32));

@@ -8,7 +8,7 @@ use crate::kernels::{
 };
 use crate::layout::SearchState;
 use crate::primitives::{Arena, Count};
-use crate::query::{Rounds, Scene, slices};
+use crate::query::{Rounds, Scene, list_parts};
 
 /// Nodes and entries that a primitive may look at in one dispatch.
 pub(super) const BUDGET: u32 = 512;
@@ -52,7 +52,7 @@ pub struct OverlapMemory {
     /// [`crate::layout::OverlapStatus`] of A against B, of B against A.
     pub status: [BufferRef; 2],
     frames: Frames,
-    ways: [Arrays; 2],
+    directions: [Arrays; 2],
 }
 
 impl OverlapMemory {
@@ -63,8 +63,8 @@ impl OverlapMemory {
     pub fn carve(arena: &mut Arena, a: &Scene, b: &Scene) -> Result<Self> {
         let frames = Frames::carve(arena)?;
         let [forth, back] = frames.status;
-        let ways = [Arrays::carve(arena, a, b, forth, frames.of[1])?, Arrays::carve(arena, b, a, back, frames.of[0])?];
-        Ok(Self { hits: ways.map(|w| w.hits), status: frames.status, frames, ways })
+        let directions = [Arrays::carve(arena, a, b, forth, frames.of[1])?, Arrays::carve(arena, b, a, back, frames.of[0])?];
+        Ok(Self { hits: directions.map(|w| w.hits), status: frames.status, frames, directions })
     }
 }
 
@@ -81,36 +81,36 @@ impl OverlapMemory {
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapMemory, rounds: Rounds) -> Result<()> {
-    let [forth, back] = memory.ways;
-    let ways = [
+    let [forth, back] = memory.directions;
+    let directions = [
         Direction { own: *a, other: *b, arrays: forth, held: back.around },
         Direction { own: *b, other: *a, arrays: back, held: forth.around },
     ];
     if !rounds.resume {
-        ways.iter().for_each(|w| w.cmd_clear(r));
+        directions.iter().for_each(|w| w.cmd_clear(r));
         r.barrier("overlap.clear → overlap.used");
         r.stage("overlap.vertices", |r| {
             memory.frames.cmd(r, a, b)?;
-            ways.iter().try_for_each(|w| w.cmd_used(r))?;
-            for slice in 0..ways.iter().map(Direction::slices).max().unwrap_or(1) {
+            directions.iter().try_for_each(|w| w.cmd_used(r))?;
+            for part in 0..directions.iter().map(Direction::parts).max().unwrap_or(1) {
                 r.barrier("overlap.used → overlap.places");
-                ways.iter().filter(|w| slice < w.slices()).try_for_each(|w| w.cmd_places(r, slice))?;
+                directions.iter().filter(|d| part < d.parts()).try_for_each(|d| d.cmd_places(r, part))?;
             }
             Ok(())
         })?;
         r.barrier("overlap.places → overlap.collect");
-        r.stage("overlap.collect", |r| ways.iter().try_for_each(|w| w.cmd_collect(r)))?;
+        r.stage("overlap.collect", |r| directions.iter().try_for_each(|w| w.cmd_collect(r)))?;
         r.barrier("overlap.collect → overlap.search");
     }
     r.stage("overlap.search", |r| {
-        let groups = [ways[0].groups(r)?, ways[1].groups(r)?];
+        let groups = [directions[0].groups(r)?, directions[1].groups(r)?];
         for round in 0..rounds.count {
             if round > 0 {
                 r.barrier("overlap.search → overlap.clear");
             }
-            ways.iter().for_each(|w| r.fill(unfinished(w.arrays.status), 0));
+            directions.iter().for_each(|w| r.fill(unfinished(w.arrays.status), 0));
             r.barrier("overlap.clear → overlap.search");
-            ways.iter().zip(groups).try_for_each(|(w, groups)| w.cmd_search(r, groups))?;
+            directions.iter().zip(groups).try_for_each(|(w, groups)| w.cmd_search(r, groups))?;
         }
         Ok(())
     })
@@ -138,11 +138,11 @@ impl Direction {
         r.dispatch(&arguments, OverlapUsedSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(workgroup)))
     }
 
-    fn slices(&self) -> u32 {
-        slices(self.other.longest_leaf).1
+    fn parts(&self) -> u32 {
+        list_parts(self.other.longest_leaf).1
     }
 
-    fn cmd_places(&self, r: &mut Recorder<'_>, slice: u32) -> Result<()> {
+    fn cmd_places(&self, r: &mut Recorder<'_>, part: u32) -> Result<()> {
         let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
         let workgroup = r.gpu().target().query;
         let arguments = OverlapPlaces {
@@ -161,9 +161,9 @@ impl Direction {
             status: self.arrays.status,
             points: own.points,
             stride: own.stride,
-            slice,
+            part,
         };
-        let spec = OverlapPlacesSpec { workgroup, slice: slices(self.other.longest_leaf).0, ..Default::default() };
+        let spec = OverlapPlacesSpec { workgroup, part_length: list_parts(self.other.longest_leaf).0, ..Default::default() };
         r.dispatch(&arguments, spec, Groups::Count(own.points.div_ceil(workgroup)))
     }
 

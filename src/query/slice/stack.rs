@@ -7,9 +7,9 @@ use crate::gpu::{Buffer, Gpu};
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, Searched};
+use crate::query::{Built, Rounds, StructureView};
 use crate::reference::vertices::CellRange;
-use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, RUN, Rows, TOUCHED, Tally, VoxelGrid, bands};
+use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
 /// Voxels of one band, unless a single row has more.
 const CHUNK: u64 = 1 << 20;
@@ -37,7 +37,7 @@ pub struct Sliced {
 /// A stack over a mesh and its tree: what its bands have in common, with memory of our own.
 pub(crate) struct Slicing<'a> {
     gpu: &'a Gpu,
-    searched: Searched,
+    searched: StructureView,
     voxels: &'a VoxelGrid,
     field: Option<(Buffer, On)>,
     extrapolate: Extrapolate,
@@ -70,13 +70,13 @@ impl<'a> Slicing<'a> {
         let field = field.map(upload).transpose()?;
         let [width, height] = voxels.size;
         let per_run = size_of::<RunState>() as u64;
-        let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, RUN));
+        let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, VOXEL_RUN));
         let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_run * u64::from(width)) / per_voxel);
         let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size, rows);
         let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
         let memory = carve(&mut Arena::new(buffer.all()))?;
-        let (searched, sliced) = (Searched::new(mesh, built)?, Sliced::default());
+        let (searched, sliced) = (StructureView::new(mesh, built)?, Sliced::default());
         Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
     }
 

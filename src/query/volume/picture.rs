@@ -7,7 +7,7 @@ use crate::gpu::{Buffer, BufferRef, Gpu};
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, Searched, Structure};
+use crate::query::{Built, Rounds, Structure, StructureView};
 use crate::reference::vertices::CellRange;
 use crate::render::Plan;
 
@@ -54,7 +54,7 @@ impl Rays {
 /// A mesh, its tree and a field in device memory, ready to be drawn: a whole picture, or strips of one.
 pub(crate) struct Canvas<'a> {
     gpu: &'a Gpu,
-    searched: Searched,
+    searched: StructureView,
     plan: &'a Plan,
     field: (Buffer, On),
     normals: Option<Buffer>,
@@ -81,7 +81,7 @@ impl<'a> Canvas<'a> {
         in_strips: bool,
     ) -> Result<Self> {
         let gpu = mesh.gpu();
-        let searched = Searched::new(mesh, built)?;
+        let searched = StructureView::new(mesh, built)?;
         on.check(values, mesh.sizes())?;
         if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
             return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));

@@ -9,7 +9,7 @@ use olbvh::query::{self, LocateOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::{self, Location, Locator, order_of};
-use olbvh::reference::overlap::{Overlap, Side, overlap};
+use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
@@ -82,8 +82,8 @@ impl Engine for Cpu {
         let build = olbvh::reference::build::build;
         let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
         let build_seconds = start.elapsed().as_secs_f64();
-        let side_a = Side { mesh: a, topology: &topology_a, tree: &tree_a };
-        let answer = overlap(side_a, Side { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        let side_a = OverlapSide { mesh: a, topology: &topology_a, tree: &tree_a };
+        let answer = overlap(side_a, OverlapSide { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
         report(1, 1);
         Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds })
     }

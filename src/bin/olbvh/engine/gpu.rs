@@ -87,7 +87,7 @@ impl Engine for Device {
 
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
         let values = field.map(|f| (f.values.as_slice(), f.on));
-        let (answer, took) = blocks::locate(&self.0, self.memory(memory), asked, values, report)?.apart();
+        let (answer, took) = blocks::locate(&self.0, self.memory(memory), asked, values, report)?.into_parts();
         let value = |i: usize| answer.values.get(i).copied().unwrap_or(f32::NAN);
         let located = answer.owners.iter().zip(&answer.barycentrics).enumerate();
         Ok(took.with(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect()))
@@ -98,12 +98,12 @@ impl Engine for Device {
     }
 
     fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
-        let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.apart();
+        let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.into_parts();
         Ok(took.with(found.overlap))
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
-        let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.apart();
+        let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.into_parts();
         let pixels = plan.pixels(&drawn.colors);
         let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
         let picture = Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms };
@@ -111,6 +111,6 @@ impl Engine for Device {
     }
 
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
-        Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.apart().1)
+        Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.into_parts().1)
     }
 }
