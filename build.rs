@@ -1,6 +1,6 @@
 //! Compiles every kernel of `glsl/` in its three forms, reflects it, and generates its Rust side into `OUT_DIR`:
-//! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V), `layout.rs` (shared structs), and `olbvh.glsl` for the shaders
-//! of other programs.
+//! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V), `layout.rs` (shared structs),
+//! and `olbvh.glsl` for the shaders of other programs.
 
 #[path = "build/export.rs"]
 mod export;
@@ -14,7 +14,7 @@ use std::{env, fs, process, thread};
 
 const GLSL: &str = "glsl";
 
-/// A shader of somebody else's, to see that `glsl/olbvh.glsl` compiles.
+/// A shader of another program, compiled to check that `glsl/olbvh.glsl` compiles.
 const FOREIGN: &str = "#version 460
 #define OLBVH_TRAVERSE
 #include \"olbvh.glsl\"
@@ -29,7 +29,7 @@ fn main() {
     let out = PathBuf::from(env::var("OUT_DIR").unwrap_or_default());
     let result = generate(&out);
     if let Err(message) = result {
-        // Straight to the reader: file, line and the compiler's words.
+        // The message is printed as it is: file, line and the words of the compiler.
         eprintln!("\n{message}");
         process::exit(1);
     }
@@ -39,7 +39,7 @@ fn generate(out: &Path) -> Result<(), String> {
     let mut kernels = Vec::new();
     find_kernels(Path::new(GLSL), &mut kernels)?;
     kernels.sort();
-    // glslang is slow enough that half the time is worth a second thread.
+    // glslang is so slow that a second thread is worthwhile.
     let (left, right) = kernels.split_at(kernels.len() / 2);
     let (left, right) = thread::scope(|scope| {
         let left = scope.spawn(|| left.iter().map(|k| compile_kernel(k, out)).collect::<Result<Vec<_>, _>>());
@@ -67,7 +67,7 @@ fn find_kernels(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
     Ok(())
 }
 
-/// The stage that a file is for; none: it is there to be included.
+/// The stage of a shader file; `None` for a file that is only included.
 fn stage_of(path: &Path) -> Option<shaderc::ShaderKind> {
     match path.extension()?.to_str()? {
         "comp" => Some(shaderc::ShaderKind::Compute),
@@ -78,7 +78,8 @@ fn stage_of(path: &Path) -> Option<shaderc::ShaderKind> {
     }
 }
 
-/// How a kernel reaches its buffers: the file's suffix, and the macro that tells the source.
+/// How a kernel reaches its buffers: the suffix of the compiled file, and the macro that selects this form in the
+/// source.
 struct Form {
     suffix: &'static str,
     macro_name: Option<&'static str>,
@@ -89,7 +90,7 @@ const WIDE: Form = Form { suffix: "wide", macro_name: Some("OLBVH_WIDE") };
 const DESCRIPTOR: Form = Form { suffix: "descriptor", macro_name: Some("OLBVH_DESCRIPTORS") };
 const FORMS: [Form; 3] = [ADDRESS, WIDE, DESCRIPTOR];
 
-/// Compiles one source, with `#include`s from `glsl/`.
+/// Compiles one source. Its `#include`s are resolved in `glsl/`.
 fn compile(source: &str, name: &str, form: &Form, optimise: bool) -> Result<Vec<u32>, String> {
     let stage = stage_of(Path::new(name)).unwrap_or(shaderc::ShaderKind::Compute);
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
@@ -119,7 +120,7 @@ fn compile_kernel(path: &Path, out: &Path) -> Result<Interface, String> {
     let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
     let name = path.display().to_string();
     let stem = path.with_extension("").strip_prefix(GLSL).map_err(|e| e.to_string())?.display().to_string().replace(['/', '\\'], ".");
-    // Optimised modules may lose names, so the plain one is reflected and the optimised ones are shipped.
+    // Optimisation may remove names, so an unoptimised module is reflected, and optimised ones are shipped.
     let plain = compile(&source, &name, &DESCRIPTOR, false)?;
     let interface = reflect::interface(&plain, &stem).map_err(|e| format!("{name}: {e}"))?;
     for form in &FORMS {
@@ -211,7 +212,8 @@ fn list(items: impl Iterator<Item = String>) -> String {
     items.collect::<Vec<_>>().join(", ")
 }
 
-/// Compiles a module that uses every struct of `layout.glsl`, and turns the reflected structs into Rust, with the source's comments.
+/// Compiles a module that uses every struct of `layout.glsl`, and turns the reflected structs into Rust, with the
+/// comments of the source.
 fn layout_source() -> Result<String, String> {
     let file = Path::new(GLSL).join("shared/layout.glsl");
     let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;

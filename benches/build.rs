@@ -1,4 +1,5 @@
-//! The stages of a construction in tetrahedra per second of device time, verified before they are timed. `cargo bench --bench build`.
+//! The stages of a construction, in tetrahedra per second of device time, verified before they are timed. Run with
+//! `cargo bench --bench build`.
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
 use olbvh::baseline::Lbvh;
@@ -9,7 +10,7 @@ use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::{boundary::topology, build::build};
 use std::time::Duration;
 
-/// Sum of the stages of that name; all of them for "all".
+/// The sum of the stages with this name; of all stages for "all".
 fn time_of(stages: &[StageTime], name: &str) -> Duration {
     let chosen = stages.iter().filter(|s| name == "all" || s.name == name);
     Duration::from_secs_f64(StageTime::sum(chosen) * 1e-3)
@@ -36,7 +37,7 @@ fn construction(c: &mut Criterion) {
         assert!(tree.download().expect("arrays") == build(&mesh, &topology, &options).expect("a tree"));
         let mut names: Vec<String> = tree.stages().iter().map(|s| s.name.clone()).collect();
         names.push("all".into());
-        // The stages of Aabb one by one, of the others what differs.
+        // All stages of `Aabb`; of the other assignments, only the stages that differ.
         names.retain(|n| assign == Assign::Aabb || ["build.filter", "build.sort", "all"].contains(&n.as_str()));
         for stage in names {
             let run = |iterations: u64| -> Duration {

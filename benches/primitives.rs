@@ -1,4 +1,5 @@
-//! Reduce, scan and sort in elements per second of device time, verified before they are timed. `cargo bench --bench primitives`.
+//! Reduce, scan and sort, in elements per second of device time, verified before they are timed.
+//! Run with `cargo bench --bench primitives`.
 
 #[path = "../tests/submit/mod.rs"]
 mod submit;
@@ -18,7 +19,7 @@ fn keys(n: u32) -> Vec<u32> {
     (0..n).map(|i| (i.wrapping_mul(2_654_435_761).rotate_left(7) ^ i) & ((1 << SORT_BITS) - 1)).collect()
 }
 
-/// Device time of `iterations` runs; `before` each, its input is made anew.
+/// Device time of `iterations` runs.
 fn timed(gpu: &Gpu, iterations: u64, mut record: impl FnMut(&mut Recorder<'_>) -> olbvh::Result<()>) -> Duration {
     let once = |_| {
         let ((), time) = submit(gpu, "olbvh.bench", |r| r.stage("bench", &mut record)).expect("the device runs");
@@ -75,7 +76,7 @@ fn sort(c: &mut Criterion) {
         let carve = |a: &mut Arena| SortScratch::carve(&gpu, a, n, SORT_BITS);
         let memory = gpu.buffer("olbvh.bench.scratch", Arena::measure(carve).expect("a size")).expect("scratch");
         let scratch = carve(&mut Arena::new(memory.all())).expect("scratch");
-        // Every run sorts the same unsorted pairs: sorted ones would find warm caches.
+        // Every run sorts the same unsorted pairs: pairs that are sorted already would find warm caches.
         let (source, source_ids) = (upload(&gpu, &data), upload(&gpu, &ids));
         let (sorted, sorted_ids) = (upload(&gpu, &data), upload(&gpu, &ids));
         let mut run = |iterations: u64| -> Duration {

@@ -1,5 +1,5 @@
-//! Point location and volume rendering in points and samples per second of device time, verified before they are timed.
-//! `cargo bench --bench query`.
+//! Point location and volume rendering, in points and samples per second of device time, verified before they are
+//! timed. Run with `cargo bench --bench query`.
 
 #[path = "../tests/submit/mod.rs"]
 mod submit;
@@ -20,7 +20,7 @@ const POINTS: u32 = 1 << 17;
 const CELLS: u32 = 32;
 
 fn setting() -> (Gpu, Mesh) {
-    // Moved by more, some cells turn over and lie in others, where trees may name different owners.
+    // With more jitter, some tetrahedra turn over and lie in others, where trees may give different owners.
     (Gpu::new(&GpuOptions::default()).expect("a device"), kuhn_jittered([CELLS; 3], 0.2, 1).expect("a mesh"))
 }
 
@@ -72,7 +72,7 @@ fn location(c: &mut Criterion) {
     group.bench_function(BenchmarkId::new("lbvh", "Apetrei 2014"), |b| b.iter_custom(run));
 }
 
-/// A figure of a drawn picture.
+/// A figure taken from a drawn picture.
 type Part = fn(&query::Drawn) -> f64;
 
 fn rendering(c: &mut Criterion) {

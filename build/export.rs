@@ -1,10 +1,10 @@
-//! `glsl/olbvh.glsl` for foreign shaders: one file, its names behind a prefix.
+//! `glsl/olbvh.glsl` for the shaders of other programs: one file, whose names have a prefix.
 
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
 
-/// The file `name` of `folder` with its includes in place, each once.
+/// Appends the file `name` of `folder` to `out`, with its includes in place, each of them once.
 fn flatten(folder: &Path, name: &str, seen: &mut BTreeSet<String>, out: &mut String) -> Result<(), String> {
     if !seen.insert(name.to_owned()) {
         return Ok(());
@@ -26,7 +26,8 @@ fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 
-/// The name that a line at the outermost level declares: a struct, a constant, a variable, a function, a buffer, a macro.
+/// The name that a line at the outermost level declares: a struct, a constant, a variable, a function, a buffer, a
+/// macro.
 fn declared(line: &str) -> Option<&str> {
     if let Some(of_macro) = line.strip_prefix("#define ") {
         return of_macro.split(|c| !is_word(c)).next();
@@ -43,7 +44,8 @@ fn declared(line: &str) -> Option<&str> {
     (!name.is_empty()).then_some(name)
 }
 
-/// The text with every declared name behind the prefix `olbvh_`, wherever the word occurs outside of comments and means no member of a struct.
+/// The text with the prefix `olbvh_` before every declared name, wherever it occurs as a word outside of comments and
+/// is not a member of a struct.
 fn prefix(text: &str) -> String {
     let names: BTreeSet<&str> = text.lines().filter_map(declared).filter(|n| !n.to_lowercase().starts_with("olbvh_")).collect();
     let is_ours = |word: &str| names.contains(word) || word.strip_suffix("Block").is_some_and(|w| names.contains(w));
@@ -69,7 +71,7 @@ fn prefix(text: &str) -> String {
     out
 }
 
-/// What `olbvh::glsl::OLBVH` holds.
+/// The text of `olbvh::glsl::OLBVH`.
 pub fn export(folder: &Path) -> Result<String, String> {
     let mut text = String::new();
     flatten(folder, "olbvh.glsl", &mut BTreeSet::new(), &mut text)?;

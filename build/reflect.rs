@@ -1,4 +1,4 @@
-//! What a compute module declares, read off its SPIR-V with rspirv.
+//! What a shader module declares, read from its SPIR-V with rspirv.
 
 use rspirv::dr::{Instruction, Module, Operand, load_words};
 use rspirv::spirv::{Decoration, Op, StorageClass, Word};
@@ -19,7 +19,7 @@ pub struct Buffer {
     pub name: String,
     pub reads: bool,
     pub writes: bool,
-    /// What its address must be a multiple of.
+    /// Its address must be a multiple of this.
     pub alignment: u32,
 }
 
@@ -155,7 +155,7 @@ impl Reader {
         Ok(members)
     }
 
-    /// Variables of a storage class: (variable, pointee).
+    /// The variables of a storage class: (variable, pointee).
     fn variables(&self, wanted: StorageClass) -> Vec<(Word, Word)> {
         let variables = self.module.types_global_values.iter().filter(|i| i.class.opcode == Op::Variable);
         variables
@@ -167,7 +167,7 @@ impl Reader {
     }
 }
 
-/// The interface of a kernel from its unoptimised descriptor permutation.
+/// The interface of a kernel, from its unoptimised descriptor form.
 pub fn interface(words: &[u32], stem: &str) -> Result<Interface, String> {
     let r = Reader::new(words)?;
     let mut buffers = Vec::new();
@@ -194,7 +194,7 @@ pub fn interface(words: &[u32], stem: &str) -> Result<Interface, String> {
         let Some(id) = i.result_id else { continue };
         let (Op::SpecConstant, Some(spec)) = (i.class.opcode, r.decoration(id, Decoration::SpecId)) else { continue };
         let Some(Operand::LiteralBit32(default)) = i.operands.first() else { continue };
-        // The workgroup size is a constant of its own that carries no name when unused otherwise.
+        // The workgroup size is a constant that has no name if the source does not use it otherwise.
         let name = r.names.get(&id).cloned().unwrap_or_else(|| "WORKGROUP".into());
         constants.push(Constant { name, id: spec, default: *default });
     }
@@ -222,7 +222,7 @@ pub fn structs(words: &[u32], wanted: &[&str]) -> Result<Vec<StructLayout>, Stri
         .collect()
 }
 
-/// Comments of a source by `Struct` (the lines before it) and `Struct.member` (behind it).
+/// The comments of a source, by `Struct` (the lines before it) and `Struct.member` (after it on its line).
 pub fn comments(text: &str) -> HashMap<String, String> {
     let (mut found, mut above, mut inside) = (HashMap::new(), Vec::new(), String::new());
     for line in text.lines().map(str::trim) {

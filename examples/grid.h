@@ -1,4 +1,4 @@
-/* What the C examples share: a grid of 6 n^3 tetrahedra, the same as `kuhn:N,N,N`, and a check of every call. */
+/* What the C examples share: a grid of 6 n^3 tetrahedra, equal to `kuhn:N,N,N`, and a check of the status of calls. */
 #include "olbvh.h"
 #include <stdio.h>
 #include <stdlib.h>
@@ -15,7 +15,7 @@ static void check(olbvh_status status, const char *what) {
     exit(1);
 }
 
-/* The corners of each unit cell along the six paths from its lower to its upper corner. */
+/* Six tetrahedra per unit cell: the corners along each of the six paths from its lower to its upper corner. */
 static grid make_grid(uint32_t n) {
     static const int paths[6][3] = {{0, 1, 2}, {0, 2, 1}, {1, 0, 2}, {1, 2, 0}, {2, 0, 1}, {2, 1, 0}};
     uint32_t side = n + 1;

@@ -1,4 +1,5 @@
-/* Finds the cells of points in a grid of 6 n^3 tetrahedra, the same that `olbvh locate kuhn:N,N,N` finds. Prints a line per point.
+/* Locates the points of a grid of 6 n^3 tetrahedra, and prints the owner of each, one per line: those that
+ * `olbvh locate kuhn:N,N,N` finds.
  *
  *     cc examples/locate.c -Iinclude -Ltarget/release -lolbvh -o locate && ./locate 4
  */
@@ -20,7 +21,7 @@ int main(int argc, char **argv) {
     if (olbvh_tree_build(mesh, &options, &tree) != OLBVH_STATUS_TOO_LARGE) return 1;
     fprintf(stderr, "as it should be: %s\n", olbvh_last_error());
     check(olbvh_tree_build(mesh, NULL, &tree), "building the tree");
-    /* Handles keep what they were made from. */
+    /* A handle keeps alive what it was made from. */
     olbvh_mesh_free(mesh);
     olbvh_gpu_free(gpu);
     olbvh_tree_info_data info;

@@ -1,5 +1,6 @@
-/* A program with a Vulkan device of its own, on a queue family with compute. It records a tree, the ranges of a field, a picture and a slice into its own
- * command buffer and memory, submits once, and compares both with those of the calls that do everything themselves.
+/* A program with its own Vulkan device, on a queue family with compute. It records a tree, the ranges of a field, a
+ * picture and a slice into its own command buffer and memory, submits once, and compares picture and slice with those
+ * of the owning calls.
  *
  *     cc examples/record.c -Iinclude -Ltarget/release -lolbvh -lvulkan -o record && ./record 4
  */
@@ -18,7 +19,8 @@ static void vk(VkResult result, const char *what) {
     exit(1);
 }
 
-/* A buffer that the processor sees as well, which keeps this program short: a renderer has its memory where the device is fastest. */
+/* A buffer that the processor can access as well, which keeps this program short. A renderer would have its memory
+ * where the device is fastest. */
 static olbvh_buffer make_buffer(uint64_t bytes, VkBufferUsageFlags usage, void **mapped) {
     VkBufferCreateInfo info = {.sType = VK_STRUCTURE_TYPE_BUFFER_CREATE_INFO, .size = bytes};
     info.usage = usage | VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT;
@@ -40,7 +42,7 @@ static olbvh_buffer make_buffer(uint64_t bytes, VkBufferUsageFlags usage, void *
     vk(vkBindBufferMemory(device, buffer, held, 0), "vkBindBufferMemory");
     vk(vkMapMemory(device, held, 0, VK_WHOLE_SIZE, 0, mapped), "vkMapMemory");
     VkBufferDeviceAddressInfo of = {.sType = VK_STRUCTURE_TYPE_BUFFER_DEVICE_ADDRESS_INFO, .buffer = buffer};
-    /* The process ends with them: nothing is destroyed here. */
+    /* Buffers live as long as the process: nothing is destroyed here. */
     return (olbvh_buffer){.buffer = (uint64_t)(uintptr_t)buffer, .size = bytes, .address = vkGetBufferDeviceAddress(device, &of)};
 }
 
@@ -58,7 +60,7 @@ int main(int argc, char **argv) {
     if (!values) return 1;
     for (uint32_t i = 0; i < mesh_data.points; ++i) values[i] = mesh_data.place[3 * i] + mesh_data.place[3 * i + 2];
 
-    /* The program's own device. */
+    /* The program's own Vulkan device. */
     VkApplicationInfo application = {.sType = VK_STRUCTURE_TYPE_APPLICATION_INFO, .apiVersion = VK_API_VERSION_1_2};
     VkInstanceCreateInfo instance_info = {.sType = VK_STRUCTURE_TYPE_INSTANCE_CREATE_INFO, .pApplicationInfo = &application};
     VkInstance instance;
@@ -73,7 +75,7 @@ int main(int argc, char **argv) {
     VkDeviceQueueCreateInfo queues = {.sType = VK_STRUCTURE_TYPE_DEVICE_QUEUE_CREATE_INFO, .queueFamilyIndex = needs.queue_family, .queueCount = 1};
     queues.pQueuePriorities = &priority;
     VkPhysicalDeviceBufferDeviceAddressFeatures addresses = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_BUFFER_DEVICE_ADDRESS_FEATURES};
-    /* This program has buffers by address only; olbvh does without them, too. */
+    /* This program uses buffers by address only; olbvh also works without addresses. */
     addresses.bufferDeviceAddress = VK_TRUE;
     VkPhysicalDeviceSubgroupSizeControlFeatures control = {.sType = VK_STRUCTURE_TYPE_PHYSICAL_DEVICE_SUBGROUP_SIZE_CONTROL_FEATURES};
     control.subgroupSizeControl = control.computeFullSubgroups = VK_TRUE;
@@ -95,7 +97,7 @@ int main(int argc, char **argv) {
     VkCommandBuffer commands;
     vk(vkAllocateCommandBuffers(device, &commands_info, &commands), "vkAllocateCommandBuffers");
 
-    /* olbvh on it. */
+    /* olbvh on that device. */
     host.device = (uint64_t)(uintptr_t)device;
     host.queue = (uint64_t)(uintptr_t)queue;
     host.queue_family = needs.queue_family;
@@ -105,7 +107,7 @@ int main(int argc, char **argv) {
     olbvh_gpu *gpu = NULL;
     check(olbvh_gpu_from_host(&host, &gpu), "lending the device");
 
-    /* Sizes first: mesh and tree. */
+    /* Sizes come first: those of mesh and tree. */
     olbvh_plan plan = {.points = mesh_data.points, .stride = 3, .tets = mesh_data.tets, .level = 7, .build = olbvh_default_build_options()};
     olbvh_plan_sizes sizes;
     check(olbvh_plan_measure(gpu, &plan, &sizes), "measuring");
@@ -116,7 +118,7 @@ int main(int argc, char **argv) {
     olbvh_scene *scene = NULL;
     check(olbvh_scene_place(gpu, &plan, positions, cells, memory, scratch, &scene), "placing");
 
-    /* A picture that shows some values only, so that parts of the tree are skipped. */
+    /* A picture that shows only some values, so that parts of the tree are skipped. */
     char camera[96];
     snprintf(camera, sizeof camera, "eye=%u,%u,%u,target=%g,%g,%g", 4 * n, 3 * n, 2 * n, n / 2.0, n / 2.0, n / 2.0);
     olbvh_picture_settings settings = olbvh_default_picture_settings();
@@ -149,7 +151,7 @@ int main(int argc, char **argv) {
     slicing.memory = make_buffer(sliced.bytes, sizes.usage, &slice_bytes);
     check(olbvh_slicing_parts(&slicing, &sliced), "placing a slice");
 
-    /* Rehearsed first, so that the second time, in the command buffer, nothing is made. */
+    /* The recording is rehearsed first, so that nothing is created when it is recorded into the command buffer. */
     olbvh_recording *recording = NULL;
     check(olbvh_recording_new(gpu, &recording), "making a recording");
     VkCommandBufferBeginInfo begin = {.sType = VK_STRUCTURE_TYPE_COMMAND_BUFFER_BEGIN_INFO, .flags = VK_COMMAND_BUFFER_USAGE_ONE_TIME_SUBMIT_BIT};
@@ -172,7 +174,7 @@ int main(int argc, char **argv) {
     vk(vkQueueSubmit(queue, 1, &submission, VK_NULL_HANDLE), "vkQueueSubmit");
     vk(vkQueueWaitIdle(queue), "vkQueueWaitIdle");
 
-    /* The same by the convenient calls. */
+    /* The same results from the owning calls. */
     olbvh_mesh *mesh = NULL;
     olbvh_tree *tree = NULL;
     check(olbvh_mesh_upload(gpu, mesh_data.place, mesh_data.points, mesh_data.cells, mesh_data.tets, 0, &mesh), "uploading the mesh");

@@ -1,5 +1,5 @@
-// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners, value and gradient of a field, traversal with the
-// host's own predicates (the paper's Alg. 3).
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners of a point, value and
+// gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
 //
 //     #version 460
 //     #include "olbvh.glsl"                     first of all, since it enables extensions
@@ -10,11 +10,13 @@
 //     uint owner = olbvh_locate(place, 1e-5, weights);
 //     if (owner != OLBVH_NONE) value = olbvh_value(owner, weights);
 //
-// `tree` is the address of a SceneAddresses that the host filled (olbvh::glsl::SceneBuffers). On devices without buffer addresses define
-// OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET (0 unless defined) from binding OLBVH_BINDING (0) on,
-// in the order of SceneBuffers::list, and the argument of olbvh_open means nothing.
+// `tree` is the address of a SceneAddresses that the host has filled (olbvh::glsl::SceneBuffers). On devices without
+// buffer addresses, define OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET
+// (0 unless defined) from binding OLBVH_BINDING (0 unless defined) on, in the order of SceneBuffers::list, and the
+// argument of olbvh_open is ignored.
 //
-// What the crate exports is this file with its includes, all names beginning with olbvh_; src/glsl.rs has the guide.
+// The crate exports this file with its includes in place and with the prefix olbvh_ before all names. src/glsl.rs has
+// the guide.
 #ifndef OLBVH_GLSL
 #define OLBVH_GLSL
 #ifndef OLBVH_SET
@@ -37,7 +39,7 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint NONE = OLBVH_NONE;
-// Records of four words are read as they are; the kernels of the library have another way as well.
+// Records of four words are read as they are. Kernels of the library can also read them as two 64-bit words.
 uvec4 words(uvec4 record) { return record; }
 vec4 floats(vec4 record) { return record; }
 #include "shared/layout.glsl"
@@ -62,7 +64,7 @@ uint LISTS;
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
-// Names the tree that the functions below mean.
+// Selects the tree that the functions below use.
 void olbvh_open(uvec2 tree) {
 #ifndef OLBVH_DESCRIPTORS
     scene = sceneBlock(tree);
@@ -81,8 +83,9 @@ void olbvh_open(uvec2 tree) {
     LISTS = scene.at[0].lists;
 }
 
-// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and its barycentric coordinates in the order of the cell's vertices. A
-// point outside of the mesh is found if its smallest coordinate in the nearest cell is at least -tolerance.
+// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and the point's barycentric coordinates
+// in the order of the tetrahedron's vertices. A point outside of the mesh is found if its smallest coordinate in the
+// nearest tetrahedron is at least -tolerance.
 uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     weights_of_owner = vec4(0.0);
     Grid g = grid.at[0];
@@ -98,7 +101,8 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     return owner;
 }
 
-// Every tetrahedron that contains a point, the first OLBVH_OWNERS of them in `owners`; their number. In no order.
+// The number of tetrahedra that contain a point; `owners` receives the first OLBVH_OWNERS of them, in no particular
+// order.
 #ifndef OLBVH_OWNERS
 #define OLBVH_OWNERS 32
 #endif
@@ -127,14 +131,14 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
 
 float no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
 
-// Value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
+// The value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
     if (scene.at[0].has_field == 0u) return no_value();
     uvec4 v = words(cells.at[owner]);
     return dot(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
 }
 
-// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
+// The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
     if (scene.at[0].has_field == 0u) return vec3(no_value());
     uvec4 v = words(cells.at[owner]);
@@ -150,10 +154,11 @@ vec3 olbvh_gradient(uint owner) {
     return sum / six_volumes * grid.at[0].scale;
 }
 
-// Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
-//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
-//     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
-// olbvh_node_box gives a node's box, olbvh_entries the primitives of a leaf: ids at olbvh_primitive(i) for i in [x, y).
+// Traversal with the host's predicates: define OLBVH_TRAVERSE before the inclusion, and after it
+//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves; may become stricter during a traversal
+//     bool olbvh_visit_leaf(olbvh_Node node);  called for an accepted leaf; returns true to end the traversal
+// olbvh_node_box gives the box of a node, olbvh_entries the entries [x, y) of a leaf, and olbvh_primitive(i) the
+// tetrahedron of entry i.
 #ifdef OLBVH_TRAVERSE
 #ifndef OLBVH_STACK
 #define OLBVH_STACK 8
@@ -164,7 +169,7 @@ bool visit_leaf(Node node);
 #include "shared/traverse.glsl"
 #include "shared/boxes.glsl"
 
-// Visits the tree; false if it was too large to visit in one go (24,000 inner nodes).
+// Traverses the tree. Returns false if it has too many nodes to visit in one call (24,000 internal nodes).
 bool olbvh_traverse() { return traverse(grid.at[0].level); }
 
 void olbvh_node_box(Node node, out vec3 lo, out vec3 hi) { cell_box(grid.at[0], node.level, node.code, lo, hi); }

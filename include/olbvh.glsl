@@ -1,5 +1,5 @@
-// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners, value and gradient of a field, traversal with the
-// host's own predicates (the paper's Alg. 3).
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners of a point, value and
+// gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
 //
 //     #version 460
 //     #include "olbvh.glsl"                     first of all, since it enables extensions
@@ -10,11 +10,13 @@
 //     uint owner = olbvh_locate(place, 1e-5, weights);
 //     if (owner != OLBVH_NONE) value = olbvh_value(owner, weights);
 //
-// `tree` is the address of a SceneAddresses that the host filled (olbvh::glsl::SceneBuffers). On devices without buffer addresses define
-// OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET (0 unless defined) from binding OLBVH_BINDING (0) on,
-// in the order of SceneBuffers::list, and the argument of olbvh_open means nothing.
+// `tree` is the address of a SceneAddresses that the host has filled (olbvh::glsl::SceneBuffers). On devices without
+// buffer addresses, define OLBVH_DESCRIPTORS before the inclusion: the arrays are then storage buffers of set OLBVH_SET
+// (0 unless defined) from binding OLBVH_BINDING (0 unless defined) on, in the order of SceneBuffers::list, and the
+// argument of olbvh_open is ignored.
 //
-// What the crate exports is this file with its includes, all names beginning with olbvh_; src/glsl.rs has the guide.
+// The crate exports this file with its includes in place and with the prefix olbvh_ before all names. src/glsl.rs has
+// the guide.
 #ifndef OLBVH_GLSL
 #define OLBVH_GLSL
 #ifndef OLBVH_SET
@@ -37,10 +39,10 @@
 #define OLBVH_NONE 0xffffffffu
 
 const uint olbvh_NONE = OLBVH_NONE;
-// Records of four words are read as they are; the kernels of the library have another way as well.
+// Records of four words are read as they are. Kernels of the library can also read them as two 64-bit words.
 uvec4 olbvh_words(uvec4 record) { return record; }
 vec4 olbvh_floats(vec4 record) { return record; }
-// Every struct that host and device share; build.rs reflects this file into src/layout.rs, comments included.
+// The structs that host and device share. build.rs reflects this file into src/layout.rs, comments included.
 
 // The grid of a mesh (SPEC 2.1).
 struct olbvh_Grid {
@@ -51,93 +53,94 @@ struct olbvh_Grid {
     float scale;  // Power of two that brings the largest extent into [1, 2).
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
-    uint ids;     // Bits of an entry of P that are its primitive; those above are its quarters, if there are any.
+    uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
 };
 
-// What is known of a mesh once it lies on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
+// What is known about a mesh on the device (SPEC 2.1, 2.3). Counters are zeroed before use.
 struct olbvh_MeshStatus {
-    uint lo[3];     // Lower corner of the bounds as ordered keys (complemented, so that zeroes mean nothing seen).
+    uint lo[3];     // Lower corner of the bounds as ordered keys, complemented, so that 0 means: no vertex yet.
     uint hi[3];     // Upper corner of the bounds as ordered keys.
-    uint bad;       // Tetrahedra left out: index out of range, repeated vertex, coordinate not finite.
+    uint bad;       // Bad tetrahedra: index out of range, repeated vertex, or coordinate not finite.
     uint boundary;  // Boundary tetrahedra.
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
-    uint overflow;  // Not 0: the table of faces was too small; never happens with the planned size.
+    uint overflow;  // Not 0: the table of faces was too small. Never happens with the planned size.
     uint pad;       // Unused.
 };
 
-// What a build made (SPEC 2.4, 2.5).
+// The result of a build (SPEC 2.4, 2.5).
 struct olbvh_BuildStatus {
     uint level;            // Level of the leaves, l.
-    uint heuristic_level;  // Level that the heuristic chose; above `level` where a capacity clipped it.
-    uint candidates;       // Cells within the quantized boxes of all tetrahedra, the entries of `Aabb`.
-    uint entries;          // n_m.
-    uint nodes;            // n_n.
-    uint internal;         // n_ni.
+    uint heuristic_level;  // Level that the heuristic chose; larger than `level` where a capacity lowered it.
+    uint candidates;       // Cells in the quantized boxes of all tetrahedra, which are the entries with `Aabb`.
+    uint entries;          // Number of entries, n_m.
+    uint nodes;            // Number of nodes, n_n.
+    uint internal;         // Number of internal nodes, n_ni.
     uint leaves;           // Nodes on the last level.
     uint boundary_leaves;  // Leaves with the boundary flag.
     uint longest_leaf;     // Entries of the longest leaf.
     uint pad;              // Unused.
     uint sum[2];           // Sum of the estimates of Eq. 11, low word first.
-    uint total[22];        // Entries of `Aabb` on every level, low word first.
-    uint levels[11];       // NO: nodes on levels 0 to k.
-    uint overflow;         // Not 0: a capacity was exceeded, which a planned one never is, or a budget is below the root alone.
+    uint total[22];        // Candidates of every level, low word first.
+    uint levels[11];       // NO: element k is the number of nodes on levels 0 to k.
+    uint overflow;         // Not 0: a capacity was exceeded (never a planned one), or the budget cannot hold a root.
 };
 
-// What is seen and how, besides mesh, tree and field; see src/render.
+// The view of a picture, without mesh, tree and field; see src/render.
 struct olbvh_RenderView {
     vec4 origin;     // Origin of the ray of pixel (0, 0).
-    vec4 origin_x;   // What one pixel to the right adds to it.
-    vec4 origin_y;   // What one pixel down adds to it.
+    vec4 origin_x;   // What one pixel to the right adds to the origin.
+    vec4 origin_y;   // What one pixel down adds to the origin.
     vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
-    vec4 direction_x;      // What one pixel to the right adds to it.
-    vec4 direction_y;      // What one pixel down adds to it.
+    vec4 direction_x;      // What one pixel to the right adds to the direction.
+    vec4 direction_y;      // What one pixel down adds to the direction.
     vec4 to_light;   // Unit vector to the light.
-    vec4 strength;   // Of light: ambient, diffuse, specular; opacity of one step at a rim.
-    float step_size; // Distance of two samples.
-    float inverse_step; // Its reciprocal, rounded on the host.
+    vec4 strength;   // Strength of ambient, diffuse and specular light; opacity of one step at a rim.
+    float step_size; // Distance between two samples.
+    float inverse_step; // Reciprocal of `step_size`, rounded on the host.
     float value_lo;  // Value at place 0 of the table.
-    float value_scale; // Places per unit of value.
+    float value_scale; // Places of the table per unit of value.
     float termination; // A ray ends once it is this opaque.
-    uint isos;       // Values of iso-surfaces.
+    uint isos;       // Number of iso-surfaces.
     uint pad[2];     // Unused.
-    float iso[8];    // Those values, ascending.
+    float iso[8];    // Values of the iso-surfaces, ascending.
 };
 
-// What is worked out of a view on the device.
+// What the device computes from a view.
 struct olbvh_RenderPlan {
-    vec4 slack;      // Boxes are larger by this, so that rounding loses no sample.
+    vec4 slack;      // Boxes are enlarged by this, so that rounding loses no sample.
     uint size[2];    // Width and height in pixels.
-    uint visible_at; // Words of the flags before the marks of visible nodes, where there are any.
-    uint row;        // Row of the view that is the first one here.
-    uint first_cell; // The first cell of the finest grid whose samples are taken, 10 bits per axis, x lowest.
-    uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
+    uint visible_at; // Word of the flags where the marks of visible nodes start, if there are any.
+    uint row;        // Row of the view that is the first row of this picture.
+    uint first_cell; // First cell of the finest grid whose samples are taken, 10 bits per axis, x lowest.
+    uint last_cell;  // Last such cell. The box of the two cells contains a block of the mesh, or all of it.
     uint pad[2];     // Unused.
 };
 
-// Where the march of a ray stands between two dispatches.
+// State of the march along a ray between two dispatches.
 struct olbvh_RayState {
     uint next;      // Number of the next sample.
     uint end;       // One past the last sample.
-    uint hint;      // Cell of the last sample found, or all ones.
+    uint hint;      // Tetrahedron of the last sample found, or `NONE`.
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
-    uint best;      // Best candidate among them, or all ones.
-    float smallest; // Its smallest barycentric coordinate.
-    uint last;      // Bits of the value at the last sample, for iso-surfaces; all ones where it has none.
-    uint check;     // From this sample on the tree is asked whether there is anything to see; the two top bits, which no sample needs, tell of the best candidate.
+    uint best;      // Best candidate owner among them, or `NONE`.
+    float smallest; // Smallest barycentric coordinate of the best candidate.
+    uint last;      // Bits of the value at the last sample, for iso-surfaces; `NONE` if it has none.
+    uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };
 
-// Counters of a picture; 64 bits as two words, low first.
+// Counters of a picture. Counters of 64 bits are two words, the low one first.
 struct olbvh_RenderStatus {
     uint samples[2]; // Samples taken.
     uint found[2];   // Samples in the mesh.
-    uint skipped[2]; // Samples not taken, in nodes where nothing is to be seen.
+    uint skipped[2]; // Samples not taken, in nodes without anything visible.
     uint unfinished; // Rays that need another round.
     uint pad;        // Unused.
 };
 
-// A node of the binary tree of the baseline (Apetrei 2014): internal node i splits the sorted primitives behind place i. References to children: bit 31
-// says that the rest is a place in the sorted primitives, bit 30 that a boundary primitive is below, the rest is an internal node or that place.
+// A node of the baseline's binary tree (Apetrei 2014). Internal node i splits the sorted tetrahedra after place i. In a
+// reference to a child, bit 31 says that the lower bits are a place among the sorted tetrahedra, not an internal node,
+// and bit 30 that a boundary tetrahedron is below.
 struct olbvh_LbvhNode {
     float lo[3];   // Lower corner of the box in normalised coordinates.
     uint left;     // Reference to the left child.
@@ -147,7 +150,7 @@ struct olbvh_LbvhNode {
 
 // A stack of layers of voxels over a mesh; see src/slicing.
 struct olbvh_SlicePlan {
-    uint listed; // Voxels of the band whose centre lies in no cell. First of all, since it is bound by itself.
+    uint listed; // Voxels of the band whose centre lies in no tetrahedron. First member, since bound by itself.
     uint pad0;   // Unused.
     uint pad1;   // Unused.
     uint pad2;   // Unused.
@@ -155,55 +158,56 @@ struct olbvh_SlicePlan {
     vec4 across; // From one voxel of a row to the next.
     vec4 down;   // From one row to the next.
     vec4 up;     // From one layer to the next.
-    vec4 half0;  // Half axis of a voxel's box in normalised coordinates, along the row.
-    vec4 half1;  // The same from row to row.
-    vec4 half2;  // The same from layer to layer.
+    vec4 half0;  // Half axis of a voxel's box along the row, in normalised coordinates.
+    vec4 half1;  // Half axis of the box from row to row.
+    vec4 half2;  // Half axis of the box from layer to layer.
     vec4 reach;  // Half extent of a voxel's box along the axes in the units of the mesh, and a little more.
     uint width;  // Voxels per row.
     uint height; // Rows of a layer.
-    uint layer;  // Layer of the first row of the band: those rows that are sliced now.
-    uint first;  // Number of that row in the layer.
+    uint layer;  // Layer of the first row of the band, the rows that are sliced now.
+    uint first;  // Number of that row in its layer.
     uint rows;   // Rows of the band.
-    uint refused; // 1: boxes are flat; 2: they are more than twice as large as the mesh; else 0.
-    uint first_cell; // The first cell of the finest grid that is looked at, 10 bits per axis, x lowest.
-    uint last_cell;  // The last one; between them lies a block of the mesh, or all of it.
+    uint refused; // 1: boxes are flat; 2: boxes are more than twice as large as the mesh; else 0.
+    uint first_cell; // First cell of the finest grid that is searched, 10 bits per axis, x lowest.
+    uint last_cell;  // Last such cell. The box of the two cells contains a block of the mesh, or all of it.
 };
 
-// Where the search for the primitive closest to a voxel stands between two dispatches.
+// State of the search for the tetrahedron closest to a voxel between two dispatches.
 struct olbvh_TouchState {
-    uint code;    // Morton code of the leaf to go on with; all ones: done.
-    uint entry;   // Entries of that leaf already seen.
-    uint owner;   // Closest primitive so far, or all ones.
-    float square; // Its squared distance.
+    uint code;    // Morton code of the leaf to resume at; `NONE`: done.
+    uint entry;   // Entries of that leaf already tested.
+    uint owner;   // Closest tetrahedron so far, or `NONE`.
+    float square; // Squared distance of that tetrahedron.
     uint voxel;   // Number of the voxel in the band.
 };
 
-// Where the location of a run of voxels stands between two dispatches.
+// State of the location of a run of voxels between two dispatches.
 struct olbvh_RunState {
     uint next;      // Number of the next voxel in the run.
-    uint hint;      // Cell of the last voxel found, or all ones.
-    uint cursor;    // Candidates of the current leaf already tested.
-    uint best;      // Best candidate so far, or all ones.
-    uint in_box;    // Whether the best one's box holds the centre.
-    float smallest; // Its smallest barycentric coordinate.
-    uint inside;    // Voxels with their centre in a cell.
-    uint waiting;   // Voxels whose boxes must be looked at and have not been listed.
+    uint hint;      // Tetrahedron of the last voxel found, or `NONE`.
+    uint cursor;    // Entries of the current leaf already tested.
+    uint best;      // Best candidate owner so far, or `NONE`.
+    uint in_box;    // Flags of the best candidate: its box contains the centre (bit 0); it does itself (bit 1).
+    float smallest; // Smallest barycentric coordinate of the best candidate.
+    uint inside;    // Voxels with their centre in a tetrahedron.
+    uint waiting;   // Voxels whose boxes must be tested and have not been listed yet.
 };
 
-// What has become of a slice.
+// Progress and result of slicing.
 struct olbvh_SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
-    uint touching; // Voxels whose boxes need another round; they are looked at once no centre does.
-    uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2); all voxels are empty then.
-    uint inside;   // Voxels with their centre in the mesh; counted once all centres are located.
-    uint touched;  // Voxels that the mesh merely touches; counted once all boxes are looked at.
-    uint empty;    // Voxels that it does not, and until then those that it may touch.
+    uint touching; // Voxels whose boxes need another round. Boxes are tested once all centres are located.
+    uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2), and all voxels are empty.
+    uint inside;   // Voxels with their centre in the mesh. Counted once all centres are located.
+    uint touched;  // Voxels that the mesh only touches. Counted once all boxes are tested.
+    uint empty;    // Voxels that it does not touch and, until all boxes are tested, those that it may touch.
 };
 
-// The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see src/reference/overlap.rs.
+// The cells of a tree in the frame common to two meshes, the normalised coordinates of their joint grid; see
+// src/reference/overlap.rs.
 struct olbvh_NodeFrame {
     vec4 corner;    // Lower corner of the tree's bounds.
-    vec4 half_size; // Half the tree's bounds.
+    vec4 half_size; // Half the size of the tree's bounds.
     vec4 flat_axis; // 1 where an axis is flat to the quantization, else 0.
     vec4 joint_lo;  // Lower corner of the joint grid in the units of the meshes.
     float scale;    // Scale of the joint grid.
@@ -212,43 +216,44 @@ struct olbvh_NodeFrame {
     uint pad2;      // Unused.
 };
 
-// Counters of one direction of an overlap; 64 bits as two words, low first. Those that are zeroed between rounds lie 16 bytes behind the one that
-// dispatches are sized by, since a descriptor of a word covers as much.
+// Counters of one direction of an overlap. Counters of 64 bits are two words, the low one first. Those that are zeroed
+// between rounds lie 16 bytes after `waiting`, by which dispatches are sized, since the descriptor of one word covers
+// 16 bytes.
 struct olbvh_OverlapStatus {
-    uint waiting;    // Primitives that need a search.
-    uint by_vertex;  // Primitives with a vertex in the other mesh, or around one of its vertices.
-    uint by_node;    // Primitives that touch a non-boundary node of the other tree.
+    uint waiting;    // Tetrahedra that need a search.
+    uint by_vertex;  // Tetrahedra with a vertex in the other mesh, or that contain one of its vertices.
+    uint by_node;    // Tetrahedra that touch a non-boundary node of the other tree.
     uint located;    // Vertices that had to be looked up in the list of a leaf.
-    uint unfinished; // Primitives that need another dispatch.
-    uint unfilled;   // Primitives whose pairs need another dispatch to be written; at least 1 as long as pairs are being counted.
+    uint unfinished; // Tetrahedra that need another dispatch.
+    uint unfilled;   // Tetrahedra whose pairs need another dispatch to be written; not 0 while pairs are counted.
     uint narrow[2];  // Tests of two tetrahedra by separating axes.
     uint pairs[2];   // Pairs that touch.
     uint empty;      // Not 0: one of the meshes has no valid tetrahedron, so nothing intersects.
     uint pad;        // Unused.
 };
 
-// Where the search of a primitive stands between two dispatches.
+// State of the search of a tetrahedron between two dispatches.
 struct olbvh_SearchState {
-    uint code;  // Morton code of the leaf to go on with; all ones: done.
-    uint entry; // Entries of that leaf already seen.
-    uint phase; // 0: non-boundary nodes; 1: lists. Of pairs, 0: counted; 1: written.
+    uint code;  // Morton code of the leaf to resume at; `NONE`: done.
+    uint entry; // Entries of that leaf already tested.
+    uint phase; // 0: non-boundary nodes; 1: lists. For pairs, 0: counting; 1: writing.
     uint place; // Pairs found so far, or where the next one goes.
 };
 
-// Where a mesh and its tree lie, for the shaders of other programs: device addresses, low word first. See src/glsl.rs.
+// Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.
 struct olbvh_SceneAddresses {
     uvec2 grid;       // Grid with the level of the leaves.
     uvec2 masks;      // Child masks.
     uvec2 co;         // Child offsets.
-    uvec2 po;         // Primitive offsets of the leaves.
-    uvec2 p;          // Primitive ids.
+    uvec2 po;         // Offsets of the leaves in `p`.
+    uvec2 p;          // Entries: ids of tetrahedra, and their quarters above them.
     uvec2 flags;      // Boundary flags.
     uvec2 cells;      // Vertex indices.
     uvec2 vertices;   // Normalised coordinates.
     uvec2 neighbours; // Neighbour table.
-    uvec2 field;      // One float per point, or anything where no field is asked for.
+    uvec2 field;      // One float per point; any address if there is no field.
     uint lists;       // 1: leaves within the mesh have a seed instead of a list.
-    uint has_field;   // Not 0: `field` is one.
+    uint has_field;   // Not 0: there is a field.
 };
 
 OLBVH_BUFFER(0, 8, olbvh_SceneAddresses, olbvh_scene)
@@ -264,17 +269,17 @@ OLBVH_BUFFER(9, 16, uvec4, olbvh_neighbours)
 OLBVH_BUFFER(10, 4, float, olbvh_field)
 uint olbvh_LISTS;
 
-// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs: the same operations in the same order.
+// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs; the operations and their order are the same.
 
 const uint olbvh_MAX_LEVEL = 10u;
 
 float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
-// x without denormals.
+// x, or 0 if it is denormal.
 float olbvh_canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
-// The whole part of x in [0, 2^23), from the bits of a sum: drivers for CPUs convert lane by lane, with tests for what no integer is. Of other x, any word
-// below 2^23.
+// The integer part of x in [0, 2^23), taken from the bits of a sum, since drivers for CPUs convert floats lane by lane,
+// with tests for values that are no integers. For other x, any word below 2^23.
 uint olbvh_whole_of(float x) {
     precise float sum = floor(x) + 8388608.0;
     return floatBitsToUint(sum) & 0x7fffffu;
@@ -286,29 +291,29 @@ vec3 olbvh_from_corner(olbvh_Grid g, vec3 x) {
     return vec3(olbvh_canonical(d.x), olbvh_canonical(d.y), olbvh_canonical(d.z));
 }
 
-// Far outside of the bounds, or not a number: no mesh can be there.
+// Whether x may lie in a mesh: false far outside of the bounds, and for NaN.
 bool olbvh_near_bounds(olbvh_Grid g, vec3 x) {
     precise vec3 t = olbvh_from_corner(g, x) * g.scale;
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid at so many of its cells from the lower corner, clamped into the grid.
+// The cell of the finest grid at this distance from the lower corner, in cells of that grid, clamped into the grid.
 uvec3 olbvh_cell_at(vec3 q) {
     vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
     return min(uvec3(olbvh_whole_of(r.x), olbvh_whole_of(r.y), olbvh_whole_of(r.z)), 1023u);
 }
 
-// Cell of the finest grid that a point lies in, clamped into the grid.
+// The cell of the finest grid that contains a point, clamped into the grid.
 uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     precise vec3 q = olbvh_from_corner(g, x) * g.inv.xyz;
     return olbvh_cell_at(q);
 }
 
-// A finest cell in one word.
+// Packs a cell of the finest grid into one word, and unpacks it.
 uint olbvh_pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
 uvec3 olbvh_unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }
 
-// Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
+// Normalised coordinates: multiples of 2^-42, with the largest extent of the mesh in [2^40, 2^41).
 vec3 olbvh_normalise(olbvh_Grid g, vec3 x) {
     precise vec3 unit = olbvh_from_corner(g, x) * g.scale;
     unit = vec3(olbvh_canonical(unit.x), olbvh_canonical(unit.y), olbvh_canonical(unit.z));
@@ -347,8 +352,8 @@ float olbvh_reciprocal(float x) {
     }
     return x < 0.0 ? -r : r;
 }
-// Orientation, containment, barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of src/reference/tet.rs: the
-// same operations in the same order.
+// Orientation, containment and barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of
+// src/reference/tet.rs; the operations and their order are the same.
 
 vec3 olbvh_cross_product(vec3 a, vec3 b) {
     precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
@@ -371,7 +376,7 @@ float olbvh_orient(vec3 a, vec3 b, vec3 c, vec3 olbvh_p) {
 // A tetrahedron with its vertices in ascending global index.
 struct olbvh_Tet {
     vec3 v[4];
-    uvec4 rank; // place in v of each vertex as the caller numbered them
+    uvec4 rank; // place in v of each vertex in the caller's order
 };
 
 // A point relative to a tetrahedron.
@@ -379,12 +384,12 @@ struct olbvh_Weights {
     vec4 w;      // signed volumes opposite to the vertices in ascending index, positive inside
     float sum;
     bool in_box; // inside the closed box of the vertices
-    bool inside; // the closed, not flat cell holds the point
-    bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
-    float margin; // of the cell, see Bounds
+    bool inside; // the closed tetrahedron contains the point, and is not flat
+    bool clear;  // inside by more than the margin, so that rounding cannot put the point into a neighbour as well
+    float margin; // of the tetrahedron, see Bounds
 };
 
-// Ascending places of four different vertex indices.
+// The place of each of four different vertex indices in ascending order.
 uvec4 olbvh_ranks(uvec4 ids) {
     uint yx = uint(ids.y < ids.x), zx = uint(ids.z < ids.x), wx = uint(ids.w < ids.x);
     uint zy = uint(ids.z < ids.y), wy = uint(ids.w < ids.y), wz = uint(ids.w < ids.z);
@@ -395,7 +400,7 @@ vec3 olbvh_select_rank(uvec4 rank, uint r, vec3 a, vec3 b, vec3 c, vec3 d) {
     return rank.x == r ? a : rank.y == r ? b : rank.z == r ? c : d;
 }
 
-// From corners in the caller's order.
+// A Tet from corners in the caller's order.
 olbvh_Tet olbvh_make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
     olbvh_Tet t;
     t.rank = olbvh_ranks(ids);
@@ -405,14 +410,16 @@ olbvh_Tet olbvh_make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
 
 float olbvh_volume(olbvh_Tet t) { return olbvh_orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
 
-// The box of a tetrahedron, and its margin: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+// The box of a tetrahedron, and its margin: if a weight is this close to 0, rounding may have put the point on either
+// side of the face.
 struct olbvh_Bounds {
     vec3 lo;
     vec3 hi;
     float margin;
 };
 
-// Of coordinates, which are not negative and thus in the order of their bits: integers need no care for NaN.
+// Minimum and maximum of coordinates. These are not negative, so their order is that of their bits, and integer
+// operations need no care for NaN.
 vec3 olbvh_smaller(vec3 a, vec3 b) { return uintBitsToFloat(min(floatBitsToUint(a), floatBitsToUint(b))); }
 vec3 olbvh_larger(vec3 a, vec3 b) { return uintBitsToFloat(max(floatBitsToUint(a), floatBitsToUint(b))); }
 
@@ -446,10 +453,10 @@ olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
 
 float olbvh_least_of(vec4 w) { return min(min(w.x, w.y), min(w.z, w.w)); }
 
-// Whether no face says outside by more than the margin.
+// Whether the point lies outside of no face by more than the margin.
 bool olbvh_near(olbvh_Weights r) { return olbvh_least_of(r.w) >= -r.margin; }
 
-// Whether the point is that near to one face, and inside of all others by more.
+// Whether the point is within the margin of one face, and inside of all others by more than the margin.
 bool olbvh_near_one_face(olbvh_Weights r) {
     uvec4 close = uvec4(lessThanEqual(r.w, vec4(r.margin)));
     return olbvh_near(r) && close.x + close.y + close.z + close.w == 1u;
@@ -458,19 +465,20 @@ bool olbvh_near_one_face(olbvh_Weights r) {
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 olbvh_own_weights(olbvh_Weights w, olbvh_Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
 
-// The face that says outside most.
+// The face with the smallest weight: the one that the point lies farthest outside of.
 uint olbvh_outermost(vec4 own) {
     uint face = 0u;
     for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
     return face;
 }
 
-// What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
+// What a step of a walk needs. It is cheaper than `weights`, but by rounding, two neighbours may disagree on which side
+// of their shared face a point lies.
 struct olbvh_Sides {
-    vec4 w;     // as in Weights, opposite to the vertices in their order here
-    float sum;  // of them
+    vec4 w;     // as in Weights, opposite to the vertices in the order given
+    float sum;  // of the weights
     bool clear; // as in Weights
-    bool near;  // no face says outside by more than the margin
+    bool near;  // outside of no face by more than the margin
 };
 
 olbvh_Sides olbvh_sides_of(vec3 v[4], olbvh_Bounds box, vec3 olbvh_p) {
@@ -493,21 +501,22 @@ vec4 olbvh_barycentric(olbvh_Sides r) {
     return b;
 }
 
-// The same of any point, in the caller's order: what an owner comes with, whatever found it.
+// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found.
 vec4 olbvh_barycentric(olbvh_Tet t, vec3 olbvh_p) {
     vec4 b = olbvh_barycentric(olbvh_sides_of(t.v, olbvh_bounds_of(t.v), olbvh_p));
     return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
 }
 
-// What has these values at the corners, at barycentric coordinates.
+// The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.
 float olbvh_weighed(vec4 b, vec4 at_corners) {
-    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    precise vec3 beside = at_corners.xyz - at_corners.w;
+    precise float r = ((b.x * beside.x + b.y * beside.y) + b.z * beside.z) + at_corners.w;
     return r;
 }
 
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
 
-// Smallest barycentric coordinate; the smallest float for a flat cell.
+// Smallest barycentric coordinate; SMALLEST_FLOAT for a flat tetrahedron.
 float olbvh_smallest(olbvh_Weights r) {
     if (r.sum <= 0.0) return olbvh_SMALLEST_FLOAT;
     precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * olbvh_reciprocal(r.sum);
@@ -526,16 +535,18 @@ struct olbvh_Node {
     uint level;
     uint code; // Morton code of its cell at that level
 };
-// A tree as queries see it (SPEC 2.5). The including kernel declares: grid, masks, co, po, p, and where used flags, cells, vertices.
+// A tree as queries see it (SPEC 2.5). The including kernel declares grid, masks, co, po, p and, where used, flags,
+// cells, vertices.
 
 // The children of a node. The including kernel declares masks and co.
 
-// Of an internal node the children that there are; of a leaf the octants that its primitives come near to, by the same digits.
+// One bit per 3-bit Morton digit: the children that an internal node has, or the octants of a leaf that its tetrahedra
+// are near.
 uint olbvh_child_mask(uint node) { return olbvh_masks.at[node >> 2u] >> (8u * (node & 3u)) & 0xffu; }
 
 uint olbvh_child_of(uint node, uint mask, uint digit) { return olbvh_co.at[node] + 1u + bitCount(mask & ((1u << digit) - 1u)); }
 
-// The node of a cell of `level`, found below `node` of level `from`; NONE if there is none.
+// The node of the cell with Morton code `code` on `level`, found below `node` of level `from`; NONE if there is none.
 uint olbvh_find_node(uint node, uint from, uint level, uint code) {
     for (uint k = level - from; k > 0u; --k) {
         uint digit = code >> (3u * (k - 1u)) & 7u, mask = olbvh_child_mask(node);
@@ -545,15 +556,16 @@ uint olbvh_find_node(uint node, uint from, uint level, uint code) {
     return node;
 }
 
-// The leaf that stands for a cell of the finest grid, by descent over child masks; NONE if there is none, or none of its primitives is near the cell.
+// The leaf that contains a cell of the finest grid, found by descent over child masks. NONE if there is none, or if
+// none of its tetrahedra is near the cell.
 uint olbvh_find_leaf(uint level, uvec3 finest) {
     uint code = olbvh_morton(finest), leaf = olbvh_find_node(0u, 0u, level, code >> (3u * (olbvh_MAX_LEVEL - level)));
     if (leaf == olbvh_NONE || level == olbvh_MAX_LEVEL) return leaf;
     return (olbvh_child_mask(leaf) >> (code >> (3u * (olbvh_MAX_LEVEL - 1u - level)) & 7u) & 1u) != 0u ? leaf : olbvh_NONE;
 }
 
-// The level of the largest cell around one of the finest grid, given by its code, that no primitive comes near to: a node that there is not, or an octant of a
-// leaf; 0 if there is none.
+// The level of the largest cell around a finest-grid cell, given by its code, that no tetrahedron is near: a missing
+// node, or an octant of a leaf. 0 if there is none.
 uint olbvh_empty_level(uint level, uint code) {
     uint node = 0u;
     for (uint at = 1u; at <= min(level + 1u, olbvh_MAX_LEVEL); ++at) {
@@ -564,41 +576,46 @@ uint olbvh_empty_level(uint level, uint code) {
     return 0u;
 }
 
-// The primitive of an entry; the bits above are quarters.
+// The tetrahedron of an entry; the bits above it are quarters.
 uint olbvh_listed_tet(uint entry) { return olbvh_p.at[entry] & olbvh_grid.at[0].ids; }
 
-// First entry of a leaf and the one behind its last.
+// The first entry of a leaf, and one past its last.
 uvec2 olbvh_entry_range(uint leaf) {
     uint i = leaf - olbvh_grid.at[0].first_leaf;
     return uvec2(olbvh_po.at[i], olbvh_po.at[i + 1u]);
 }
-// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
 
-// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
+// Whether the tree holds nothing: one without tetrahedra, or one that did not fit.
+bool olbvh_is_empty_tree(uint level) { return level == 0u ? olbvh_entry_range(0u).y == 0u : olbvh_child_mask(0u) == 0u; }
+// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl,
+// and flags, cells, vertices.
+
+// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl and vertices.
 
 olbvh_Tet olbvh_load_tet(uvec4 ids) {
     return olbvh_make_tet(ids, olbvh_floats(olbvh_vertices.at[ids.x]).xyz, olbvh_floats(olbvh_vertices.at[ids.y]).xyz, olbvh_floats(olbvh_vertices.at[ids.z]).xyz, olbvh_floats(olbvh_vertices.at[ids.w]).xyz);
 }
 
-// The quarters of its leaf's cell that an entry is near to, a bit each, axis by axis, in the top bits of its word in P; halves, where ids leave fewer bits.
-// Twin of src/reference/quarters.rs, which explains it. Needs grid.glsl.
+// The quarters of its leaf's cell that an entry is near, one bit each, axis by axis, in the top bits of its word in P;
+// or the halves, where ids leave fewer bits. Twin of src/reference/quarters.rs, which explains them. Needs grid.glsl.
 const uint olbvh_ALL_OCTANTS = 0xffu;
 
 uint olbvh_id_bits(olbvh_Grid g) { return uint(bitCount(g.ids)); }
 
-// How often a leaf's cell is cut in two along each axis: not beyond finest cells.
+// How often a leaf's cell is halved along each axis. Cells of the finest grid are not cut.
 uint olbvh_cuts(olbvh_Grid g) { return min((32u - olbvh_id_bits(g)) / 6u, olbvh_MAX_LEVEL - g.level); }
 
-// By how many finest cells per axis boxes grow: by all of them where normalised coordinates are too coarse to tell those cells apart.
+// By how many finest-grid cells boxes grow along each axis: by `least`, or by all cells where normalised coordinates
+// are too coarse to tell these cells apart.
 uvec3 olbvh_reach_of(olbvh_Grid g, uint least) { return mix(uvec3(least), uvec3(1024u), lessThan(g.extent.xyz, vec3(olbvh_two_to(-30)))); }
 
-// Quarters of each axis as they stand in an entry.
+// The quarters of each axis, packed as in an entry.
 uint olbvh_in_entry(olbvh_Grid g, uvec3 quarters) {
     uint n = olbvh_cuts(g), width = 1u << n;
     return n == 0u ? 0u : (quarters.x | quarters.y << width | quarters.z << 2u * width) << olbvh_id_bits(g);
 }
 
-// Those of a leaf's cell that the box of finest cells [lo, hi] meets, or is nearest to.
+// The quarters of a leaf's cell that the box of finest-grid cells [lo, hi] meets, or else is nearest to.
 uvec3 olbvh_quarters_met(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
     uint n = olbvh_cuts(g), shift = olbvh_MAX_LEVEL - g.level - n;
     uvec3 first = olbvh_unmorton(code) << n, last = first + ((1u << n) - 1u);
@@ -606,26 +623,27 @@ uvec3 olbvh_quarters_met(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
     return (uvec3(2u) << to) - (uvec3(1u) << from);
 }
 
-// Those that it meets once it has grown, as they stand in an entry.
+// The quarters that the box meets once it has grown, packed as in an entry.
 uint olbvh_quarters_near(olbvh_Grid g, uint code, uvec3 lo, uvec3 hi) {
     uvec3 reach = olbvh_reach_of(g, 1u);
     return olbvh_in_entry(g, olbvh_quarters_met(g, code, lo - min(lo, reach), hi + reach));
 }
 
-// Those around a finest cell.
+// The quarters that contain a finest-grid cell, packed as in an entry.
 uint olbvh_quarters_around(olbvh_Grid g, uvec3 cell) {
     uint n = olbvh_cuts(g);
     return olbvh_in_entry(g, uvec3(1u) << (cell >> olbvh_MAX_LEVEL - g.level - n & (1u << n) - 1u));
 }
 
-// A bit for each octant, that is 3-bit Morton digit, in these halves of each axis: 1 the lower one, 2 the upper.
+// One bit per octant (3-bit Morton digit) that lies in these halves of each axis: 1 is the lower half, 2 the upper, 3
+// both.
 uint olbvh_octants_of(uvec3 halves) {
     uint x = (halves.x & 1u) * 0x0fu | (halves.x >> 1u) * 0xf0u;
     uint y = (halves.y & 1u) * 0x33u | (halves.y >> 1u) * 0xccu;
     return x & y & ((halves.z & 1u) * 0x55u | (halves.z >> 1u) * 0xaau);
 }
 
-// The octants of its leaf's cell that an entry is near to.
+// The octants of its leaf's cell that an entry is near.
 uint olbvh_octants_near(olbvh_Grid g, uint entry) {
     uint n = olbvh_cuts(g), width = 1u << n;
     if (n == 0u) return olbvh_ALL_OCTANTS;
@@ -635,14 +653,15 @@ uint olbvh_octants_near(olbvh_Grid g, uint entry) {
     return olbvh_octants_of(uvec3(notEqual(each & lower, uvec3(0u))) + 2u * uvec3(greaterThan(each, uvec3(lower))));
 }
 
-// A point that an owner is sought for.
+// A point whose owner is searched for.
 struct olbvh_Sought {
     vec3 x;             // in normalised coordinates
-    uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
-    uint quarters;      // of the leaf that it lies in
+    uvec3 least, most;  // range of finest-grid cells that the box of an owner must meet
+    uint quarters;      // quarters of its leaf's cell that contain it, packed as in an entry; 0: not tested
 };
 
-// That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
+// The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
+// tetrahedron's box by at most 3 t times the size of the box.
 olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = olbvh_quantize(g, at);
     uint least = 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
@@ -650,14 +669,15 @@ olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : olbvh_quarters_around(g, cell));
 }
 
-// Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
+// Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
+// cell of the finest grid.
 bool olbvh_is_near(uvec4 ids, olbvh_Sought s) {
     uvec3 a = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.x]).w)), b = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.y]).w));
     uvec3 c = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.z]).w)), d = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.w]).w));
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 
-// The best of the candidates so far.
+// The best candidate owner so far.
 struct olbvh_Best {
     uint owner; // NONE: none yet
     bool inside;
@@ -667,8 +687,9 @@ struct olbvh_Best {
 
 olbvh_Best olbvh_no_best() { return olbvh_Best(olbvh_NONE, false, false, olbvh_SMALLEST_FLOAT); }
 
-// Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
-// smallest barycentric coordinate, then the lowest id. Flat cells never.
+// Takes candidate t if it is better. Tetrahedra that contain the point come first, ordered by id; then those whose box
+// contains it; then those with a larger smallest barycentric coordinate; then those with a lower id. Flat tetrahedra
+// are never taken.
 void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights w) {
     if (w.inside) {
         if (!best.inside || t < best.owner) best = olbvh_Best(t, true, true, 0.0);
@@ -681,15 +702,16 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
 
-// Of up to 32 entries from `begin` on, those before `end` that are in the quarters of the leaf's cell, a bit each. Most are not, nor are most of those near;
-// each test is made for all of them before the next, so that invocations wait for each other less.
+// Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
+// one bit each. Most entries fail this test, and most of the others fail that of `near_of`. Each test is done for all
+// entries before the next test, so that invocations wait less for each other.
 uint olbvh_in_quarters(uint begin, uint end, olbvh_Sought s) {
     uint count = min(32u, end - begin), left = 0u;
     for (uint k = 0u; k < count; ++k) left |= uint((olbvh_p.at[begin + k] & s.quarters) == s.quarters) << k;
     return left;
 }
 
-// Those that are near.
+// Of the entries in `left`, those whose quantized box is near the point.
 uint olbvh_near_of(uint begin, uint left, olbvh_Sought s) {
     uint ids = olbvh_grid.at[0].ids, olbvh_near = 0u;
     for (; left != 0u; left &= left - 1u) {
@@ -700,7 +722,7 @@ uint olbvh_near_of(uint begin, uint left, olbvh_Sought s) {
 
 uint olbvh_near_among(uint begin, uint end, olbvh_Sought s) { return olbvh_near_of(begin, olbvh_in_quarters(begin, end, s), s); }
 
-// Looks at entries [begin, end) in order, ends at the first that contains the point.
+// Considers the entries [begin, end) in order, up to the first that contains the point.
 void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
     for (; begin < end && !best.inside; begin += 32u) {
         for (uint olbvh_near = olbvh_near_among(begin, end, s); olbvh_near != 0u && !best.inside; olbvh_near &= olbvh_near - 1u) {
@@ -713,14 +735,16 @@ void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
 
 bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
-// The owner after the whole list has been searched.
+// The owner, once the whole list has been searched; NONE if there is none.
 uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
     if (best.owner == olbvh_NONE || best.inside) return best.owner;
     return !olbvh_is_boundary_node(leaf) || best.smallest >= -tolerance ? best.owner : olbvh_NONE;
 }
-// Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and neighbours.
+// Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and
+// neighbours.
 
-// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
+// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
+// src/reference/assign.rs.
 
 vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
     precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
@@ -733,34 +757,37 @@ vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
     precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
     return b;
 }
-// Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it: the same operations in the same order. Needs
-// candidates.glsl, cells and neighbours.
-const uint olbvh_STAR = 128u;    // tetrahedra of a star
-const uint olbvh_STEPS = 512u;   // of part 1
-const uint olbvh_HINTED = 16u;   // of a stride from a hint
-const uint olbvh_STRIDE = 64u;   // of a stride through a leaf
-const uint olbvh_LEG = 1024u;    // along one segment
-const uint olbvh_DETOURS = 8u;   // points to go by
-const uint olbvh_ARRIVALS = 2u;  // stars that part 1 looks at
+// Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
+// and their order are the same. Needs candidates.glsl, cells and neighbours.
+const uint olbvh_STAR = 128u;    // most tetrahedra of a star
+const uint olbvh_STEPS = 512u;   // most steps of part 1
+const uint olbvh_HINTED = 16u;   // most steps of a stride from a hint
+const uint olbvh_STRIDE = 64u;   // most steps of a stride through a leaf
+const uint olbvh_LEG = 1024u;    // most steps along one segment
+const uint olbvh_DETOURS = 8u;   // points of the cell to walk by, the first its centre
+const uint olbvh_ARRIVALS = 2u;  // stars that part 1 searches
 const float olbvh_GAP = -7.62939453125e-6; // -2^-17
 
-// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells, vertices and neighbours.
+// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
+// vertices and neighbours.
 
-// The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
+// The tetrahedron that a stride has reached. Its corners are kept in ascending index, so that what is computed from
+// them does not depend on the path.
 struct olbvh_Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
-    uvec4 ids;  // and ascending
-    uvec4 beside; // tetrahedra across the faces opposite to `cell`, read together with it: a cache misses both at once
+    uvec4 ids;  // vertices in ascending order
+    // Neighbours across the faces opposite to `cell`, loaded together with it so that their cache misses overlap.
+    uvec4 beside;
     vec4 x, y, z;
     olbvh_Bounds box;
 };
 
-// How a step changes what is held per corner.
+// How a step changes what is kept per corner.
 struct olbvh_Exchange {
-    uint fresh;   // the vertex that comes in
-    bvec3 beyond; // whether the corner left behind is that of place 0; at most 1; at most 2
-    bvec3 before; // whether the fresh one comes before each of the corners kept
+    uint fresh;   // the vertex that enters
+    bvec3 beyond; // whether the place of the corner that leaves is 0; at most 1; at most 2
+    bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
 olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
@@ -792,7 +819,7 @@ float olbvh_of_vertex(olbvh_Stand s, vec4 ascending, uint id) {
     return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
 }
 
-// Barycentric coordinates of the point that these are the sides of, in the caller's order.
+// Barycentric coordinates of the point that `at` was computed for, in the caller's order.
 vec4 olbvh_barycentric(olbvh_Stand s, olbvh_Sides at) {
     vec4 b = olbvh_barycentric(at);
     return vec4(olbvh_of_vertex(s, b, s.cell.x), olbvh_of_vertex(s, b, s.cell.y), olbvh_of_vertex(s, b, s.cell.z), olbvh_of_vertex(s, b, s.cell.w));
@@ -800,7 +827,7 @@ vec4 olbvh_barycentric(olbvh_Stand s, olbvh_Sides at) {
 
 uvec3 olbvh_kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
-// What is held of one kind after a step.
+// Data per corner after a step, with that of the fresh corner.
 uvec4 olbvh_exchange(uvec4 held, olbvh_Exchange e, uint fresh) {
     uvec3 k = olbvh_kept(held, e.beyond);
     return uvec4(e.before.x ? fresh : k.x, e.before.x ? k.x : e.before.y ? fresh : k.y, e.before.y ? k.y : e.before.z ? fresh : k.z,
@@ -813,7 +840,8 @@ vec4 olbvh_exchange(vec4 held, olbvh_Exchange e, float fresh) {
 
 uint olbvh_xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
 
-// One step through the face that says outside most; false, and nowhere, if none does or there is nothing behind it.
+// Steps through the face with the most negative weight. Returns false if no weight is negative or nothing lies beyond
+// that face; the stand must then not be used.
 bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     float least = min(min(at.w.x, at.w.y), min(at.w.z, at.w.w));
     e.beyond.x = at.w.x == least;
@@ -825,7 +853,7 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
     s.t = s.cell.x == left ? s.beside.x : s.cell.y == left ? s.beside.y : s.cell.z == left ? s.beside.z : s.beside.w;
     if (s.t == olbvh_NONE) return false;
-    // Three corners are shared; the fourth takes the place of the one left behind.
+    // Three corners are shared; the fresh one replaces the fourth.
     s.cell = olbvh_words(olbvh_cells.at[s.t]);
     s.beside = olbvh_words(olbvh_neighbours.at[s.t]);
     e.fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
@@ -844,22 +872,24 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
     return olbvh_step_on(s, at, e);
 }
 
-// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one; else NONE.
+// The owner of x, where x is near one face of the stand and far from all other faces of the two tetrahedra that share
+// it; else NONE.
 uint olbvh_owner_at_face(olbvh_Stand s, vec3 x) {
     olbvh_Tet tet = olbvh_tet_of(s);
     olbvh_Weights here = olbvh_weights(tet, x);
     uint u = olbvh_near_one_face(here) ? s.beside[olbvh_outermost(olbvh_own_weights(here, tet))] : olbvh_NONE;
     if (u == olbvh_NONE) return olbvh_NONE;
     olbvh_Weights there = olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x);
-    // The face weighs the same from either side.
+    // Both sides compute the same magnitude of the weight at their shared face.
     if (!olbvh_near_one_face(there) || olbvh_least_of(there.w) != -olbvh_least_of(here.w)) return olbvh_NONE;
     return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : olbvh_NONE;
 }
 
-// The owner of x where a stride ends: in a tetrahedron that holds it clearly, or at its face; else NONE.
+// The owner of x where a stride ends: the stand if it clearly contains x, or the owner at its face; else NONE.
 uint olbvh_owner_of(olbvh_Stand s, olbvh_Sides at, vec3 x) { return at.clear ? s.t : at.near ? olbvh_owner_at_face(s, x) : olbvh_NONE; }
 
-// Goes from `t` towards x, and to its owner if that is not far, and if x does not lie near an edge; false, and anywhere, if not.
+// Moves `t` towards x, to its owner if at most `most` steps lead there and x is not near an edge. Otherwise returns
+// false and sets `t` to NONE.
 bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     if (t == olbvh_NONE) return false;
     olbvh_Stand s = olbvh_stand_in(t);
@@ -873,7 +903,7 @@ bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     return owner != olbvh_NONE;
 }
 
-// Cell of a leaf in normalised coordinates.
+// The cell of a leaf, in normalised coordinates.
 struct olbvh_LeafCell {
     vec3 centre;
     vec3 half_size;
@@ -889,18 +919,18 @@ bool olbvh_in_star(uint t) {
     return false;
 }
 
-// Takes into the star what lies beside `t`, one of it.
+// Adds to the star of x the neighbours of its member `t` that x is near, across faces that x is near.
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
     uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
-    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
         if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
     }
 }
 
-// Looks for the owner in the star of x in `first`.
+// Considers all tetrahedra of the star of x as its owner, starting with `first`.
 void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
     olbvh_star[0] = first;
     olbvh_star_size = 1u;
@@ -915,7 +945,8 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
 
 bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.smallest >= olbvh_GAP); }
 
-// Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
+// Part 1, from `t`, which step number `s` has reached and which is left first with `leave`. Returns whether `t` is now
+// near x. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
 bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout olbvh_Best best) {
     for (; s < olbvh_STEPS; ++s) {
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
@@ -931,7 +962,7 @@ bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout ol
     return false;
 }
 
-// Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
+// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends.
 uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
     uint from = olbvh_NONE;
     for (uint s = 0u; s < olbvh_LEG; ++s) {
@@ -957,22 +988,22 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
     return t;
 }
 
-// Point number k of the cell, the first its centre.
-vec3 olbvh_room_point(olbvh_LeafCell room, uint k) {
+// Point number k of the cell; the first is its centre.
+vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
     vec3 olbvh_p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * olbvh_two_to(-23) - 1.0;
         float away = k == 0u ? 0.0 : part;
-        precise float at = room.centre[c] + room.half_size[c] * away;
+        precise float at = cell.centre[c] + cell.half_size[c] * away;
         precise float whole = floor(at * olbvh_two_to(42)) * olbvh_two_to(-42);
         olbvh_p[c] = whole;
     }
     return olbvh_p;
 }
 
-// Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
-// kernels hold each part once.
-olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell room, vec3 x) {
+// Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
+// DETOURS points. All of it is one loop, so that a kernel contains each part only once.
+olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !olbvh_settled(best); ++way) {
@@ -983,32 +1014,32 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell room, vec3 x) {
             }
         } else {
             uint k = way - olbvh_ARRIVALS;
-            vec3 by = olbvh_room_point(room, k);
+            vec3 by = olbvh_cell_point(cell, k);
             t = seed;
-            // The first point to go by is the centre, where the walk begins.
-            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = olbvh_walk_leg(t, leg == 0u ? room.centre : by, leg == 0u ? by : x);
+            // The first point is the centre, where the walk starts.
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = olbvh_walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x);
         }
         olbvh_arrive(t, x, best);
     }
     return best;
 }
 
-// Whether a leaf is one to walk through: full of mesh, its list left out.
+// Whether a leaf is searched by walking: it is full of mesh and has a seed instead of a list.
 bool olbvh_walks_in(uint leaf, uvec2 range) { return olbvh_LISTS != 0u && range.x < range.y && !olbvh_is_boundary_node(leaf); }
 
-// Where a stride through a leaf with these entries begins.
+// The tetrahedron where a stride through a leaf with these entries starts.
 uint olbvh_middle_of(uvec2 range) { return olbvh_listed_tet(range.x + (range.y - range.x) / 2u); }
 
-// The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
+// The owner of the point `at`, x in normalised coordinates, in a leaf that is full of mesh, found by a whole walk.
 olbvh_Best olbvh_walked_through(olbvh_Grid g, uvec2 range, vec3 at, vec3 x) {
-    olbvh_LeafCell room;
-    room.half_size = olbvh_half_cell(g, g.level);
-    room.centre = olbvh_cell_centre(room.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
-    return olbvh_walk_from_seed(olbvh_listed_tet(range.x), room, x);
+    olbvh_LeafCell cell;
+    cell.half_size = olbvh_half_cell(g, g.level);
+    cell.centre = olbvh_cell_centre(cell.half_size, olbvh_quantize(g, at) >> (olbvh_MAX_LEVEL - g.level));
+    return olbvh_walk_from_seed(olbvh_listed_tet(range.x), cell, x);
 }
 
-// The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
-// if its list must be searched.
+// The owner of x in a leaf with these entries, found by a stride from the middle of the list or, if that fails and the
+// leaf is full of mesh, by a whole walk. Without an owner, the list must be searched.
 olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, vec3 at, vec3 x) {
     if (olbvh_LISTS == 0u || range.x >= range.y) return olbvh_no_best();
     uint t = olbvh_middle_of(range);
@@ -1016,7 +1047,7 @@ olbvh_Best olbvh_walked(olbvh_Grid g, uint leaf, uvec2 range, vec3 at, vec3 x) {
     return olbvh_is_boundary_node(leaf) ? olbvh_no_best() : olbvh_walked_through(g, range, at, x);
 }
 
-// Names the tree that the functions below mean.
+// Selects the tree that the functions below use.
 void olbvh_open(uvec2 tree) {
 #ifndef OLBVH_DESCRIPTORS
     olbvh_scene = olbvh_sceneBlock(tree);
@@ -1035,8 +1066,9 @@ void olbvh_open(uvec2 tree) {
     olbvh_LISTS = olbvh_scene.at[0].lists;
 }
 
-// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and its barycentric coordinates in the order of the cell's vertices. A
-// point outside of the mesh is found if its smallest coordinate in the nearest cell is at least -tolerance.
+// The tetrahedron that owns a point (in the units of the mesh), or OLBVH_NONE, and the point's barycentric coordinates
+// in the order of the tetrahedron's vertices. A point outside of the mesh is found if its smallest coordinate in the
+// nearest tetrahedron is at least -tolerance.
 uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     weights_of_owner = vec4(0.0);
     olbvh_Grid g = olbvh_grid.at[0];
@@ -1052,7 +1084,8 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     return owner;
 }
 
-// Every tetrahedron that contains a point, the first OLBVH_OWNERS of them in `owners`; their number. In no order.
+// The number of tetrahedra that contain a point; `owners` receives the first OLBVH_OWNERS of them, in no particular
+// order.
 #ifndef OLBVH_OWNERS
 #define OLBVH_OWNERS 32
 #endif
@@ -1081,14 +1114,14 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
 
 float olbvh_no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
 
-// Value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
+// The value of the field, which has one value per point of the mesh, in a tetrahedron; NaN without a field.
 float olbvh_value(uint owner, vec4 weights_of_owner) {
     if (olbvh_scene.at[0].has_field == 0u) return olbvh_no_value();
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
     return dot(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
 }
 
-// Gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
+// The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.
 vec3 olbvh_gradient(uint owner) {
     if (olbvh_scene.at[0].has_field == 0u) return vec3(olbvh_no_value());
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
@@ -1104,10 +1137,11 @@ vec3 olbvh_gradient(uint owner) {
     return sum / six_volumes * olbvh_grid.at[0].scale;
 }
 
-// Traversal for predicates of the host's: define OLBVH_TRAVERSE before the inclusion, and after it
-//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves. It may become stricter during a traversal.
-//     bool olbvh_visit_leaf(olbvh_Node node);  a leaf that was accepted; returns true to end the traversal
-// olbvh_node_box gives a node's box, olbvh_entries the primitives of a leaf: ids at olbvh_primitive(i) for i in [x, y).
+// Traversal with the host's predicates: define OLBVH_TRAVERSE before the inclusion, and after it
+//     bool olbvh_visit_node(olbvh_Node node);  descend? Also asked for leaves; may become stricter during a traversal
+//     bool olbvh_visit_leaf(olbvh_Node node);  called for an accepted leaf; returns true to end the traversal
+// olbvh_node_box gives the box of a node, olbvh_entries the entries [x, y) of a leaf, and olbvh_primitive(i) the
+// tetrahedron of entry i.
 #ifdef OLBVH_TRAVERSE
 #ifndef OLBVH_STACK
 #define OLBVH_STACK 8
@@ -1115,15 +1149,16 @@ vec3 olbvh_gradient(uint owner) {
 const uint olbvh_STACK = OLBVH_STACK;
 bool olbvh_visit_node(olbvh_Node node);
 bool olbvh_visit_leaf(olbvh_Node node);
-// Traversal for predicates with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of src/reference/traverse.rs, which
-// explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
+// Traversal with predicates, using a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of
+// src/reference/traverse.rs, which explains the trail. Before including this file, a kernel declares what tree.glsl
+// needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
-//     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+//     bool visit_leaf(Node node);  // called for a leaf that F_N accepted; returns true to end the traversal
 // and may define
-//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the node's children, which these are, `first` the index of the first
-//     KEEPS(node)                    // whether a node that F_N accepted earlier is to be looked at still
+//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the children of the node; `first` is the first
+//     KEEPS(node)                    // whether a node that F_N accepted earlier is still to be visited
 //     FLIP                           // the children of a node are visited in the order of their digits XOR this
-// STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+// STACK is the number of nodes on the short stack. Any size gives the same leaves; a small one asks F_N more often.
 #ifndef olbvh_ENTER_NODE
 #define olbvh_ENTER_NODE(node, mask, first)
 #endif
@@ -1133,7 +1168,7 @@ bool olbvh_visit_leaf(olbvh_Node node);
 #ifndef olbvh_FLIP
 #define olbvh_FLIP 0u
 #endif
-const uint olbvh_MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
+const uint olbvh_MAX_VISITS = 24000u; // loop limit; a traversal that reaches it returns false
 
 // True if the traversal ended by itself, false at the loop limit.
 bool olbvh_traverse(uint level) {
@@ -1144,12 +1179,12 @@ bool olbvh_traverse(uint level) {
         return true;
     }
     olbvh_Node stack[olbvh_STACK];
-    uint top = 0u, held = 0u; // ring: the oldest node is dropped where there is no room
+    uint top = 0u, held = 0u; // ring buffer: if it is full, the oldest node is dropped
     uint trail = 0u, resume = 0u;
     for (uint visits = 0u; visits < olbvh_MAX_VISITS; ++visits) {
         bool leaves = node.level + 1u == level;
         uint mask = olbvh_child_mask(node.index), first = olbvh_co.at[node.index] + 1u;
-        uint accepted = 0u; // bit per child, in their order
+        uint accepted = 0u; // one bit per child, in the order of visits
         olbvh_ENTER_NODE(node, mask, first);
         for (uint k = 0u; k < 8u; ++k) {
             uint digit = k ^ olbvh_FLIP;
@@ -1164,7 +1199,7 @@ bool olbvh_traverse(uint level) {
             uint shift = 3u * node.level;
             if (node.level >= resume) trail |= (n - 1u) << shift;
             uint left = min(trail >> shift & 7u, n - 1u);
-            // Siblings behind the next node, last first; then the next node itself.
+            // Pushes the siblings after the next node, the last first; then takes the next node itself.
             olbvh_Node parent = node;
             for (uint k = 0u; k <= left; ++k) {
                 uint highest = uint(findMSB(accepted)), digit = highest ^ olbvh_FLIP;
@@ -1216,7 +1251,7 @@ void olbvh_cell_box(olbvh_Grid g, uint level, uint code, out vec3 lo, out vec3 h
     }
 }
 
-// Visits the tree; false if it was too large to visit in one go (24,000 inner nodes).
+// Traverses the tree. Returns false if it has too many nodes to visit in one call (24,000 internal nodes).
 bool olbvh_traverse() { return olbvh_traverse(olbvh_grid.at[0].level); }
 
 void olbvh_node_box(olbvh_Node node, out vec3 lo, out vec3 hi) { olbvh_cell_box(olbvh_grid.at[0], node.level, node.code, lo, hi); }

@@ -23,27 +23,32 @@
 #include <stdlib.h>
 
 /*
- How a call ended.
+ Version of this interface. A header and a library with different versions are incompatible.
+ */
+#define OLBVH_ABI 1
+
+/*
+ Result of a call.
  */
 typedef enum olbvh_status {
   /*
-   Done.
+   The call succeeded.
    */
   OLBVH_STATUS_OK = 0,
   /*
-   An argument makes no sense.
+   An argument is invalid.
    */
   OLBVH_STATUS_INVALID = 1,
   /*
-   No Vulkan, or no device that qualifies.
+   There is no Vulkan, no suitable device, or the device failed the self-test.
    */
   OLBVH_STATUS_DEVICE = 2,
   /*
-   The device's memory does not suffice.
+   There is not enough device memory.
    */
   OLBVH_STATUS_MEMORY = 3,
   /*
-   The mesh is larger than 32-bit offsets reach.
+   The problem is larger than the device or 32-bit offsets allow.
    */
   OLBVH_STATUS_TOO_LARGE = 4,
   /*
@@ -51,11 +56,11 @@ typedef enum olbvh_status {
    */
   OLBVH_STATUS_VULKAN = 5,
   /*
-   Anything else; please report it.
+   Any other error; please report it.
    */
   OLBVH_STATUS_INTERNAL = 6,
   /*
-   The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles, and begin again with another device.
+   The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles and start again with a new device.
    */
   OLBVH_STATUS_LOST = 7,
 } olbvh_status;
@@ -71,12 +76,12 @@ typedef struct olbvh_gpu olbvh_gpu;
 typedef struct olbvh_mesh olbvh_mesh;
 
 /*
- Commands being recorded, and the descriptor sets they use: one per frame in flight.
+ A recording of commands and the descriptor sets that they use: one per frame in flight.
  */
 typedef struct olbvh_recording olbvh_recording;
 
 /*
- A mesh and its tree in memory of the host's.
+ A mesh and its tree in the host's memory.
  */
 typedef struct olbvh_scene olbvh_scene;
 
@@ -86,42 +91,46 @@ typedef struct olbvh_scene olbvh_scene;
 typedef struct olbvh_tree olbvh_tree;
 
 /*
- How to build a tree; `olbvh_default_build_options` fills it.
+ How to build a tree. `olbvh_default_build_options` returns the defaults.
  */
 typedef struct olbvh_build_options {
   /*
-   The paper's alpha, 0 to 10: how many levels coarser than the cells' size the leaves are.
+   The paper's alpha, from 0 to 10: how many levels coarser than the size of the tetrahedra the leaves are.
    */
   float alpha;
   /*
-   0: cells of the bounding box. 1: of those, the cells that no face plane separates. 2: exactly the cells touched.
+   Which octree cells list a tetrahedron. 0: all cells of its bounding box. 1: of these, the cells that no face
+   plane of the tetrahedron separates from it. 2: exactly the cells that it touches.
    */
   uint32_t assign;
   /*
-   0: all primitives are listed (the paper). 1: where the surface is, seeds and walks elsewhere.
+   Which leaves have full lists. 0: every leaf lists all its tetrahedra (the paper). 1: only leaves that the
+   surface touches; every other leaf has one entry, from which walks across faces find the others.
    */
   uint32_t lists;
   /*
-   Level of the leaves whatever alpha says, 1 to 10: one finer than alpha 0 asks for suits thin parts. 0: as alpha says.
+   Level of the leaves, from 1 to 10, which overrides alpha; meshes with thin parts profit from a level finer than
+   alpha 0 gives. 0: alpha decides.
    */
   uint32_t level;
   /*
-   How fine leaves are beyond that: 0: as it says. 1: finer where lists are long, as suits points, slices and overlap. 2: as suits pictures. A recorded
-   build takes no notice.
+   Whether leaves become finer than that. 0: no. 1: yes where lists are long, which suits location of points,
+   slices and overlap. 2: as fine as suits pictures. A recorded build ignores this.
    */
   uint32_t fineness;
   /*
-   Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
+   Maximum number of entries of the tree, which is made coarser until it fits. 0: the usual capacity, 64 entries
+   per tetrahedron and at least 2^20.
    */
   uint32_t capacity;
   /*
-   Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
+   Maximum number of bytes of all arrays of the tree together; it is made coarser until it fits. 0: no limit.
    */
   uint64_t budget;
 } olbvh_build_options;
 
 /*
- What was built.
+ Properties of a tree.
  */
 typedef struct olbvh_tree_info_data {
   /*
@@ -129,15 +138,15 @@ typedef struct olbvh_tree_info_data {
    */
   uint32_t level;
   /*
-   Primitive ids in the leaves.
+   Number of entries, that is of (tetrahedron, leaf) pairs.
    */
   uint32_t entries;
   /*
-   Nodes.
+   Number of nodes.
    */
   uint32_t nodes;
   /*
-   Leaves.
+   Number of leaves.
    */
   uint32_t leaves;
   /*
@@ -149,26 +158,27 @@ typedef struct olbvh_tree_info_data {
    */
   float hi[3];
   /*
-   Tetrahedra left out: a vertex that does not exist, occurs twice or is not finite.
+   Number of tetrahedra left out because a vertex does not exist, occurs twice or is not finite.
    */
   uint32_t bad_cells;
   /*
-   Milliseconds of device time.
+   Device time of the construction in milliseconds.
    */
   double build_ms;
   /*
-   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order, and no
-   field: `olbvh_value` is NaN there. Scenes have fields (`olbvh_scene_arrays`).
+   Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
+   reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+   (`olbvh_scene_arrays`).
    */
   uint64_t address;
 } olbvh_tree_info_data;
 
 /*
- What a host enables when it makes a device for olbvh.
+ What a host should enable when it creates a device for olbvh.
  */
 typedef struct olbvh_host_requirements {
   /*
-   The first queue family with compute; any other with compute will do.
+   The first queue family with compute; any other family with compute works as well.
    */
   uint32_t queue_family;
   /*
@@ -176,25 +186,26 @@ typedef struct olbvh_host_requirements {
    */
   uint32_t buffer_addresses;
   /*
-   Not 0: it has the feature `shaderInt64`.
+   Not 0: the device has the feature `shaderInt64`.
    */
   uint32_t shader_int64;
   /*
-   Not 0: it has the features `subgroupSizeControl` and `computeFullSubgroups`, and heeds them.
+   Not 0: the device has the features `subgroupSizeControl` and `computeFullSubgroups`, and lets compute shaders
+   require a subgroup size.
    */
   uint32_t subgroup_size_control;
   /*
-   Number of names that follow.
+   Number of entries in `extensions`.
    */
   uint32_t extension_count;
   /*
-   Names of device extensions, which stay where they are.
+   Names of the device extensions to enable. The strings are static: they stay valid and must not be freed.
    */
   const char *extensions[4];
 } olbvh_host_requirements;
 
 /*
- A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
+ A Vulkan device that the host owns; olbvh uses it and never destroys it. Handles are cast to `uint64_t`.
  */
 typedef struct olbvh_host_device {
   /*
@@ -202,7 +213,7 @@ typedef struct olbvh_host_device {
    */
   void (*get_instance_proc_addr)(void);
   /*
-   `VkInstance`, of Vulkan 1.2 or later.
+   `VkInstance`, created for Vulkan 1.2 or later.
    */
   uint64_t instance;
   /*
@@ -214,16 +225,33 @@ typedef struct olbvh_host_device {
    */
   uint64_t device;
   /*
-   `VkQueue` of that family. Nobody else submits to it while a function runs that does work at once (`olbvh_gpu_from_host` with its self-test, uploads,
-   builds, queries); those that record do not touch it. 0: recording is all that is done, untested.
+   `VkQueue` of the family `queue_family`, which owning calls submit to (`olbvh_gpu_from_host` with its self-test,
+   uploads, builds, queries); recording functions do not touch it. Nothing else may use the queue while an owning
+   call runs, or, with `lock_queue`, while it holds that lock. 0: only recording is possible, and the self-test is
+   skipped.
    */
   uint64_t queue;
   /*
-   `VkPipelineCache` of the host's, which knows the kernels of earlier runs. 0: one that lasts as long as the `olbvh_gpu`.
+   Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
+   with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
+   `unlock_queue`, or neither.
+   */
+  void (*lock_queue)(void*);
+  /*
+   Releases the host's lock of the queue; may be null. It is called with `queue_lock` after each submission.
+   */
+  void (*unlock_queue)(void*);
+  /*
+   Argument of `lock_queue` and `unlock_queue`.
+   */
+  void *queue_lock;
+  /*
+   The host's `VkPipelineCache`, which may hold the kernels of earlier runs; not one that needs external
+   synchronization, since threads compile at the same time. 0: a cache that lasts as long as the `olbvh_gpu`.
    */
   uint64_t pipeline_cache;
   /*
-   Queue family with compute; it needs nothing else.
+   Index of a queue family with compute; it needs no other capability.
    */
   uint32_t queue_family;
   /*
@@ -231,12 +259,14 @@ typedef struct olbvh_host_device {
    */
   uint32_t buffer_addresses;
   /*
-   Not 0: feature `shaderInt64` is enabled, which only drivers for processors profit from.
+   Not 0: the feature `shaderInt64` is enabled, from which only drivers for processors profit.
    */
   uint32_t shader_int64;
   /*
-   Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
-   vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks; Intel's are not.
+   Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and
+   `computeFullSubgroups`. Enable it where subgroup sizes vary. Without it, the driver is trusted to run kernels
+   with its usual subgroup size, which the self-test checks on opening; Intel devices whose subgroup sizes vary are
+   refused.
    */
   uint32_t subgroup_size_control;
   /*
@@ -246,27 +276,28 @@ typedef struct olbvh_host_device {
 } olbvh_host_device;
 
 /*
- What a picture shows; `olbvh_default_picture_settings` fills it.
+ What a picture shows. `olbvh_default_picture_settings` returns the defaults.
  */
 typedef struct olbvh_picture_settings {
   /*
-   Pixels in a row.
+   Width in pixels.
    */
   uint32_t width;
   /*
-   Rows.
+   Height in pixels.
    */
   uint32_t height;
   /*
-   The camera, as `olbvh render --camera` takes it; null: it sees the whole mesh from an angle.
+   The camera, in the form of `olbvh render --camera`; null: it sees the whole mesh from an oblique direction.
    */
   const char *camera;
   /*
-   Name of a colour map, as `olbvh render --tf` takes it; null: the usual one.
+   Name of a colour map, as for `olbvh render --tf`; null: the default.
    */
   const char *colors;
   /*
-   Opacity, as `olbvh render --opacity` takes it; null: `olbvh_render` makes it fit the field, `olbvh_view_make` lets it rise with the value.
+   Opacity, in the form of `olbvh render --opacity`; null: `olbvh_render` adapts it to the field, `olbvh_view_make`
+   lets it increase with the value.
    */
   const char *opacity;
   /*
@@ -274,41 +305,42 @@ typedef struct olbvh_picture_settings {
    */
   float iso[8];
   /*
-   How many of them there are; 0: the volume is drawn.
+   Number of values in `iso` that are used; 0: the volume is drawn.
    */
   uint32_t iso_count;
   /*
-   Values at the ends of the colour map; the first above the second: all values that the field has.
+   Values at the two ends of the colour map. If the first is greater than the second, all values of the field are
+   covered.
    */
   float range[2];
   /*
-   Distance of two samples in units of the mesh; 0: 1/512 of its diagonal.
+   Distance between two samples in units of the mesh; 0: 1/512 of the diagonal of its bounding box.
    */
   double step;
   /*
-   Factor on the opacity: 2 is as opaque as twice the way through the mesh.
+   Factor on the opacity: 2 makes the mesh as opaque as if rays travelled twice the distance through it.
    */
   float opacity_scale;
   /*
-   A ray ends once it is this opaque.
+   A ray ends when its opacity reaches this.
    */
   float termination;
   /*
-   Not 0: surface and steep values are lit.
+   Not 0: the surface, and steep changes of the field, are lit.
    */
   uint32_t shading;
   /*
-   Opacity that a lit surface seen from the side has at least.
+   Minimum opacity of a lit surface that is seen edge-on.
    */
   float outline;
   /*
-   Direction to the light: right, up, towards the viewer.
+   Direction to the light: components to the right, upwards, and towards the viewer.
    */
   float light[3];
 } olbvh_picture_settings;
 
 /*
- Where the voxels of a stack of layers lie.
+ Geometry of a stack of layers of voxels.
  */
 typedef struct olbvh_voxels {
   /*
@@ -316,15 +348,15 @@ typedef struct olbvh_voxels {
    */
   float origin[3];
   /*
-   From one voxel to the next in a row.
+   Vector from one voxel to the next in a row.
    */
   float across[3];
   /*
-   From one row to the next.
+   Vector from one row to the next.
    */
   float down[3];
   /*
-   From one layer to the next.
+   Vector from one layer to the next.
    */
   float up[3];
   /*
@@ -332,92 +364,95 @@ typedef struct olbvh_voxels {
    */
   float half[3][3];
   /*
-   Voxels in a row.
+   Number of voxels in a row.
    */
   uint32_t width;
   /*
-   Rows of a layer.
+   Number of rows in a layer.
    */
   uint32_t height;
   /*
-   Layers.
+   Number of layers.
    */
   uint32_t layers;
 } olbvh_voxels;
 
 /*
- A stage that was timed.
+ A timed stage of a recording.
  */
 typedef struct olbvh_stage {
   /*
-   Such as "build.levels".
+   Name of the stage, for example "build.levels"; ends with a zero byte.
    */
   char name[64];
   /*
-   Query with the time of its begin.
+   Index of the query with the time of its start.
    */
   uint32_t begin;
   /*
-   Query with the time of its end.
+   Index of the query with the time of its end.
    */
   uint32_t end;
 } olbvh_stage;
 
 /*
- What is known of a mesh and its tree before there is memory for them.
+ What must be known of a mesh and its tree before memory is allocated for them.
  */
 typedef struct olbvh_plan {
   /*
-   Points.
+   Number of points.
    */
   uint32_t points;
   /*
-   32-bit floats from one point to the next, at least 3.
+   Distance from one point to the next in 32-bit floats, at least 3.
    */
   uint32_t stride;
   /*
-   Tetrahedra.
+   Number of tetrahedra.
    */
   uint32_t tets;
   /*
-   Deepest level that the leaves may have, up to 10.
+   Deepest level that the leaves may have, at most 10.
    */
   uint32_t level;
   /*
-   At least the entries of the longest leaf, 0: any number. Location takes a dispatch for every 16,384 of them.
+   Upper bound on the number of entries of a leaf; 0: unknown. If it is too low, points are lost. Location records
+   one dispatch for every 16,384 entries, at most 16 dispatches.
    */
   uint32_t longest_leaf;
   /*
-   How to build. Without a capacity there is room for 8 entries per tetrahedron (24 where all are listed), or for what the budget allows; trees that need more
-   get coarser.
+   How to build the tree. If both a capacity and a budget are given, the smaller one holds. If neither is given,
+   there is room for 8 entries per tetrahedron, or 24 if all leaves have full lists. A tree that would need more is
+   made coarser.
    */
   struct olbvh_build_options build;
 } olbvh_plan;
 
 /*
- What memory a plan wants.
+ Memory that a plan needs.
  */
 typedef struct olbvh_plan_sizes {
   /*
-   Bytes of mesh and tree, kept as long as the tree is asked.
+   Bytes for mesh and tree, kept as long as the tree is queried.
    */
   uint64_t memory;
   /*
-   Bytes in use while building only; frames in flight on one queue can share them.
+   Bytes used only during construction; frames in flight on one queue can share them.
    */
   uint64_t scratch;
   /*
-   Offsets of parts are multiples of this.
+   Offsets of parts of buffers must be multiples of this.
    */
   uint64_t alignment;
   /*
-   `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
+   `VkBufferUsageFlags` that every buffer needs; where buffer addresses are used, they include
+   `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT`.
    */
   uint32_t usage;
 } olbvh_plan_sizes;
 
 /*
- A part of a buffer of the host's.
+ A part of one of the host's buffers.
  */
 typedef struct olbvh_buffer {
   /*
@@ -425,11 +460,11 @@ typedef struct olbvh_buffer {
    */
   uint64_t buffer;
   /*
-   Bytes from its start.
+   Offset of the part from the start of the buffer, in bytes.
    */
   uint64_t offset;
   /*
-   Bytes.
+   Size of the part in bytes.
    */
   uint64_t size;
   /*
@@ -439,122 +474,129 @@ typedef struct olbvh_buffer {
 } olbvh_buffer;
 
 /*
- Where the arrays of a scene are: what olbvh.glsl gets.
+ Where the arrays of a scene are, as olbvh.glsl needs them.
  */
 typedef struct olbvh_scene_arrays_data {
   /*
-   The content of the buffer whose address `olbvh_open` gets. By descriptors that buffer is the first of the bindings.
+   Content of the buffer whose address is passed to `olbvh_open`. With descriptors, this buffer is the first
+   binding.
    */
   uint32_t addresses[22];
   /*
-   The buffers of the other bindings, in order.
+   Buffers of the other bindings, in order.
    */
   struct olbvh_buffer bindings[10];
   /*
-   What was built, in words: level of the leaves, level that was asked for, candidates, entries, nodes, internal nodes, leaves, …
+   What was built, in words: level of the leaves, level that was requested, candidates, entries, nodes, internal
+   nodes, leaves, …
    */
   struct olbvh_buffer status;
 } olbvh_scene_arrays_data;
 
 /*
- Points to locate, and where the answers go.
+ Points to locate, and where the results go.
  */
 typedef struct olbvh_location {
   /*
-   32-bit floats, three of each point.
+   Points, three 32-bit floats each.
    */
   struct olbvh_buffer points;
   /*
-   Floats from one point to the next, at least 3.
+   Distance from one point to the next in floats, at least 3.
    */
   uint32_t stride;
   /*
-   Points.
+   Number of points.
    */
   uint32_t count;
   /*
-   As `olbvh_locate` takes it.
+   Tolerance, as for `olbvh_locate`.
    */
   float tolerance;
   /*
-   0: each point by itself. 1: each around the owner of the one before, for more points than half the tetrahedra, of which each lies near the one
-   before. 2: so too, for points in no order, which are sorted first.
+   How points are located. 0: each one independently. 1: each one starting at the owner of the point before it;
+   this pays from one point per four tetrahedra on, if each point lies near the one before. 2: like 1,
+   for points in no order, which are sorted first.
    */
   uint32_t path;
   /*
-   For path 0, if not of no bytes: a word per point, a valid tetrahedron to begin with, such as the owner of the frame before, or 0xffffffff.
+   For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
+   owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh.
    */
   struct olbvh_buffer hints;
   /*
-   For path 2: memory to sort in, of `olbvh_location_parts`.
+   For path 2: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
    */
   struct olbvh_buffer memory;
   /*
-   A word per point: its owner, or 0xffffffff.
+   A word per point: its owner, or `UINT32_MAX` if there is none.
    */
   struct olbvh_buffer owners;
   /*
-   Four floats per point, in the order of the cell's vertices; zeroes without an owner.
+   Four floats per point: barycentric coordinates in the order of the tetrahedron's vertices; zeroes if there is no
+   owner.
    */
   struct olbvh_buffer barycentrics;
 } olbvh_location;
 
 /*
- What memory location takes.
+ Size of the scratch memory for point location.
  */
 typedef struct olbvh_location_parts_data {
   /*
-   Bytes of `olbvh_location.memory`: 0 but for path 2.
+   Size of `olbvh_location.memory` in bytes: 0 except for path 2.
    */
   uint64_t bytes;
 } olbvh_location_parts_data;
 
 /*
- Memory of all owners of points, and where in it the answers are.
+ Memory for all owners of points, and where in it the results are.
  */
 typedef struct olbvh_owner_parts_data {
   /*
-   Bytes of the memory.
+   Size of the memory in bytes.
    */
   uint64_t bytes;
   /*
-   A word per point: the lowest of its owners, as location gives it.
+   A word per point: the lowest of its owners, as `olbvh_cmd_locate` writes it.
    */
   struct olbvh_buffer owners;
   /*
-   Four floats per point: coordinates in that one.
+   Four floats per point: barycentric coordinates in that owner.
    */
   struct olbvh_buffer barycentrics;
   /*
-   A word per point: where its owners end in the list; they begin where those of the point before end, the first at 0.
+   A word per point: where its owners end in the list. They start where those of the point before end; those of the
+   first point start at 0.
    */
   struct olbvh_buffer ends;
   /*
-   A word: how many owners all points have together, whether or not there was room for them.
+   A word: the total number of owners of all points, even if there was not room for all of them.
    */
   struct olbvh_buffer total;
 } olbvh_owner_parts_data;
 
 /*
- Values on a mesh.
+ A scalar field on a mesh.
  */
 typedef struct olbvh_field {
   /*
-   A 32-bit float per point, or per tetrahedron.
+   One 32-bit float per point or per tetrahedron.
    */
   struct olbvh_buffer values;
   /*
-   0: per point, linear in a tetrahedron. Else: per tetrahedron.
+   0: one value per point, interpolated linearly in a tetrahedron. Otherwise: one value per tetrahedron.
    */
   uint32_t on_cells;
 } olbvh_field;
 
 /*
- What a picture shows, for the device: `olbvh_view_make` fills it, and the host copies it as it is to where `olbvh_picture.view` lies.
+ What a picture shows, in the form that the device reads. `olbvh_view_make` fills it; the host copies it unchanged to
+ `olbvh_picture.view`.
  */
 typedef struct olbvh_view {
   /*
-   Rays, light, step, range of values, iso-surfaces.
+   Rays, light, step, range of values, and values of iso-surfaces.
    */
   uint32_t frame[64];
   /*
@@ -562,96 +604,103 @@ typedef struct olbvh_view {
    */
   float table[1024][4];
   /*
-   Ranges of values outside of which nothing is to be seen, ascending and apart; behind the last stand such as no value lies in.
+   Ranges of values outside of which nothing is visible, ascending and disjoint. Unused ranges at the end contain
+   no value.
    */
   float drawn[512][2];
   /*
-   How many of them there are.
+   Number of ranges in `drawn` that are used.
    */
   uint32_t drawn_count;
 } olbvh_view;
 
 /*
- How far a recording goes with work that takes as many dispatches as it takes: a dispatch looks at so much and no more, so that no device is kept
- busy for long. The status of the query says what is left.
+ How many dispatches are recorded for work whose length is not known in advance. Each dispatch does a bounded amount
+ of work, so that the device is never kept busy for long. The status of the query says how much is left.
  */
 typedef struct olbvh_rounds {
   /*
-   Dispatches, one after the other; what is finished is passed over.
+   Number of dispatches, one after the other; they skip what is finished.
    */
   uint32_t count;
   /*
-   Not 0: go on where an earlier recording of the same ended.
+   Not 0: continue where an earlier recording of the same query ended.
    */
   uint32_t resume;
 } olbvh_rounds;
 
 /*
- What is drawn, and where. Contents are read when the commands are executed, so a new view or new values need no new recording.
+ What is drawn, and where. The contents of the buffers are read when the commands are executed, so a new view or new
+ values need no new recording.
  */
 typedef struct olbvh_picture {
   /*
-   Pixels in a row.
+   Width in pixels.
    */
   uint32_t width;
   /*
-   Rows.
+   Height in pixels.
    */
   uint32_t height;
   /*
-   Not 0: the iso-surfaces that the view has, instead of the volume.
+   Not 0: the iso-surfaces of the view are drawn instead of the volume.
    */
   uint32_t iso;
   /*
-   With ranges: ranges of the view that are looked at, its `drawn_count` or more, up to 512.
+   Used if `ranges` is given: how many ranges of the view are considered, at least its own `drawn_count`, up to
+   512.
    */
   uint32_t drawn_count;
   /*
-   An `olbvh_view`.
+   Buffer with an `olbvh_view`.
    */
   struct olbvh_buffer view;
   /*
-   What is shown.
+   The field that is drawn.
    */
   struct olbvh_field field;
   /*
-   Three floats per point of the mesh, normals of length up to 1 by which the volume is lit. Of no bytes: it is not lit.
+   Optional (size 0: no lighting): three floats per point of the mesh, normals of length up to 1 by which the
+   volume is lit.
    */
   struct olbvh_buffer normals;
   /*
-   The ranges of the field that `olbvh_cmd_ranges` records: nodes without a value to be seen are skipped. Of no bytes: nothing is. The picture is the same.
+   Optional (size 0: nothing is skipped): the ranges that `olbvh_cmd_ranges` records for the field, by which nodes
+   without visible values are skipped. The picture is the same either way.
    */
   struct olbvh_buffer ranges;
   /*
-   Memory of `olbvh_picture_parts`.
+   Memory of the size that `olbvh_picture_parts` reports.
    */
   struct olbvh_buffer memory;
   /*
-   A round takes up to 1,024 samples of every ray. No round, from the beginning, prepares the picture and leaves it empty.
+   A round takes up to 1,024 samples of every ray. A `count` of 0 without `resume` prepares the picture and leaves
+   it empty.
    */
   struct olbvh_rounds rounds;
 } olbvh_picture;
 
 /*
- Memory of a picture, and where in it the answers are.
+ Memory for a picture, and where in it the results are.
  */
 typedef struct olbvh_picture_parts_data {
   /*
-   Bytes of the memory.
+   Size of the memory in bytes.
    */
   uint64_t bytes;
   /*
-   Per pixel, the upper row first, four floats: colour, multiplied by its opacity, and opacity.
+   Four floats per pixel, upper row first: colour multiplied by its opacity, and opacity.
    */
   struct olbvh_buffer colors;
   /*
-   Words: samples taken, those in the mesh, those skipped, two words each, the lower first; then rays that need another round.
+   Three numbers of two words each, lower word first: samples taken, samples in the mesh, samples skipped. Then a
+   word: rays that need another round.
    */
   struct olbvh_buffer status;
 } olbvh_picture_parts_data;
 
 /*
- Which voxels are sliced, and where the answers go.
+ Which voxels are sliced, and where the results go.
  */
 typedef struct olbvh_slicing {
   /*
@@ -663,83 +712,87 @@ typedef struct olbvh_slicing {
    */
   uint32_t layer;
   /*
-   Number of that row in its layer.
+   Number of this row in its layer.
    */
   uint32_t first;
   /*
-   Rows; behind the last of a layer comes the first of the next. In whole layers, or parts of one that begin at multiples of 64 rows, voxels have the same
-   owners as in the whole stack where cells overlap, too.
+   Number of rows; the last row of a layer is followed by the first row of the next. If whole layers are sliced, or
+   parts of one layer that start at multiples of 64 rows, voxels have the same owners as in the whole stack even
+   where tetrahedra overlap.
    */
   uint32_t rows;
   /*
-   As `olbvh_slice` takes it.
+   Which value touched voxels get, as for `olbvh_slice`.
    */
   uint32_t linear;
   /*
-   The field, or one whose values are of no bytes: none.
+   Optional (`values` of size 0: none): the field.
    */
   struct olbvh_field field;
   /*
-   Memory of `olbvh_slicing_parts`.
+   Memory of the size that `olbvh_slicing_parts` reports.
    */
   struct olbvh_buffer memory;
   /*
-   One is enough but where leaves hold thousands of tetrahedra.
+   Rounds of the search; one is enough unless leaves hold thousands of tetrahedra.
    */
   struct olbvh_rounds rounds;
 } olbvh_slicing;
 
 /*
- Memory of a slice, and where in it the answers are.
+ Memory for a slice, and where in it the results are.
  */
 typedef struct olbvh_slicing_parts_data {
   /*
-   Bytes of the memory: 29 per voxel, and 32 per run of 64 voxels below each other in a layer.
+   Size of the memory in bytes: 29 per voxel, and 32 per run of 64 voxels in the same column of a layer.
    */
   uint64_t bytes;
   /*
-   A word per voxel, row by row, as `olbvh_slice` gives it.
+   A word per voxel, row by row, as for `olbvh_slice`.
    */
   struct olbvh_buffer answers;
   /*
-   A float per voxel: the value, NaN where it is empty; not written without a field.
+   A float per voxel: the value, NaN if the voxel is empty; not written without a field.
    */
   struct olbvh_buffer values;
   /*
-   Words: runs of voxels and voxels that need another round, and until there are none nothing else is to be used; why all are empty (1: the boxes are flat,
-   2: they are more than twice as large as the mesh), or 0; voxels with their centre in the mesh, those that it merely touches, those that it does not.
+   Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
+   used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are more than twice as
+   large as the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
+   touches, voxels that it does not touch.
    */
   struct olbvh_buffer status;
 } olbvh_slicing_parts_data;
 
 /*
- Memory of the overlap of two meshes, and where in it the answers are.
+ Memory for the overlap of two meshes, and where in it the results are.
  */
 typedef struct olbvh_overlap_parts_data {
   /*
-   Bytes of the memory.
+   Size of the memory in bytes.
    */
   uint64_t bytes;
   /*
-   For A and for B a bit per tetrahedron, the lowest of a word first: it intersects the other mesh.
+   For A and for B: one bit per tetrahedron, lowest bit of a word first, set if it intersects the other mesh.
    */
   struct olbvh_buffer hits[2];
   /*
-   For A and for B; the fifth word of either counts the tetrahedra that need another round, whose bits are 0.
+   For A and for B: the fifth word counts the tetrahedra that need another round; their bits are 0 until then.
    */
   struct olbvh_buffer status[2];
 } olbvh_overlap_parts_data;
 
 /*
- Memory of the pairs of two meshes, and where in it the answers are.
+ Memory for the pairs of two meshes, and where in it the results are.
  */
 typedef struct olbvh_pair_parts_data {
   /*
-   Bytes of the memory.
+   Size of the memory in bytes.
    */
   uint64_t bytes;
   /*
-   Words 4 and 5: tetrahedra of A that need another round to be counted, and to have their pairs written. Words 8 and 9: pairs, the lower first.
+   Words, counted from 0. Word 4: tetrahedra of A that need another round of counting. Word 5: tetrahedra of A that
+   need another round for their pairs to be written. Words 8 and 9: number of pairs, lower word first.
    */
   struct olbvh_buffer status;
 } olbvh_pair_parts_data;
@@ -749,29 +802,37 @@ extern "C" {
 #endif // __cplusplus
 
 /*
- The text of the last error of this thread; valid until its next call.
+ Text of the last error of this thread; valid until the next call of this thread.
  */
 const char *olbvh_last_error(void);
 
 /*
- Version of the library, such as "0.1.0".
+ Version of the library, for example "0.1.0".
  */
 const char *olbvh_version(void);
 
 /*
- Opens a device: part of its name, or its number; null: the best that qualifies.
+ Returns the `OLBVH_ABI` of the library, for comparison with that of the header.
  */
-enum olbvh_status olbvh_gpu_open(const char *device, struct olbvh_gpu **out);
+uint32_t olbvh_abi(void);
 
 /*
- Lets a device go; null is allowed.
+ Opens a device, chosen by a part of its name or by its number; null selects the best suitable device.
+ */
+enum olbvh_status olbvh_gpu_open(const char *device,
+                                 struct olbvh_gpu **out);
+
+/*
+ Frees the handle of a device; null is allowed.
  */
 void olbvh_gpu_free(struct olbvh_gpu *gpu);
 
 /*
- Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted. `reorder`, if not 0, brings points
- and tetrahedra into the order of a Z curve on the way, which pays where they come in no order; all functions go on to take and to give the caller's numbers.
- Of the tetrahedra that share a face, edge or vertex, the first along the curve owns its points then, not that of the lowest number.
+ Uploads a mesh to the device: three floats per point, four indices per tetrahedron. Invalid tetrahedra are left out
+ and counted (`olbvh_tree_info`). If `reorder` is not 0, points and tetrahedra are first sorted along a Z-order
+ curve, which pays where they come in no spatial order; all functions still take and return the caller's numbers. Of
+ the tetrahedra that share a face, edge or vertex, the first along the curve then owns its points, instead of the one
+ with the lowest number.
  */
 enum olbvh_status olbvh_mesh_upload(const struct olbvh_gpu *gpu,
                                     const float *points,
@@ -782,35 +843,36 @@ enum olbvh_status olbvh_mesh_upload(const struct olbvh_gpu *gpu,
                                     struct olbvh_mesh **out);
 
 /*
- Lets a mesh go; null is allowed.
+ Frees the handle of a mesh; null is allowed.
  */
 void olbvh_mesh_free(struct olbvh_mesh *mesh);
 
 /*
- What `olbvh_tree_build` takes where it is given no options.
+ The default build options, which `olbvh_tree_build` also uses when its `options` are null.
  */
 struct olbvh_build_options olbvh_default_build_options(void);
 
 /*
- Builds the tree over a mesh. `options` may be null.
+ Builds the tree over a mesh. `options` may be null: the defaults.
  */
 enum olbvh_status olbvh_tree_build(const struct olbvh_mesh *mesh,
                                    const struct olbvh_build_options *options,
                                    struct olbvh_tree **out);
 
 /*
- Lets a tree go; null is allowed.
+ Frees the handle of a tree; null is allowed.
  */
 void olbvh_tree_free(struct olbvh_tree *tree);
 
 /*
- Tells what a tree is like.
+ Reports the properties of a tree.
  */
 enum olbvh_status olbvh_tree_info(const struct olbvh_tree *tree, struct olbvh_tree_info_data *out);
 
 /*
- Tells what to enable on a physical device before a device is made from it. Handles are cast to `uint64_t`, `vkGetInstanceProcAddr` to a function without
- arguments. Ends with `OLBVH_STATUS_DEVICE` where the device does not qualify; `olbvh_last_error` tells what it lacks.
+ Reports what to enable on a physical device, before a device is created from it. Handles are cast to `uint64_t`,
+ `vkGetInstanceProcAddr` to a function without arguments. Returns `OLBVH_STATUS_DEVICE` if the physical device does
+ not qualify; `olbvh_last_error` then says what it lacks.
  */
 enum olbvh_status olbvh_host_check(void (*get_instance_proc_addr)(void),
                                    uint64_t instance,
@@ -818,16 +880,18 @@ enum olbvh_status olbvh_host_check(void (*get_instance_proc_addr)(void),
                                    struct olbvh_host_requirements *out);
 
 /*
- Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a
- host that reads or writes them on another family transfers their ownership.
+ Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
+ of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
+ ownership.
  */
 enum olbvh_status olbvh_gpu_from_host(const struct olbvh_host_device *host,
                                       struct olbvh_gpu **out);
 
 /*
- Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
- point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
- `-tolerance`; below 0 means the default, 1e-5.
+ Finds the owner of each of `count` points (three floats each): a tetrahedron, or `UINT32_MAX` if the point lies
+ outside of the mesh. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices; it may
+ be null. A point slightly outside of the mesh is accepted if its smallest barycentric coordinate in the nearest
+ tetrahedron is at least `-tolerance`; a negative `tolerance` selects the default, 1e-5.
  */
 enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
                                const float *points,
@@ -837,13 +901,14 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
                                float *barycentrics);
 
 /*
- What pictures are like where nothing else is asked for.
+ The default settings of pictures.
  */
 struct olbvh_picture_settings olbvh_default_picture_settings(void);
 
 /*
- Draws a field: `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets four floats per pixel, the upper row first: colour
- (sRGB from 0 to 1) multiplied by its opacity, and opacity; what is behind is the caller's.
+ Draws a field as a picture. `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets
+ four floats per pixel, upper row first: colour (sRGB, 0 to 1) multiplied by its opacity, and opacity. The caller
+ adds the background.
  */
 enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
                                const struct olbvh_picture_settings *settings,
@@ -852,10 +917,12 @@ enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
                                float *pixels);
 
 /*
- Slices a mesh conservatively: no voxel that it touches is left empty. `answers`, if not null, gets a word per voxel, layer by layer and row by row: the
- tetrahedron of its centre; plus 2^31 the nearest that touches its box, if the centre lies in none; 0xffffffff if it is empty. `results`, if not null, gets a
- float: the value of the field (`values` and `on_cells` as `olbvh_render` takes them) there, NaN where it is empty. A voxel that is merely touched gets the
- value of the tetrahedron's nearest point or, if `linear` is not 0, its field continued to the centre.
+ Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
+ voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
+ tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
+ null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
+ voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
+ if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
  */
 enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
                               const struct olbvh_voxels *voxels,
@@ -866,8 +933,9 @@ enum olbvh_status olbvh_slice(const struct olbvh_tree *tree,
                               float *results);
 
 /*
- Finds the tetrahedra of either mesh that intersect the other, whose points lie in one space. Of `hits_a` and `hits_b` word i / 32 gets bit i % 32
- set if tetrahedron i does; both have a word for 32 tetrahedra, the last of them perhaps for fewer. The trees are of one `olbvh_gpu`.
+ Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
+ coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
+ mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
  */
 enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
                                 const struct olbvh_tree *b,
@@ -875,20 +943,22 @@ enum olbvh_status olbvh_overlap(const struct olbvh_tree *a,
                                 uint32_t *hits_b);
 
 /*
- Makes what commands are recorded with: one per frame in flight, used by one thread at a time.
+ Makes a recording: one per frame in flight, used by one thread at a time.
  */
 enum olbvh_status olbvh_recording_new(const struct olbvh_gpu *gpu, struct olbvh_recording **out);
 
 /*
- Lets a recording go, when its commands have been executed; null is allowed.
+ Frees a recording after its commands have been executed; null is allowed.
  */
 void olbvh_recording_free(struct olbvh_recording *recording);
 
 /*
- Begins anew. `commands` is a `VkCommandBuffer` in the recording state, outside of a render pass; what was recorded before has been executed. 0
- rehearses: commands compile what they need, and the end makes room for the descriptor sets they would take, so that recording the same later makes
- nothing. `queries` is a reset `VkQueryPool` for timestamps of that many queries, or 0; stages are timed as long as there are queries left.
- The recording binds a compute pipeline, push constants, and set 0 where the device has no buffer addresses.
+ Starts a recording and forgets the previous one, whose commands must have been executed. `commands` is a
+ `VkCommandBuffer` in the recording state, outside of a render pass. If it is 0, the recording is a rehearsal:
+ commands compile the pipelines that they need, and the end reserves room for their descriptor sets, so that
+ recording the same commands later creates nothing. `queries` is a reset `VkQueryPool` of `query_count` timestamp
+ queries, or 0; stages are timed as long as queries are left. The recording binds a compute pipeline, push constants,
+ and descriptor set 0 where the device has no buffer addresses.
  */
 enum olbvh_status olbvh_recording_begin(struct olbvh_recording *recording,
                                         uint64_t commands,
@@ -896,37 +966,42 @@ enum olbvh_status olbvh_recording_begin(struct olbvh_recording *recording,
                                         uint32_t query_count);
 
 /*
- Ends the recording, the command buffer stays open. Fails where a barrier is missing between two commands, and names them.
+ Ends the recording; the command buffer stays in the recording state. Returns an error that names both commands if a
+ barrier is missing between two of them.
  */
 enum olbvh_status olbvh_recording_end(struct olbvh_recording *recording);
 
 /*
- Tells which queries of a recording that has ended have the times of its `index`th stage; fails behind the last.
+ Reports which queries hold the times of stage `index` (from 0) of a recording that has ended; returns an error if
+ there is no such stage.
  */
 enum olbvh_status olbvh_recording_stage(const struct olbvh_recording *recording,
                                         uint32_t index,
                                         struct olbvh_stage *out);
 
 /*
- Records a barrier: what was written so far is visible to the compute shaders, transfers and indirect commands that follow.
+ Records a barrier: what was written so far becomes visible to the compute shaders, transfers and indirect commands
+ that follow.
  */
 enum olbvh_status olbvh_cmd_barrier(struct olbvh_recording *recording);
 
 /*
- Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+ States that the host itself recorded a barrier at this place, equivalent to `olbvh_cmd_barrier` or stronger, so that
+ `olbvh_recording_end` does not report one missing. Records nothing.
  */
 enum olbvh_status olbvh_recording_host_barrier(struct olbvh_recording *recording);
 
 /*
- Tells what memory a plan wants.
+ Reports how much memory a plan needs.
  */
 enum olbvh_status olbvh_plan_measure(const struct olbvh_gpu *gpu,
                                      const struct olbvh_plan *plan,
                                      struct olbvh_plan_sizes *out);
 
 /*
- A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
- measured. The host keeps the buffers as long as it records with the scene.
+ Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
+ built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
+ as it records with the scene.
  */
 enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
                                     const struct olbvh_plan *plan,
@@ -937,26 +1012,27 @@ enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
                                     struct olbvh_scene **out);
 
 /*
- Lets a scene go, but not its buffers; null is allowed.
+ Frees a scene, but not its buffers; null is allowed.
  */
 void olbvh_scene_free(struct olbvh_scene *scene);
 
 /*
- Tells where the arrays of a scene are. `field`, a float per point, may be null.
+ Reports where the arrays of a scene are. `field`, a float per point, may be null.
  */
 enum olbvh_status olbvh_scene_arrays(const struct olbvh_scene *scene,
                                      const struct olbvh_buffer *field,
                                      struct olbvh_scene_arrays_data *out);
 
 /*
- Records the construction of a scene's tree for the positions there are then. Reads positions and cells in compute shaders, uses memory and scratch in
- compute shaders and transfers, and ends with a barrier as `olbvh_cmd_barrier` records it.
+ Records the construction of a scene's tree for the positions at the time of execution. Reads positions and cells in
+ compute shaders, uses memory and scratch in compute shaders and transfers, and ends with a barrier like that of
+ `olbvh_cmd_barrier`.
  */
 enum olbvh_status olbvh_cmd_build(struct olbvh_recording *recording,
                                   const struct olbvh_scene *scene);
 
 /*
- Tells what memory the location takes besides the answers.
+ Reports how much scratch memory the location needs besides the results.
  */
 enum olbvh_status olbvh_location_parts(const struct olbvh_scene *scene,
                                        const struct olbvh_location *location,
@@ -970,7 +1046,8 @@ enum olbvh_status olbvh_cmd_locate(struct olbvh_recording *recording,
                                    const struct olbvh_location *location);
 
 /*
- Tells what memory all owners of the points take, and where in `memory` (of no bytes, as long as there is none) the answers are.
+ Reports how much memory all owners of the points need, and where in `memory` (size 0 if it does not exist yet) the
+ results are.
  */
 enum olbvh_status olbvh_owner_parts(const struct olbvh_scene *scene,
                                     const struct olbvh_location *location,
@@ -978,8 +1055,9 @@ enum olbvh_status olbvh_owner_parts(const struct olbvh_scene *scene,
                                     struct olbvh_owner_parts_data *out);
 
 /*
- Records all owners of points: the tetrahedra that contain each, ascending, point by point, a word each in `found`. As many are written as that
- holds; `ends` and `total` of `olbvh_owner_parts` are right in any case. Of the location, points, stride, count and tolerance are read.
+ Records the search for all owners of points, that is for all tetrahedra that contain each of them: a word each in
+ `found`, point by point, ascending for each point. Only as many as fit `found` are written; `ends` and `total` of
+ `olbvh_owner_parts` are correct in any case. Of `location`, only points, stride, count and tolerance are used.
  */
 enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
                                    const struct olbvh_scene *scene,
@@ -988,8 +1066,8 @@ enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
                                    struct olbvh_buffer found);
 
 /*
- Records the values of a field at points that have been located: a float each in `values`, NaN without an owner. Of the location, count, owners and
- barycentrics are read, by compute shaders.
+ Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point
+ without an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
  */
 enum olbvh_status olbvh_cmd_interpolate(struct olbvh_recording *recording,
                                         const struct olbvh_scene *scene,
@@ -998,8 +1076,9 @@ enum olbvh_status olbvh_cmd_interpolate(struct olbvh_recording *recording,
                                         struct olbvh_buffer values);
 
 /*
- Works out what a picture shows of a mesh whose points lie within the box from `lo` to `hi`, three floats each: the camera is placed by it, and lengths are
- measured by its diagonal. Without a range in the settings, values reach from 0 to 1.
+ Computes what a picture shows of a mesh whose points lie in the box from `lo` to `hi`, three floats each. The camera
+ is placed relative to this box, and default lengths are fractions of its diagonal. If the settings give no range of
+ values, it is 0 to 1.
  */
 enum olbvh_status olbvh_view_make(const struct olbvh_picture_settings *settings,
                                   const float *lo,
@@ -1007,13 +1086,14 @@ enum olbvh_status olbvh_view_make(const struct olbvh_picture_settings *settings,
                                   struct olbvh_view *out);
 
 /*
- Tells how many bytes the ranges of a field take.
+ Reports how many bytes the ranges of a field take.
  */
 enum olbvh_status olbvh_range_bytes(const struct olbvh_scene *scene, uint64_t *out);
 
 /*
- Records the smallest and the largest value of a field in every node of the tree into `ranges`; new values need this alone, not a new tree. Begins with a
- transfer write, ends with a barrier as `olbvh_cmd_barrier` records it.
+ Records the computation of the smallest and the largest value of a field in every node of the tree, into `ranges`.
+ New values of the field need only this, not a new tree. Starts with a transfer write and ends with a barrier like
+ that of `olbvh_cmd_barrier`.
  */
 enum olbvh_status olbvh_cmd_ranges(struct olbvh_recording *recording,
                                    const struct olbvh_scene *scene,
@@ -1021,34 +1101,36 @@ enum olbvh_status olbvh_cmd_ranges(struct olbvh_recording *recording,
                                    struct olbvh_buffer ranges);
 
 /*
- Tells what memory a picture takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+ Reports how much memory a picture needs, and where in its `memory` (size 0 if it does not exist yet) the results
+ are.
  */
 enum olbvh_status olbvh_picture_parts(const struct olbvh_scene *scene,
                                       const struct olbvh_picture *picture,
                                       struct olbvh_picture_parts_data *out);
 
 /*
- Records the drawing of a picture. Where nodes are skipped, the tree is read by transfers as well.
+ Records the drawing of a picture. If nodes are skipped, transfers read the tree as well.
  */
 enum olbvh_status olbvh_cmd_render(struct olbvh_recording *recording,
                                    const struct olbvh_scene *scene,
                                    const struct olbvh_picture *picture);
 
 /*
- Tells what memory a slice takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+ Reports how much memory a slice needs, and where in its `memory` (size 0 if it does not exist yet) the results are.
  */
 enum olbvh_status olbvh_slicing_parts(const struct olbvh_slicing *slicing,
                                       struct olbvh_slicing_parts_data *out);
 
 /*
- Records the slicing of rows of voxels. The status is written by transfers as well.
+ Records the slicing of rows of voxels. Transfers write the status as well.
  */
 enum olbvh_status olbvh_cmd_slice(struct olbvh_recording *recording,
                                   const struct olbvh_scene *scene,
                                   const struct olbvh_slicing *slicing);
 
 /*
- Tells what memory the overlap of two meshes takes, and where in `memory` (of no bytes, as long as there is none) the answers are.
+ Reports how much memory the overlap of two meshes needs, and where in `memory` (size 0 if it does not exist yet) the
+ results are.
  */
 enum olbvh_status olbvh_overlap_parts(const struct olbvh_scene *a,
                                       const struct olbvh_scene *b,
@@ -1056,7 +1138,8 @@ enum olbvh_status olbvh_overlap_parts(const struct olbvh_scene *a,
                                       struct olbvh_overlap_parts_data *out);
 
 /*
- Records which tetrahedra of A intersect B and which of B intersect A; the points of both lie in one space. Three rounds are enough for most.
+ Records the search for the tetrahedra of A that intersect B, and of B that intersect A. The points of both meshes
+ are in the same coordinate system. Three rounds are enough for most meshes.
  */
 enum olbvh_status olbvh_cmd_overlap(struct olbvh_recording *recording,
                                     const struct olbvh_scene *a,
@@ -1065,15 +1148,16 @@ enum olbvh_status olbvh_cmd_overlap(struct olbvh_recording *recording,
                                     struct olbvh_rounds rounds);
 
 /*
- Tells what memory the pairs of A with another mesh take, and where in `memory` (of no bytes, as long as there is none) the status is.
+ Reports how much memory the pairs of A with another mesh need, and where in `memory` (size 0 if it does not exist
+ yet) the status is.
  */
 enum olbvh_status olbvh_pair_parts(const struct olbvh_scene *a,
                                    struct olbvh_buffer memory,
                                    struct olbvh_pair_parts_data *out);
 
 /*
- Records how many pairs of a tetrahedron of A and one of B touch; the tree over B has all lists (`lists` 0). But for `assign` 0, a pair counts once per
- leaf that lists both.
+ Records the counting of the pairs of a tetrahedron of A and one of B that touch. The tree over B must have full
+ lists (`lists` 0). Unless its `assign` is 0, a pair is counted once for every leaf that lists both.
  */
 enum olbvh_status olbvh_cmd_count_pairs(struct olbvh_recording *recording,
                                         const struct olbvh_scene *a,
@@ -1082,8 +1166,9 @@ enum olbvh_status olbvh_cmd_count_pairs(struct olbvh_recording *recording,
                                         struct olbvh_rounds rounds);
 
 /*
- Records the pairs themselves, once they are counted: two words each in `found`, the tetrahedron of A and that of B, ascending by A. As many are written
- as that holds. Begins with a barrier; if it goes on where an earlier recording ended, with a transfer write of the status.
+ Records the writing of the pairs, after they have been counted: two words each in `found`, the tetrahedron of A and
+ that of B, ascending by A. Only as many as fit `found` are written. Starts with a barrier; if it continues where an
+ earlier recording ended, it starts with a transfer write of the status.
  */
 enum olbvh_status olbvh_cmd_list_pairs(struct olbvh_recording *recording,
                                        const struct olbvh_scene *a,

@@ -1,5 +1,6 @@
-/* A driver whose queue families have no graphics, as those have that GPUs offer for computing beside a renderer; otherwise libvulkan_lvp.so, which is loaded
- * with it. It stands below the validation layers, which thus object to whatever needs graphics: commands, stages of barriers, stages of timestamps. */
+/* A driver whose queue families have no graphics, like those that GPUs offer for computing beside a renderer. Apart
+ * from that it is libvulkan_lvp.so, which is loaded with it. It lies below the validation layers, which therefore
+ * object to everything that needs graphics: commands, stages of barriers, stages of timestamps. */
 #include <dlfcn.h>
 #include <stdint.h>
 #include <string.h>

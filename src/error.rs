@@ -1,18 +1,18 @@
-//! The one error type of the crate.
+//! The error type of the crate.
 
 use std::path::PathBuf;
 
 /// Result of every fallible call of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
 
-/// What went wrong, where, and what to do about it.
+/// Every error of the crate. Its message says what went wrong, where, and what to do about it.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
     /// No Vulkan implementation could be loaded on this machine.
     #[error("no Vulkan on this machine: {0}")]
     NoVulkan(String),
-    /// No physical device meets the requirements, or the one asked for does not exist.
+    /// No physical device meets the requirements, or the requested one does not exist.
     #[error("no suitable Vulkan device: {0}")]
     NoDevice(String),
     /// The device computes wrong results in the start-up self-test.
@@ -22,7 +22,7 @@ pub enum Error {
         device: String,
         /// Name of the failing test.
         test: &'static str,
-        /// First wrong value, expected and found.
+        /// The first wrong value, and the expected one.
         detail: String,
     },
     /// A Vulkan call returned an error.
@@ -32,17 +32,17 @@ pub enum Error {
         call: &'static str,
         /// What it returned.
         result: ash::vk::Result,
-        /// The remedy, or empty; begins with a separator.
+        /// A remedy that starts with a separator, or empty.
         hint: String,
     },
-    /// Device memory could not be had.
+    /// Device memory could not be allocated.
     #[error("cannot allocate {bytes} bytes for {name}: {reason}")]
     Memory {
         /// Name of the allocation, `olbvh.<stage>.<thing>`.
         name: String,
-        /// Bytes asked for.
+        /// Bytes requested.
         bytes: u64,
-        /// What the allocator said.
+        /// The reason given by the allocator.
         reason: String,
     },
     /// A problem is larger than the device or the 32-bit indices of the tree can hold.
@@ -51,28 +51,28 @@ pub enum Error {
     /// An argument contradicts another one or lies outside its range.
     #[error("invalid argument: {0}")]
     Invalid(String),
-    /// The mesh has bad cells and the caller's policy is to reject them.
+    /// The mesh has bad cells and the caller chose to reject them.
     #[error("{count} bad cells (index out of range, repeated vertex, or coordinate not finite); the first: {first}")]
     BadCells {
-        /// How many.
+        /// Number of bad cells.
         count: u64,
         /// The first few, each with its reason.
         first: String,
     },
-    /// A tree breaks one of its rules (see [`crate::tree::TreeArrays::validate`]).
+    /// A tree breaks one of its invariants (see [`crate::tree::TreeArrays::validate`]).
     #[error("the tree breaks a rule: {0}")]
     BrokenTree(String),
-    /// Two structures give different answers to one question.
+    /// Two structures give different answers to the same question.
     #[error("wrong answer: {0}")]
     Mismatch(String),
-    /// A file cannot be read as what it should be.
+    /// A file's content is not valid for the format it is read as.
     #[error("{}: {place}{message}", path.display())]
     File {
         /// The file.
         path: PathBuf,
         /// Line, byte, array or cell; ends with a separator, or is empty.
         place: String,
-        /// What is wrong and what to do.
+        /// What is wrong and what to do about it.
         message: String,
     },
     /// Reading or writing failed.
@@ -80,13 +80,13 @@ pub enum Error {
     Io {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: std::io::Error,
     },
 }
 
 impl Error {
-    /// Whether something failed for want of memory or room, so that less may do.
+    /// Whether the error is a lack of memory or capacity, so that a smaller request may succeed.
     pub(crate) fn is_lack_of_room(&self) -> bool {
         matches!(self, Self::Memory { .. } | Self::TooLarge(_))
     }

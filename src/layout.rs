@@ -2,7 +2,7 @@
 
 #![allow(clippy::doc_markdown)]
 
-/// A number of 64 bits as it stands in a struct, the lower word first.
+/// A 64-bit number from the two words of a struct, the lower word first.
 pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {
     low as u64 | (high as u64) << 32
 }

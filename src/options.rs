@@ -1,59 +1,68 @@
-//! What a caller may ask of a build. One set of options for the device and the CPU; knows no Vulkan.
+//! Options of a build, the same for the device and the CPU. They do not depend on Vulkan.
 
 use crate::error::{Error, Result};
 
-/// How far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf, unless the caller says otherwise (SPEC 3.1).
+/// Default tolerance: how far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf
+/// (SPEC 3.1).
 pub const TOLERANCE: f32 = 1e-5;
 
-/// Points that are located one after the other, each from the owner of the one before, where they lie near each other.
+/// Number of consecutive points that are located together as a run, each starting from the owner of the one before.
 pub const POINT_RUN: u32 = 8;
 
-/// Which cells list a primitive (SPEC 2.2). The stronger the test, the shorter the lists and the longer the construction.
+/// The assignment: which grid cells list a tetrahedron (SPEC 2.2). A stronger test gives shorter lists and a longer
+/// construction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Assign {
-    /// Every cell of the primitive's quantized bounding box (the paper, Eq. 5–6).
+    /// Every cell of the tetrahedron's quantized bounding box (the paper, Eq. 5–6).
     Aabb = 0,
-    /// Of those, the cells that no face plane separates from the primitive. Takes about as long to build as [`Self::Aabb`], since there is less to sort.
+    /// The cells of the box that no face plane separates from the tetrahedron. Takes about as long to build as
+    /// [`Self::Aabb`], since there is less to sort.
     #[default]
     Planes = 1,
-    /// Of those, the cells that touch the primitive: face planes and the 18 crosses of edges and axes.
+    /// The cells of the box that touch the tetrahedron, tested with its face planes and the 18 cross products of edges
+    /// and axes.
     Exact = 2,
 }
 
-/// Which primitives a leaf lists (SPEC 2.6).
+/// The tetrahedra that a leaf lists (SPEC 2.6).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Lists {
-    /// All that the assignment puts there (the paper).
+    /// All tetrahedra that the assignment puts there (the paper).
     All = 0,
-    /// The same in leaves that the boundary touches; in a leaf that is full of mesh one primitive, the owner of the cell's centre, from which a
-    /// walk across faces finds the others. Entries grow with the mesh's surface instead of its volume.
+    /// All of them in boundary leaves; in a leaf that lies entirely within the mesh only the seed, which is the owner
+    /// of the cell's centre and from which a walk across faces finds the others. The number of entries grows with the
+    /// mesh's surface instead of its volume.
     #[default]
     Boundary = 1,
 }
 
-/// How fine leaves are, where nothing else says it.
+/// How fine the leaves are, beyond what α or a given level sets.
 ///
-/// α goes by the largest extent of a cell in parts of the bounds along that axis, so the tree over a plate, whose cells reach through it, is a single node, and
-/// points beside thin parts meet long lists. A finer tree than α's is built after it where that repays the time, as far as capacity and memory allow. It is for
-/// trees in memory of our own ([`crate::build::Tree::build`]) and the reference, where counts are known in time; a recorded build takes no notice, and is given
-/// the level that a tree over the mesh at rest came to ([`BuildOptions::level`]).
+/// α refers to the largest extent of a tetrahedron as a fraction of the bounds along that axis. The tree over a plate
+/// whose tetrahedra span its thickness is therefore a single node, and points beside thin parts meet long lists. The
+/// other variants build a second, finer tree where that repays the time, as far as capacity and memory allow; with a
+/// budget none is built. This applies to [`crate::build::Tree::build`] and the reference implementation, which know the
+/// counts in time. A recorded build ignores it, and should be given the level of a tree over the undeformed mesh
+/// ([`BuildOptions::level`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Fineness {
-    /// As α or the level asked for says (the paper).
+    /// As fine as α or the requested level makes them (the paper).
     #[default]
     Alpha = 0,
-    /// As suits points, slices and overlap: a leaf lists up to 128 entries on average.
+    /// For points, slices and overlap: a leaf lists up to 128 entries on average.
     Points = 1,
-    /// As suits pictures, which ask far more: up to 30 entries on average (of 110 a level more draws twice as fast, of 31 1.4 times, of 20 it costs what it
-    /// gains), and anyway as fine as 2^20 entries of `Aabb` go, since rays pass by empty cells at once.
+    /// For rendering, which makes far more queries: a leaf lists up to 30 entries on average. (From a mean of 110
+    /// entries, one more level renders twice as fast; from 31, 1.4 times; from 20, the gain equals the cost.) Leaves
+    /// are in any case as fine as 2^20 entries of `Aabb` allow, since rays pass empty cells immediately.
     Pictures = 2,
 }
 
 impl Fineness {
-    /// Entries that a leaf lists at most on average, and entries of `Aabb` that a tree may have anyway; nothing where neither matters.
+    /// The most entries that a leaf may list on average, and a number of `Aabb` entries that the tree may always have;
+    /// `None` if neither limit applies.
     pub(crate) fn limits(self) -> Option<(u64, u64)> {
         match self {
             Self::Alpha => None,
@@ -62,13 +71,13 @@ impl Fineness {
         }
     }
 
-    /// Whether finer leaves than α's would suit better, by their mean number of entries.
+    /// Whether finer leaves than those of α would suit better, given the mean number of entries per leaf.
     pub fn wants_finer(self, mean: u64) -> bool {
         self.limits().is_some_and(|(most, _)| mean > most)
     }
 }
 
-/// Names of the variants, as the command line and reports use them.
+/// Implements the names of an enum's variants, as the command line and reports use them.
 macro_rules! named {
     ($type:ident, $what:literal, [$($variant:ident = $name:literal),+ $(,)?]) => {
         impl $type {
@@ -107,36 +116,38 @@ named!(Assign, "assignment", [Aabb = "aabb", Planes = "planes", Exact = "exact"]
 named!(Lists, "kind of lists", [All = "all", Boundary = "boundary"]);
 named!(Fineness, "fineness", [Alpha = "alpha", Points = "points", Pictures = "pictures"]);
 
-/// How to build a tree.
+/// Options of a build.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BuildOptions {
     /// The paper's α in 0…10: how many levels coarser than the cells' size the leaves are.
     pub alpha: f32,
-    /// Which cells list a primitive.
+    /// The assignment of tetrahedra to grid cells.
     pub assign: Assign,
-    /// Which primitives a leaf lists.
+    /// The tetrahedra that a leaf lists.
     pub lists: Lists,
-    /// Store a box per node (24 bytes each). Without, boxes follow from the grid.
+    /// Whether to store a box per node (24 bytes each). Otherwise boxes follow from the grid.
     pub boxes: bool,
-    /// Most entries (primitive ids in leaves) the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are held to the
-    /// count of `Aabb`, which bounds theirs and is known without their tests. `None`: [`usual_capacity`].
+    /// Most entries the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are limited by the
+    /// entry count of `Aabb`, which bounds theirs and is known without their tests. `None`: [`usual_capacity`].
     pub capacity: Option<u32>,
-    /// Most bytes that the arrays of the tree may have together ([`crate::tree::TreeBytes::total`]), α being the finest that is asked for: the tree gets
-    /// coarser until it fits. What is held to the budget is [`crate::tree::TreeBytes::most`], which is known before anything is built. `None`: no limit.
+    /// Most bytes that the arrays of the tree may have together ([`crate::tree::TreeBytes::total`]), while α sets the
+    /// finest level; the tree gets coarser until it fits. The budget is compared with [`crate::tree::TreeBytes::most`],
+    /// which is known before anything is built. `None`: no limit.
     pub budget: Option<u64>,
-    /// Level that the leaves should have, up to 10, whatever α and the size of the cells ask for; capacity and budget still hold. `None`: by α.
+    /// Level of the leaves, up to 10, which replaces the choice by α; capacity and budget still apply. `None`: by α.
     pub level: Option<u32>,
-    /// How fine leaves are beyond that.
+    /// Whether to build finer leaves than that where they suit the queries better.
     pub fineness: Fineness,
 }
 
-/// Entries per tetrahedron of the usual capacity; even cells have about 8 at α = 0.
+/// Entries per tetrahedron of [`usual_capacity`]; a mesh of even tetrahedra has about 8 at α = 0.
 pub const USUAL_ENTRIES: u32 = 64;
-/// The least usual capacity.
+/// The smallest value of [`usual_capacity`].
 pub const LEAST_USUAL: u32 = 1 << 20;
 
-/// Most entries of the tree over so many tetrahedra where no capacity is asked for: where cells differ much in size, the mean that α refers to is that of
-/// the small ones, and the large ones would fill hundreds of leaves each.
+/// Most entries of a tree over `tets` tetrahedra if [`BuildOptions::capacity`] is not given. Without a limit, where
+/// tetrahedra differ much in size, the mean that α refers to is that of the small ones, and each large one would be
+/// listed by hundreds of leaves.
 pub fn usual_capacity(tets: u32) -> u32 {
     tets.saturating_mul(USUAL_ENTRIES).max(LEAST_USUAL)
 }

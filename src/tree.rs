@@ -10,34 +10,39 @@ use crate::reference::grid::{Grid, MAX_LEVEL, morton};
 use crate::reference::leaves::Box6;
 use std::ops::Range;
 
-/// An OLBVH: nodes breadth first, node 0 the root on level 0, leaves on level l = `grid.level`.
+/// An OLBVH. Nodes are in breadth-first order: node 0 is the root on level 0, and the leaves are on level l =
+/// `grid.level`.
 ///
-/// A mesh without a single valid cell has one node, an empty leaf.
+/// For a mesh without a valid tetrahedron the tree is one node, an empty leaf.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeArrays {
     /// The assignment that the entries follow.
     pub assign: Assign,
-    /// Which primitives a leaf lists.
+    /// The tetrahedra that a leaf lists.
     pub lists: Lists,
-    /// The grid whose cells the leaves are; its `level` is l, its `first_leaf` `n_ni`.
+    /// The grid whose cells are the leaves; its `level` is l, its `first_leaf` is `n_ni`.
     pub grid: Grid,
-    /// `P[n_m]`: primitive ids by Morton code of the leaf, ascending within a leaf.
+    /// `P[n_m]`: tetrahedron ids in the order of the leaves' Morton codes, ascending within a leaf.
     pub p: Vec<u32>,
-    /// Quarters of its leaf's cell that each entry is near to (see [`crate::reference::quarters`]); empty where entries have none.
+    /// For each entry, the quarters of its leaf's cell that it is near to (see [`crate::reference::quarters`]); empty
+    /// where entries have none.
     pub quarters: Vec<u16>,
-    /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper has offsets for every node; those of the
-    /// other nodes follow from their leaves.
+    /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper stores
+    /// offsets for every node; here those of internal nodes follow from their leaves.
     pub po: Vec<u32>,
     /// `CO[n_ni + 1]`: the children of internal node i are `co[i] + 1 ..= co[i + 1]`.
     pub co: Vec<u32>,
-    /// `NO[l + 1]`: `no[k]` nodes on levels 0…k.
+    /// `NO[l + 1]`: `no[k]` is the number of nodes on levels 0…k.
     pub no: Vec<u32>,
-    /// Boundary flag per node, bit j % 32 of word j / 32; set if a boundary primitive lies in the node.
+    /// Boundary flag per node, bit j % 32 of word j / 32. It is set if the node lists a boundary tetrahedron, and where
+    /// a leaf may lie outside of the mesh (see [`crate::reference::leaves::flag`]).
     pub boundary: Vec<u32>,
-    /// Mask per node, byte i % 4 of word i / 4. Of an internal node, bit d: the child with the 3-bit Morton digit d exists. Of a leaf: an entry is
-    /// near to that octant of its cell (see [`crate::reference::leaves::octants`]); in the others nothing is to be found.
+    /// Mask per node, byte i % 4 of word i / 4. For an internal node, bit d says that the child with the 3-bit Morton
+    /// digit d exists. For a leaf, bit d says that an entry is near to that octant of its cell (see
+    /// [`crate::reference::leaves::octants`]); the other octants contain no part of the mesh.
     pub mask: Vec<u32>,
-    /// Box per node, `[lo, hi]` in the units of the mesh: a leaf's is its cell's, others the union of their children's.
+    /// Box per node, `[lo, hi]` in the units of the mesh: the cell's box for a leaf, the union of the children's boxes
+    /// for others.
     pub boxes: Option<Vec<Box6>>,
 }
 
@@ -47,7 +52,7 @@ impl TreeArrays {
         self.no.last().copied().unwrap_or(0)
     }
 
-    /// Number of nodes that are not leaves, `n_ni`; they come first.
+    /// Number of internal nodes, `n_ni`; they precede the leaves.
     pub fn internal_nodes(&self) -> u32 {
         self.co.len().saturating_sub(1) as u32
     }
@@ -57,7 +62,7 @@ impl TreeArrays {
         self.internal_nodes()..self.nodes()
     }
 
-    /// The node indices of a level; empty past the last.
+    /// The node indices of a level; empty beyond the last level.
     pub fn level_nodes(&self, level: u32) -> Range<u32> {
         let end = |k: u32| self.no.get(k as usize).copied().unwrap_or(self.nodes());
         if level == 0 { 0..end(0) } else { end(level - 1)..end(level) }
@@ -68,7 +73,7 @@ impl TreeArrays {
         self.no.partition_point(|&n| n <= node) as u32
     }
 
-    /// The children of a node, in the order of their digits; empty for leaves.
+    /// The children of a node, in the order of their Morton digits; empty for leaves.
     pub fn children(&self, node: u32) -> Range<u32> {
         match self.co.get(node as usize..node as usize + 2) {
             Some(co) => co[0] + 1..co[1] + 1,
@@ -76,7 +81,7 @@ impl TreeArrays {
         }
     }
 
-    /// The mask of a node: its children, or the octants of a leaf.
+    /// The mask of a node: of its children, or of the octants of a leaf.
     pub fn mask_of(&self, node: u32) -> u32 {
         self.mask[node as usize / 4] >> (8 * (node % 4)) & 0xff
     }
@@ -93,7 +98,7 @@ impl TreeArrays {
         (mask >> digit & 1 != 0).then(|| self.co[node as usize] + 1 + before)
     }
 
-    /// The slots of a node's entries in `p`: those of its first to its last leaf.
+    /// The range of a node's entries in `p`, from those of its first leaf to those of its last.
     pub fn entries(&self, node: u32) -> Range<usize> {
         let (mut first, mut last) = (node, node);
         while first < self.internal_nodes() {
@@ -103,23 +108,26 @@ impl TreeArrays {
         self.po[leaf(first)] as usize..self.po[leaf(last) + 1] as usize
     }
 
-    /// The primitives of a node: ascending and each once for a leaf; for others the lists of their leaves one after the other.
+    /// The tetrahedra of a node. For a leaf they are ascending and distinct; for an internal node the lists of its
+    /// leaves follow one another.
     pub fn primitives(&self, node: u32) -> &[u32] {
         &self.p[self.entries(node)]
     }
 
-    /// The primitive that a walk through a leaf begins at, if the leaf is one to walk through: full of mesh, its list left out (SPEC 2.6).
+    /// The seed, from which a walk through a leaf starts, if the leaf has one: the leaf lies entirely within the mesh
+    /// and its list is left out (SPEC 2.6).
     pub fn seed(&self, leaf: u32) -> Option<u32> {
         let full = self.lists == Lists::Boundary && !self.is_boundary(leaf);
         self.primitives(leaf).first().copied().filter(|_| full)
     }
 
-    /// Whether a boundary primitive lies in the node. If not, the node's leaves are full of mesh.
+    /// Whether the mesh surface may pass through the node. If not, the node's leaves lie entirely within the mesh.
     pub fn is_boundary(&self, node: u32) -> bool {
         bit(&self.boundary, node)
     }
 
-    /// The leaf that stands for a cell of the finest grid (as [`Grid::quantize`] gives it), by descent over the child masks, if a primitive is near it.
+    /// The leaf whose cell contains a cell of the finest grid (as returned by [`Grid::quantize`]), found by descent
+    /// over the child masks; `None` if there is no leaf, or no entry is near that octant of it.
     pub fn find_leaf(&self, finest: [u32; 3]) -> Option<u32> {
         let (level, code) = (self.grid.level, morton(finest));
         let leaf = self.find_node(code >> (3 * (MAX_LEVEL - level)), level)?;
@@ -127,7 +135,7 @@ impl TreeArrays {
         near.then_some(leaf)
     }
 
-    /// The node of a level that stands for the cell with this Morton code.
+    /// The node on a level whose cell has this Morton code.
     pub fn find_node(&self, code: u32, level: u32) -> Option<u32> {
         (0..level).try_fold(0, |node, k| self.child(node, code >> (3 * (level - 1 - k)) & 7))
     }

@@ -1,4 +1,4 @@
-//! `include/olbvh.h` is what cbindgen makes of `src/capi`.
+//! `include/olbvh.h` is the header that cbindgen generates from `src/capi`.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use std::path::Path;
 #[test]
 fn the_header_in_the_repository_is_the_generated_one() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    // One module for cbindgen, which does not follow private ones.
+    // All in one module, since cbindgen does not follow private ones.
     let mut source = String::new();
     let files = ["mod", "host", "query", "record", "record/scene", "record/locate", "record/render", "record/slice", "record/overlap"];
     for file in files.map(|stem| format!("{stem}.rs")) {

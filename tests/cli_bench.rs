@@ -1,4 +1,4 @@
-//! `olbvh bench` on a tiny mesh: what it writes, and that what it writes fits together.
+//! `olbvh bench` on a tiny mesh: the files that it writes, and that their figures agree.
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -14,12 +14,12 @@ fn strings<'a>(list: &'a Value, key: &str) -> Vec<&'a str> {
     list.as_array().unwrap().iter().map(|entry| entry[key].as_str().unwrap()).collect()
 }
 
-/// Device median, or else that of the host.
+/// The median of the device times, or of the host times where there are none.
 fn milliseconds(figure: &Value) -> f64 {
     figure["device_ms"].get("median").unwrap_or(&figure["wall_ms"]["median"]).as_f64().unwrap()
 }
 
-/// Stages fit the build's figure, the sizes of the tree, and the copy rate.
+/// The stages agree with the figure of the build, the sizes of the tree, and the copy rate.
 fn check_stages(report: &Value, structure: &Value) {
     let timed = structure["figures"][0]["stages_ms"].as_object().unwrap();
     let stages = structure["stages"].as_array().unwrap();
@@ -37,7 +37,7 @@ fn check_stages(report: &Value, structure: &Value) {
     }
     let missing: Vec<_> =
         timed.iter().filter(|(name, ms)| ms.as_f64() > Some(0.0) && stages.iter().all(|s| s["stage"] != **name)).collect();
-    // A tree that is its root alone has nothing to sort and no levels.
+    // A tree of its root alone has nothing to sort and no levels.
     assert!(
         missing.iter().all(|(name, _)| structure["level"] == 0 && ["build.sort", "build.levels"].contains(&name.as_str())),
         "{missing:?}"
@@ -59,7 +59,7 @@ fn time_per_item_is_told_over_sizes() {
         let figure = structure["figures"].as_array().unwrap().iter().find(|f| f["quantity"] == scale["quantity"]).unwrap();
         let per_item = scale["ns_per_item"].as_f64().unwrap();
         assert!((per_item * figure["per_second"].as_f64().unwrap() / 1e9 - 1.0).abs() < 1e-9, "{scale}");
-        // The larger mesh is nearer to 200,000.
+        // The larger mesh is nearer to 200,000 tetrahedra.
         assert!(scale["mesh"] != "kuhn:7,6,5" || scale["ratio"] == 1.0, "{scale}");
     }
     assert!(std::fs::read_to_string(folder.path().join("out/bench.md")).unwrap().contains("## Scaling: Construction"));
@@ -121,7 +121,7 @@ fn a_tiny_mesh_is_measured() {
                     let rate = figure["per_second"].as_f64().unwrap();
                     assert!((rate * time / 1e3 / items - 1.0).abs() < 1e-9, "{figure}");
                 }
-                // The ratio is that of the times printed.
+                // The ratio is the one of the times printed.
                 let baseline = lbvh["figures"].as_array().unwrap().iter().find(|f| f["quantity"] == figure["quantity"]);
                 let ratio = baseline.map(|b| milliseconds(b) / time);
                 match (figure["speedup"].as_f64(), ratio) {

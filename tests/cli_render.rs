@@ -1,4 +1,4 @@
-//! The program as its users run it: exit codes, JSON keys, messages, files.
+//! The program as its users run it: exit codes, JSON keys, messages and files.
 
 #![allow(clippy::unwrap_used)]
 
@@ -23,7 +23,7 @@ fn json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_slice(&out.stdout).unwrap()
 }
 
-/// A run that must fail with `code`; its message.
+/// Runs the program, which must fail with `code`; returns its message.
 fn fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
     let out = olbvh(folder, arguments);
     let message = text(&out.stderr);
@@ -128,7 +128,7 @@ fn locate_finds_points_and_values() {
     for ending in ["npy", "npz", "vtu", "json"] {
         json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", &format!("o.{ending}"), "--device", "cpu"]);
     }
-    // Many points for the mesh: sorted, or in runs.
+    // So many points for the mesh that they are sorted or, with `--coherent`, located in runs.
     let table = |name: &str, more: &[&str]| {
         json(folder.path(), &[&["locate", "kuhn:1,1,1", "p.csv", "-o", name, "--device", "cpu"], more].concat());
         std::fs::read_to_string(folder.path().join(name)).unwrap()
@@ -220,7 +220,7 @@ fn a_closed_pipe_is_no_panic() {
     assert_eq!((out.status.code(), text(&out.stderr)), (Some(0), String::new()));
 }
 
-/// Trees are as fine as suits what is asked, unless a level is.
+/// Unless a level is given, trees are as fine as suits the query.
 #[test]
 fn leaves_suit_what_is_asked() {
     let folder = TempDir::new().unwrap();
@@ -239,7 +239,7 @@ fn leaves_suit_what_is_asked() {
         assert_eq!(told(&[asked, &["--level", "1"]].concat()), [false; 2], "{asked:?}");
     }
     assert_eq!(told(&render), [false, true]);
-    // Where there are few pixels for so many cells, a second build repays for lists that are very long alone.
+    // With few pixels for this many cells, a second build pays only for very long lists.
     assert_eq!(told(&[&render[..5], &["20x20"]].concat()), [true, false]);
     assert_eq!(told(&["info", "kuhn:30,30,1"]), [false; 2]);
 }

@@ -1,4 +1,5 @@
-//! `olbvh slice` and `olbvh overlap` on the command line: files, JSON keys, refusals. On the processor, so that no driver is needed.
+//! `olbvh slice` and `olbvh overlap` on the command line: files, JSON keys and refusals. They run on the processor, so
+//! that no driver is needed.
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -69,7 +70,7 @@ fn slices_become_files() {
     assert_eq!(files(folder), made, "a refused slice leaves nothing");
 }
 
-/// What is asked for by mistake is done, and told.
+/// Requests that look like mistakes are carried out, with a remark.
 #[test]
 fn remarks() {
     let folder = tempfile::tempdir().unwrap();
@@ -123,7 +124,7 @@ fn overlaps_become_files() {
     let (_, sets, _) = olbvh(folder, &["overlap", "kuhn:3,3,3", "kuhn:2,2,2", "-o", "b.json", "--move-b", "1.3,1.2,1.1", "--reorder"]);
     assert_eq!((&sets["a"], &sets["b"], &sets["pairs"]), (&json["a"], &json["b"], &Value::Null));
     assert_eq!((&read("b.json")["a"], &read("b.json")["b"]), (&result["a"], &result["b"]), "in another order the ids are the same");
-    // Turned by 90° about its own centre, a cube covers what it covered; moved away, nothing.
+    // Turned by 90° about its own centre, a cube covers what it covered before; moved away, it covers nothing.
     let (_, turned, _) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "c.json", "--rotate-b", "z,90"]);
     assert_eq!((turned["a"].as_u64(), turned["b"].as_u64()), (Some(48), Some(48)));
     let (code, away, _) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "d.vtu", "--move-b", "0,-9,0"]);

@@ -1,4 +1,4 @@
-//! `olbvh tune`, and how later runs find what it saved.
+//! `olbvh tune`, and how later runs find the profile that it saved.
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
-/// A folder with a configuration of its own.
+/// A folder with its own configuration.
 struct Home(tempfile::TempDir);
 
 impl Home {
@@ -30,7 +30,7 @@ impl Home {
         serde_json::from_slice(&out.stdout).unwrap()
     }
 
-    /// What `info -v` says of the kernels, and what it remarks.
+    /// The line of `info -v` about the kernels, and its remarks.
     fn kernels(&self, arguments: &[&str], variables: &[(&str, &str)]) -> (String, String) {
         let out = self.olbvh(&[&["info", "kuhn:2,2,2", "-v"], arguments].concat(), variables);
         let [stdout, stderr] = [out.stdout, out.stderr].map(|text| String::from_utf8(text).unwrap());
@@ -76,7 +76,7 @@ fn profiles_are_found_and_passed_over() {
     assert!(!file.exists());
     assert!(home.kernels(&[], &[]).0.contains("for devices of this kind"));
 
-    // The device's own.
+    // The profile of this device.
     let mut profile: Value = serde_json::from_slice(&std::fs::read(home.path("mine.json")).unwrap()).unwrap();
     let named = |profile: &mut Value, key: &str, value: Value| profile["target"][key] = value;
     named(&mut profile, "name", "mine".into());
@@ -91,7 +91,7 @@ fn profiles_are_found_and_passed_over() {
     }
     assert!(home.kernels(&[], &[("OLBVH_NO_PROFILE", "0")]).0.contains("`mine`"));
 
-    // Another device's, and broken ones, cost speed only: a remark names file and remedy.
+    // The profile of another device, and broken ones, cost only speed: a remark names the file and a remedy.
     let mut foreign = profile.clone();
     foreign["driver"] = "Another 1.0".into();
     let mut narrow = profile.clone();
@@ -115,7 +115,7 @@ fn profiles_are_found_and_passed_over() {
         assert!(remarks.contains("remove it, or"), "{remarks}");
     }
 
-    // What is asked for must be there, and stands before the profile.
+    // A target that is asked for must exist, and takes precedence over the profile.
     write(&file, &profile);
     assert!(home.kernels(&["--target", "mine.json"], &[]).0.contains("from mine.json"));
     assert!(home.kernels(&[], &[("OLBVH_TARGET", "amd")]).0.contains("`amd`, as asked for"));

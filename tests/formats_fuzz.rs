@@ -1,6 +1,6 @@
-//! Files cut short and files with wrong bytes: an error or a mesh that is sound, never a panic.
+//! Files cut short and files with wrong bytes give an error or a sound mesh, never a panic.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used)] // In helpers of tests as well.
+#![allow(clippy::unwrap_used)] // also in helpers of tests
 
 mod formats_small;
 
@@ -24,7 +24,7 @@ fn check(path: &Path, bytes: Vec<u8>) {
     }
 }
 
-/// Cuts and wrong bytes at every `step`-th byte.
+/// Checks cuts and wrong bytes at every `step`-th byte.
 fn damage(path: &Path, bytes: &[u8], step: usize) {
     for at in (0..bytes.len()).step_by(step) {
         check(path, bytes[..at].to_vec());

@@ -1,8 +1,8 @@
-//! Hostile files: refused or read as `expect.json` says, quickly and without large allocations. One test alone in its process,
-//! because it watches the allocator.
+//! Hostile files are refused or read as `expect.json` says, quickly and without large allocations. This is the only
+//! test of its process, because it watches the allocator.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used, clippy::format_push_string, clippy::format_collect)] // In helpers of tests as well; plain is better than fast here.
-#![allow(unsafe_code)] // A global allocator that counts cannot be written otherwise.
+#![allow(clippy::unwrap_used, clippy::format_push_string, clippy::format_collect)] // also in helpers of tests
+#![allow(unsafe_code)] // a global allocator that counts cannot be written otherwise
 
 mod formats_small;
 
@@ -19,7 +19,7 @@ static PEAK: AtomicUsize = AtomicUsize::new(0);
 
 struct Counting;
 
-// SAFETY: every call is handed to the system's allocator unchanged; the counters do not allocate.
+// SAFETY: every call is passed on to the system's allocator unchanged; the counters do not allocate.
 unsafe impl GlobalAlloc for Counting {
     unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
         let now = NOW.fetch_add(layout.size(), Relaxed) + layout.size();
@@ -38,7 +38,8 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-/// What a file becomes; complaints if that takes long, or more than `times` the memory that a reader may ask for.
+/// Loads a file. Adds a complaint to `broken` if that takes long, or takes more than `times` the memory that a reader
+/// may ask for.
 fn watched(
     name: &str,
     size: usize,
@@ -85,7 +86,7 @@ fn vtu(pieces: &[(usize, String, String)]) -> Vec<u8> {
     (text + "</UnstructuredGrid></VTKFile>").into_bytes()
 }
 
-/// A Gmsh file with views of nodes: their values, and how many components these have.
+/// A Gmsh file with views of nodes, given by name, number of components and values.
 fn msh(points: usize, views: impl Iterator<Item = (String, usize, &'static str)>) -> Vec<u8> {
     let mut text = format!("$MeshFormat\n2.2 0 8\n$EndMeshFormat\n$Nodes\n{points}\n1 0 0 0\n2 1 0 0\n3 0 1 0\n4 0 0 1\n");
     text.extend((5..=points).map(|i| format!("{i} 0 0 0\n")));
@@ -96,7 +97,7 @@ fn msh(points: usize, views: impl Iterator<Item = (String, usize, &'static str)>
     text.into_bytes()
 }
 
-/// A Gmsh file of so many tetrahedra, each a volume of its own and with a physical group of its own.
+/// A Gmsh file of `n` tetrahedra, each a volume of its own with its own physical group.
 fn volumes(n: usize) -> Vec<u8> {
     let mut text = format!("$MeshFormat\n4.1 0 8\n$EndMeshFormat\n$Entities\n0 0 0 {n}\n");
     text.extend((1..=n).map(|i| format!("{i} 0 0 0 1 1 1 1 {} 0\n", 2 * i)));
@@ -105,7 +106,7 @@ fn volumes(n: usize) -> Vec<u8> {
     (text + "$EndElements\n").into_bytes()
 }
 
-/// A legacy VTK file of one tetrahedron and cell arrays of these names.
+/// A legacy VTK file of one tetrahedron with cell arrays of these names.
 fn vtk(names: impl Iterator<Item = String>) -> Vec<u8> {
     let arrays: Vec<String> = names.map(|name| format!("{name} 1 1 int 7\n")).collect();
     let head = format!(
@@ -114,7 +115,8 @@ fn vtk(names: impl Iterator<Item = String>) -> Vec<u8> {
     format!("{head}CELL_DATA 1\nFIELD F {}\n{}", arrays.len(), arrays.concat()).into_bytes()
 }
 
-/// Files that once took time or memory with the square of their size. Arrays that need more NaN than the file allows are left out.
+/// Files that once took time or memory in proportion to the square of their size. Arrays that need more NaN than the
+/// size of the file allows are left out.
 fn made_files(broken: &mut Vec<String>) {
     let array = |i: usize, components: usize| {
         let values = "7 ".repeat(components);

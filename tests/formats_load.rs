@@ -1,6 +1,6 @@
 //! Every spelling of every format gives the same mesh.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used, clippy::format_collect, clippy::case_sensitive_file_extension_comparisons)] // Tests and their helpers may.
+#![allow(clippy::unwrap_used, clippy::format_collect, clippy::case_sensitive_file_extension_comparisons)] // also in helpers of tests
 
 mod formats_small;
 
@@ -171,7 +171,7 @@ fn far_meshes_keep_their_shape() {
     let points: String = POINTS.iter().map(|p| format!("{} {} {}\n", p[0] + 1e7 + 0.3, p[1] - 3e7, p[2] + 0.1)).collect();
     let far = format!("{}POINTS 8 double\n{points}{}", &text[..head], &text[cells..]);
     let Loaded { mesh, report } = open(write(&folder, "far.vtk", far.as_bytes()));
-    // The third axis is near.
+    // Only the third axis is close enough to 0 to have no origin.
     assert_eq!(mesh.origin, [1e7 + 0.3, -3e7, 0.0]);
     assert_eq!(report.bounds[0], [1e7 + 0.3, -3e7, 0.1]);
     for (p, q) in mesh.points.iter().zip(POINTS) {
@@ -221,7 +221,7 @@ fn open_bytes(name: &str, bytes: Vec<u8>) -> Loaded {
     load_bytes(name, bytes, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
 }
 
-/// The cell field `c` is 0 to 5, here as marks of ghosts.
+/// The cell field `c`, 0 to 5, serves as marks of ghosts here.
 #[test]
 fn ghost_cells_are_left_out() {
     for (name, old, new) in [
@@ -246,7 +246,8 @@ fn parametric_volumes_are_missed() {
     assert_eq!((report.count(Fate::Unsupported), report.count(Fate::Boundary)), (1, 0), "{report}");
 }
 
-/// Of three pieces, `a` is in the first and the last, there twice with as many components; `b` is in the second.
+/// Of three pieces, the first and the last have the array `a`, in the last with twice as many components; the second
+/// has `b`.
 #[test]
 fn arrays_of_some_pieces() {
     let values = |name: &str, values: [i32; 4]| {
@@ -313,7 +314,7 @@ fn gmsh_physical_groups_of_4_0() {
 fn two_sections_of_vertices_are_refused() {
     let text = replace("text.mesh", b"Tetrahedra", b"Vertices\n1\n0 0 0 0\nTetrahedra");
     let mut binary = all().into_iter().find(|f| f.0 == "binary.meshb").unwrap().1;
-    // The section of vertices once more, each with the byte where it ends.
+    // Adds the section of vertices a second time; every section holds the byte where it ends.
     let (start, end) = (20, 256);
     let section = binary[start..end].to_vec();
     let longer = |word: &mut [u8]| {

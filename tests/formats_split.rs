@@ -1,7 +1,7 @@
-//! Hexahedra, wedges and pyramids become tetrahedra that fit together and fill the same space.
+//! Hexahedra, wedges and pyramids are split into tetrahedra that fit together and fill the same space.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used)] // In helpers of tests as well.
-#![allow(clippy::format_push_string)] // Plain is better than fast here.
+#![allow(clippy::unwrap_used)] // also in helpers of tests
+#![allow(clippy::format_push_string)] // simple code matters more than speed here
 
 mod formats_small;
 
@@ -17,7 +17,7 @@ fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
     (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
 }
 
-/// Faces by how many tetrahedra share them.
+/// The number of tetrahedra that share each face.
 fn faces(mesh: &Mesh) -> HashMap<[u32; 3], u32> {
     let mut faces = HashMap::new();
     for t in &mesh.tets {
@@ -30,7 +30,7 @@ fn faces(mesh: &Mesh) -> HashMap<[u32; 3], u32> {
     faces
 }
 
-/// Tetrahedra fit together: no face has more than two, and the boundary is closed.
+/// Checks that tetrahedra fit together: no face belongs to more than two, and the boundary is closed.
 fn check(mesh: &Mesh, wanted: f64, boundary: usize) {
     let total: f64 = mesh.tets.iter().map(|&t| volume(mesh, t)).sum();
     assert!((total - wanted).abs() < 1e-5 * wanted, "volume {total}, not {wanted}");
@@ -47,7 +47,7 @@ fn check(mesh: &Mesh, wanted: f64, boundary: usize) {
     assert!(edges.values().all(|&n| n == 2));
 }
 
-/// A grid of hexahedra with shuffled vertex numbers; `diagonal` cells are cut into two wedges, others into six pyramids.
+/// A grid of hexahedra with shuffled vertex numbers; some cells are cut into two wedges, others into six pyramids.
 fn grid(n: usize, seed: u64) -> String {
     let mut state = seed;
     let mut random = move |m: usize| {
@@ -154,13 +154,14 @@ fn collapsed_cells_lose_their_empty_pieces() {
     }
 }
 
-/// A box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little is counted twice.
+/// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted
+/// twice.
 const MIXED: f64 = 2.501_392_23;
 
 #[test]
 fn shared_meshes_conform() {
     let Some(folder) = shared("formats") else { return };
-    // Boundary triangles: those of the meshes plus two for each quadrilateral.
+    // The boundary triangles are those of the mesh, plus two for each quadrilateral.
     for (name, wanted) in [
         ("mixed_hex_pyr_tet_wedge.vtu", MIXED),
         ("mixed_hex_pyr_tet_wedge_interleaved.vtu", MIXED),

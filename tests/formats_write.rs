@@ -1,6 +1,6 @@
-//! What is written can be read back.
+//! Files that are written can be read back.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used)] // In helpers of tests as well.
+#![allow(clippy::unwrap_used)] // also in helpers of tests
 
 use std::io::Write as _;
 use std::path::Path;
@@ -18,7 +18,7 @@ fn names(folder: &Path) -> Vec<String> {
     names
 }
 
-/// Text of the header and the data of a `.npy`.
+/// The text of the header and the data of a `.npy` file.
 fn split_npy(bytes: &[u8]) -> (String, &[u8]) {
     assert_eq!(&bytes[..8], b"\x93NUMPY\x01\x00");
     let end = 10 + usize::from(u16::from_le_bytes([bytes[8], bytes[9]]));
@@ -57,7 +57,7 @@ fn arrays_of_points() {
     let wanted: Vec<[f64; 3]> = points.chunks(3).map(|p| [p[0], p[1], p[2]]).collect();
     write_npy(&path, &[10, 3], &points).unwrap();
     assert_eq!(load_points(&path).unwrap(), wanted);
-    // The same as Fortran-ordered big-endian and as single precision.
+    // The same array in Fortran order and big-endian, and in single precision.
     let bytes = std::fs::read(&path).unwrap();
     let header = bytes[..bytes.len() - 240].to_vec();
     let text = String::from_utf8_lossy(&header[10..]).replace("<f8", ">f8").replace("False", "True ");
@@ -138,7 +138,7 @@ fn located_points() {
         let (header, data) = split_npy(&bytes);
         assert!(header.contains(shape) && data.len() == size, "{name}: {header}");
     }
-    // Vertices alone are no mesh to this program, and the message says so.
+    // A file of vertices alone is not a mesh for this program, and the message says so.
     let error = load(folder.path().join("out.vtu"), &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.contains("2 vertex"), "{error}");
     assert!(matches!(write_located(folder.path().join("out.txt"), &located), Err(Error::Invalid(m)) if m.contains(".npz")));
@@ -234,7 +234,7 @@ fn no_half_written_file() {
         let file = OutputFile::create(&link).unwrap();
         file.commit().unwrap();
         assert!(link.is_symlink() && std::fs::read(&path).unwrap().is_empty());
-        // A pipe is written to; it is not replaced by a file.
+        // A pipe is written to, not replaced by a file.
         let pipe = folder.path().join("pipe");
         assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
         let reader = std::thread::spawn({

@@ -1,4 +1,4 @@
-//! The LBVH baseline: a proper tree, the same on every device, and the answers of the octree.
+//! The LBVH baseline: its tree is sound and equal on every device, and it gives the answers of the octree.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::baseline::{Lbvh, LbvhArrays};
@@ -12,7 +12,7 @@ use olbvh::reference::boundary::NONE;
 use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
-/// A mesh with both structures over it.
+/// A mesh, and both structures over it.
 struct HostAndDevice {
     mesh: Mesh,
     device: DeviceMesh,
@@ -29,7 +29,7 @@ impl HostAndDevice {
     }
 }
 
-/// Numbers from 0 to 1, always the same.
+/// Reproducible random numbers from 0 to 1.
 fn random() -> impl FnMut() -> f32 {
     let mut state = 1u32;
     move || {
@@ -38,8 +38,8 @@ fn random() -> impl FnMut() -> f32 {
     }
 }
 
-/// All degenerate meshes, a jittered grid, and more cells in one place than a dispatch can look at: equal ones, and different ones, of which none
-/// may be passed over.
+/// All degenerate meshes, a jittered grid, and more tetrahedra in one place than a dispatch can test: equal ones, and
+/// different ones, none of which may be passed over.
 fn meshes() -> Vec<(&'static str, Mesh)> {
     let mut meshes: Vec<_> = cases().unwrap().into_iter().map(|c| (c.name, c.mesh)).collect();
     meshes.push(("jittered", kuhn_jittered([9, 8, 7], 0.3, 5).unwrap()));
@@ -54,7 +54,7 @@ fn meshes() -> Vec<(&'static str, Mesh)> {
 const LEAF: u32 = 1 << 31;
 const BOUNDARY: u32 = 1 << 30;
 
-/// Checks the subtree of a reference; its places, box, and depth.
+/// Checks the subtree of a reference. Returns its places, box, and depth.
 fn check_subtree(at: u32, tree: &LbvhArrays, mesh: &Mesh, vertices: &[[f32; 4]], boundary: &[u32]) -> ([u32; 2], [[f32; 3]; 2], u32) {
     let i = at & (BOUNDARY - 1);
     if at & LEAF != 0 {
@@ -91,7 +91,7 @@ fn check_tree(name: &str, b: &HostAndDevice) {
     }
 }
 
-/// Vertices, middles of faces and cells, and points all over the bounds.
+/// Vertices, midpoints of faces and tetrahedra, and points all over the bounds.
 fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
     let corner = |v: u32| mesh.points.get(v as usize).copied().unwrap_or([f32::NAN; 3]);
     let middle = |of: &[u32]| [0, 1, 2].map(|c| of.iter().map(|&v| corner(v)[c] / of.len() as f32).sum::<f32>());
@@ -109,7 +109,7 @@ fn points(mesh: &Mesh) -> Vec<[f32; 3]> {
 fn check_owners(name: &str, b: &HostAndDevice) {
     let mut points = points(&b.mesh);
     if name == "identical-9000" {
-        points = points.into_iter().step_by(97).collect(); // each looks at all cells
+        points = points.into_iter().step_by(97).collect(); // every point tests all tetrahedra
     }
     let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
     let found = b.lbvh.locate(&b.device, &points, TOLERANCE).unwrap();
@@ -122,7 +122,8 @@ fn check_owners(name: &str, b: &HostAndDevice) {
     }
 }
 
-/// Few pixels and voxels where each looks at thousands of cells, in many dispatches, or has thousands of samples.
+/// The size of a picture or slice: small where every pixel or voxel tests thousands of tetrahedra, in many dispatches,
+/// or has thousands of samples.
 fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
     if name.starts_with("identical") || name == "very-far" {
         [4, 3]
@@ -133,7 +134,7 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
     }
 }
 
-/// A picture by either structure; `None` where there is nothing to see.
+/// The picture, which both structures must draw alike; `None` if nothing is visible.
 fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
     let bounds = Bounds::from(b.device.grid());
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
@@ -143,13 +144,13 @@ fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field:
     let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, &|_, _| {}).unwrap();
     let (expected, drawn) = (draw(&b.tree), draw(&b.lbvh));
     let camera = &settings.camera;
-    // The octree skips what shows no surface; nothing is skipped of a function that shows every value.
+    // With a surface, the octree skips what does not show it. With a function that shows every value, it skips nothing.
     assert!(expected.skipped_samples > 0 || expected.found_samples == drawn.found_samples, "{name}, {camera:?}: samples in the mesh");
     assert!(expected.colors == drawn.colors, "{name}, {camera:?}: colours");
     Some(drawn)
 }
 
-/// Pictures of numbers of points and cells, if there is something to see.
+/// Draws fields that number points and cells. Returns the number of samples in the mesh.
 fn check_picture(name: &str, b: &HostAndDevice) -> u64 {
     let mut found = 0;
     for (camera, on, n) in [("iso", On::Points, b.mesh.points.len()), ("azimuth=100,elevation=-10,zoom=1.5", On::Cells, b.mesh.tets.len())]
@@ -161,7 +162,7 @@ fn check_picture(name: &str, b: &HostAndDevice) -> u64 {
     found
 }
 
-/// Slices through the middle: touched voxels.
+/// Compares slices through the middle. Returns the number of touched voxels.
 fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     let (lo, hi) = (three(b.device.grid().lo), three(b.device.grid().hi));
@@ -219,7 +220,7 @@ fn everything(binding: Binding) {
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
-/// Two surfaces that cut through cells: lit or not, and half transparent, so that those behind are seen.
+/// Two surfaces that cut through tetrahedra, lit or not, and half transparent, so that both are visible.
 fn surfaces(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     let both = HostAndDevice::new(&gpu, kuhn_jittered([6, 5, 4], 0.3, 9).unwrap());

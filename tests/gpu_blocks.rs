@@ -1,4 +1,5 @@
-//! Meshes that do not fit the memory allowed: in blocks, answers are those of the whole, and the memory is kept to.
+//! Meshes that do not fit into the memory allowed are processed in blocks: the answers are those of the whole mesh, and
+//! the limit of memory is kept.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
@@ -13,7 +14,7 @@ use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 
 const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
-/// Vertices, midpoints of edges, centres of faces and cells, points just outside and far outside.
+/// Vertices, midpoints of edges, centres of faces and tetrahedra, and points just outside and far outside.
 fn points(mesh: &Mesh, every: usize) -> Vec<[f32; 3]> {
     let mean = |ids: &[u32]| [0, 1, 2].map(|c| ids.iter().map(|&v| mesh.points[v as usize][c]).sum::<f32>() / ids.len() as f32);
     let valid = |ids: &&[u32; 4]| ids.iter().all(|&v| (v as usize) < mesh.points.len());
@@ -55,7 +56,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     most
 }
 
-/// With fields on points and cells, and cells that are bad.
+/// A grid with fields on points and cells, and with bad cells.
 fn grid() -> Mesh {
     let mut mesh = kuhn_jittered([14, 13, 12], 0.15, 5).unwrap();
     for k in (0..mesh.tets.len()).step_by(997) {
@@ -66,7 +67,7 @@ fn grid() -> Mesh {
     mesh
 }
 
-/// One test, since pipelines are compiled once for it.
+/// A single test, so that pipelines are compiled only once.
 #[test]
 fn answers_are_those_of_the_whole() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -93,7 +94,7 @@ fn located(gpu: &Gpu, mesh: &Mesh) {
     }
 }
 
-/// What fits is not cut, and too little is refused with the sizes.
+/// A mesh that fits is not cut, and a limit that is too small is refused with the sizes.
 fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
@@ -101,13 +102,13 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     assert_eq!(locate(gpu, 64 << 20, &asked, None, QUIET).unwrap().trees, 1);
     let refused = locate(gpu, 1 << 14, &asked, None, QUIET).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
-    // What it says would do does.
+    // The limit that the message names is enough.
     let said = refused.to_string();
     let enough = said.split("allow ").nth(1).unwrap().split(' ').next().unwrap().parse().unwrap();
     assert!(locate(gpu, enough, &asked, None, QUIET).unwrap().trees > 4, "{said}");
 }
 
-/// A plate is one cell of α's level, which cannot be cut; of a finer one, it can.
+/// A plate is one cell of the level of α, which cannot be cut. With a finer level, it can.
 fn flat(gpu: &Gpu) {
     let mesh = kuhn_jittered([50, 50, 1], 0.2, 3).unwrap();
     let points: Vec<_> =
@@ -140,7 +141,8 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
     }
 }
 
-/// Voxels smaller and larger than cells, their centres on faces of cells and off, upright and oblique planes, inside and at the surface.
+/// Voxels smaller and larger than tetrahedra, with centres on and off their faces, in upright and oblique planes,
+/// inside and at the surface.
 fn sliced(gpu: &Gpu, mesh: &Mesh) {
     let (wave, number) = (&mesh.fields[0], &mesh.fields[1]);
     let stack = |plane, layers, size| SliceSettings { plane, layers, size, ..SliceSettings::default() };
@@ -183,7 +185,7 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
     }
 }
 
-/// Parallel and spreading rays from several sides and from within, values that are not shown, surfaces.
+/// Parallel and diverging rays from several sides and from within, values that are not shown, and surfaces.
 fn drawn(gpu: &Gpu, mesh: &Mesh) {
     let wave = &mesh.fields[0];
     let faint = TransferFunction::default().with_opacity(vec![(0.0, 0.1), (1.0, 0.3)]).unwrap();
@@ -217,7 +219,7 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
     }
 }
 
-/// Of a field that grows along x only what lies near the far end is shown: no tree is built over the rest.
+/// Of a field that grows along x, only values near the far end are shown: no tree is built over the rest.
 fn hidden(gpu: &Gpu, mesh: &Mesh) {
     let values: Vec<f32> = mesh.points.iter().map(|p| p[0]).collect();
     let field = Field { name: "x".into(), on: On::Points, values };

@@ -1,4 +1,5 @@
-//! A budget in bytes: trees within it, as deep as it allows, equal to the reference's, and refused with figures where not even the root fits.
+//! A budget in bytes: trees keep within it, are as deep as it allows, equal those of the reference implementation, and
+//! are refused with figures where not even the root fits.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod submit;
@@ -27,7 +28,7 @@ fn diagonal() -> Mesh {
     mesh
 }
 
-/// Points, which call for a deep tree, and cells that fill the bounds.
+/// Flat tetrahedra that are points, which call for a deep tree, and tetrahedra that fill the bounds.
 fn uneven() -> Mesh {
     let mut points = vec![[0.5; 3]; 4];
     points.extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
@@ -36,7 +37,7 @@ fn uneven() -> Mesh {
     Mesh::new(points, tets)
 }
 
-/// Without a capacity there is the usual one.
+/// Without a given capacity, the usual one applies.
 fn usual(gpu: &Gpu) {
     let mesh = uneven();
     let topology = topology(&mesh).unwrap();
@@ -44,7 +45,7 @@ fn usual(gpu: &Gpu) {
     let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
     assert_eq!((tree.status().heuristic_level, tree.status().level), (9, 4), "33·8^5 entries are more than 2^20");
     assert_eq!(tree.download().unwrap(), build(&mesh, &topology, &BuildOptions::default()).unwrap());
-    // A level that is asked for, coarser and finer than the cells ask for; capacities hold.
+    // Levels that are asked for, coarser and finer than the heuristic would choose. Capacities still hold.
     for (level, capacity, built) in [(2, None, 2), (10, None, 4), (10, Some(100_000), 3)] {
         let options = BuildOptions { alpha: 1.5, level: Some(level), capacity, ..BuildOptions::default() };
         let tree = Tree::build(gpu, &device, &options).unwrap();
@@ -66,7 +67,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
     ] {
         let of = |level: u32| TreeBytes::most(&sizes.entries, level, boxes).total();
         let options = |budget: u64| BuildOptions { assign, lists, boxes, budget: Some(budget), ..BuildOptions::default() };
-        // Too small by a byte: refused by both, with the sizes.
+        // A budget that is too small by one byte: both refuse it, with the sizes.
         let (short, what) = (of(0) - 1, format!("{name} {assign} {lists} boxes {boxes}"));
         let refused = [Tree::build(gpu, &device, &options(short)).err(), build(mesh, &topology, &options(short)).err()];
         for error in refused {
@@ -83,7 +84,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
             assert!(level == deepest || of(level + 1) > budget, "{what}: level {level} in {budget} bytes");
         }
     }
-    // Every point is found in a tree of a small budget, by its lowest cell.
+    // Every point is found in a tree of a small budget, with the lowest tetrahedron that contains it.
     let of = |budget: Option<u64>| {
         let tree = Tree::build(gpu, &device, &BuildOptions { budget, ..BuildOptions::default() }).unwrap();
         let found = locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
@@ -114,7 +115,7 @@ fn by_descriptors() {
     everything(Binding::Descriptors);
 }
 
-/// A recorded build into so many bytes of memory stays within them, whatever the mesh.
+/// A recorded build into a given number of bytes keeps within them, whatever the mesh.
 #[test]
 fn memory_of_a_recorded_build() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -141,7 +142,7 @@ fn memory_of_a_recorded_build() {
     assert!(matches!(Capacity::for_bytes(100, 8, &BuildOptions::default()), Err(Error::TooLarge(_))));
 }
 
-/// A recorded build and what is located in it.
+/// A recorded build, and what is located in its tree.
 struct Built {
     tree: TreeMemory,
     owners: BufferRef,
@@ -172,9 +173,10 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     }
 }
 
-/// Every capacity from one entry per tetrahedron, which the root may need, to more than the deepest level takes: the deepest tree that fits, by its
-/// candidates or, where there is room for those of every level, by its entries, within its memory, and every point is found in it. One candidate less is
-/// refused before anything is recorded.
+/// Every capacity, from one entry per tetrahedron, which the root may need, to more than the deepest level takes, gives
+/// the deepest tree that fits: by its candidates or, where there is memory for those of every level, by its entries.
+/// The tree keeps within its memory, and every point is found in it. A capacity of one candidate less is refused before
+/// anything is recorded.
 #[test]
 fn every_capacity() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -203,7 +205,7 @@ fn every_capacity() {
             assert!([tets, tets - 1].iter().all(|n| text.contains(&n.to_string())), "{text}");
         }
 
-        // All of them on the reference driver; where a layer or another driver takes long, some.
+        // All capacities on the reference driver; only some where a layer or another driver is slow.
         let other = std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|name| !name.starts_with("lavapipe25"));
         let step = if other || std::env::var_os("OLBVH_TEST_VALIDATION").is_some() { 13 } else { 1 };
         let most = (0..=deepest).map(&entries).max().unwrap();
@@ -251,7 +253,7 @@ fn every_capacity() {
                 }
             }
         }
-        // A coarser level of boundary lists can have more entries than the next.
+        // With lists of the boundary, a coarser level can have more entries than the next finer one.
         let built = (0..=deepest).filter(|&l| built_levels[l as usize] > 0).count();
         assert!(built > 2 && (by_entries || built == trees.len()), "{built_levels:?}");
     }

@@ -1,18 +1,19 @@
-//! The conformance suite as tests, on both ways of binding buffers. A test is a family of cases (`address sort/21-bits`), so that runners which
-//! start a process per test do not open the device a thousand times; its message names every case that failed.
+//! The conformance suite as tests, with both ways of binding buffers. A test is a family of cases (for example
+//! `address sort/21-bits`), so that runners that start a process per test do not open the device a thousand times. Its
+//! message names every case that failed.
 //!
-//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, runs all cases that are not `large` by address. Descriptors, other
-//! drivers, other widths of its subgroups and validation layers get the quick ones over a few meshes that between them record every kernel.
-//! SwiftShader compiles every kernel anew on every device that is opened, which takes longer than all cases over a mesh: there the meshes are one
-//! family, and one mesh is asked by descriptors.
-//! `OLBVH_TEST_GROUP` = `quick`, `full` or `large` says otherwise.
+//! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, run all cases that are not `large` by
+//! address. Descriptors, other drivers, other subgroup sizes of lavapipe and validation layers run the quick cases,
+//! over a few meshes that together record every kernel. SwiftShader compiles every kernel anew on every device that is
+//! opened, which takes longer than all cases over a mesh: there the meshes are one family, and one mesh is tested by
+//! descriptors. `OLBVH_TEST_GROUP` = `quick`, `full` or `large` overrides this.
 
 use libtest_mimic::{Arguments, Failed, Trial};
 use olbvh::conformance::{Case, Lab, Outcome, cases};
 use olbvh::gpu::{Binding, GpuOptions};
 use std::env;
 
-/// Meshes that between them record every kernel, and dispatches of nothing.
+/// Meshes that together record every kernel, and also empty dispatches.
 const BRIEF: [&str; 6] = ["no-cells", "one-tet", "bad-cells", "jitter-12x13x11", "one-place", "cloud"];
 
 fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
@@ -23,7 +24,8 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
         return grouped(&group, |_| true);
     }
     let group = if reference { "full" } else { "quick" };
-    // Every row of the table of shapes compiles all kernels anew. By descriptors they are worth that where a layer follows their barriers.
+    // Every row of the table of targets compiles all kernels anew. By descriptors, that is worth it only where a layer
+    // checks their barriers.
     let in_shape = |case: &Case| binding == Binding::Address || validation || !case.name.contains("/row-");
     let families = grouped(group, |case| reference || !case.is_over_a_mesh() || BRIEF.contains(&case.family()) && in_shape(case));
     if driver != "swiftshader" {
@@ -68,7 +70,7 @@ fn main() {
             trials.push(Trial::test(format!("{name} {family}"), move || run(binding, &cases)));
         }
     }
-    // The one driver whose descriptors begin at multiples of 256 bytes.
+    // SwiftShader is the one driver whose descriptors start at multiples of 256 bytes.
     if env::var("OLBVH_TEST_DRIVER").is_ok_and(|driver| driver == "swiftshader") {
         let cases: Vec<Case> = cases().into_iter().filter(|case| case.matches(Some("quick")) && case.family() == "one-tet").collect();
         trials.push(Trial::test("bindings one-tet", move || run(Binding::Descriptors, &cases)));

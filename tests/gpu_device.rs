@@ -1,4 +1,4 @@
-//! Opening a device: who is chosen, who is refused, and the pipeline cache on disk.
+//! Opening a device: which one is chosen, which are refused, and the pipeline cache on disk.
 
 #![allow(clippy::unwrap_used)]
 

@@ -1,4 +1,4 @@
-//! Stage 0 on meshes whose faces crowd in the table of faces.
+//! Stage 0 on meshes whose faces crowd in the hash table of faces.
 #![allow(clippy::unwrap_used)]
 
 use olbvh::build::{BadCells, DeviceMesh};
@@ -7,7 +7,8 @@ use olbvh::mesh::Mesh;
 use olbvh::reference::boundary::topology;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Balls cut into tetrahedra round their centres, which are the first points: the faces of few vertices crowd in the table of faces.
+/// Balls cut into tetrahedra around their centres, which are the first points, so that the faces of a few vertices
+/// crowd in the table.
 fn stars(n: u32) -> Mesh {
     const SIDE: i32 = 2;
     let place = |k: u32, x: i32, y: i32, z: i32| {
@@ -16,7 +17,7 @@ fn stars(n: u32) -> Mesh {
     };
     let mut mesh = Mesh::new((0..n).map(|k| [3.0 * k as f32, 0.0, 0.0]).collect(), Vec::new());
     for k in 0..n {
-        // Points of an octahedron's surface in rows, |x| + |y| + |z| = SIDE.
+        // Points of the surface of an octahedron, |x| + |y| + |z| = SIDE, in rows.
         let mut ids = BTreeMap::new();
         for (x, y) in (-SIDE..=SIDE).flat_map(|x| (-SIDE..=SIDE).map(move |y| (x, y))) {
             let z = SIDE - x.abs() - y.abs();

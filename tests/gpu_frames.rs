@@ -1,6 +1,8 @@
-//! A mesh that moves: its tree is rebuilt every frame into the same memory, two frames in flight, and every tree is that of a fresh build.
+//! A moving mesh: its tree is rebuilt every frame into the same memory, with two frames in flight, and every tree
+//! equals that of a fresh build.
 //!
-//! 1,000 frames on the reference driver; a part, to keep the suite short, on others. `OLBVH_TEST_FRAMES` says otherwise.
+//! The reference driver runs 1,000 frames; others run a part of them, to keep the suite short. `OLBVH_TEST_FRAMES`
+//! overrides this.
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
@@ -24,7 +26,7 @@ fn frames() -> u32 {
     std::env::var("OLBVH_TEST_FRAMES").ok().and_then(|n| n.parse().ok()).unwrap_or(some)
 }
 
-/// Frame number `i` of the mesh: sheared, stretched and jittered.
+/// Frame number `i` of the mesh, sheared, stretched and jittered.
 fn deformed(mesh: &Mesh, i: u32) -> Mesh {
     let mut state = i.wrapping_mul(0x9e37_79b9) | 1;
     let mut random = || {
@@ -41,7 +43,7 @@ fn deformed(mesh: &Mesh, i: u32) -> Mesh {
     moved
 }
 
-/// Commands, a fence, and what a frame was of.
+/// The commands and the fence of a frame, and the mesh that it showed.
 struct Slot {
     commands: vk::CommandBuffer,
     fence: vk::Fence,
@@ -62,7 +64,7 @@ fn compare(gpu: &Gpu, slot: &Slot, mesh: &Mesh, number: u32) {
     assert_eq!(words(frame.tree.co, expected.co.len()), expected.co, "CO of frame {number}");
     assert_eq!(words(frame.tree.flags, expected.boundary.len()), expected.boundary, "flags of frame {number}");
     assert_eq!(words(frame.tree.masks, expected.mask.len()), expected.mask, "masks of frame {number}");
-    // Every vertex has an owner, and it is one of its cells.
+    // Every vertex has an owner.
     for (v, &owner) in words(frame.output.owners, mesh.points.len()).iter().enumerate() {
         assert!(mesh.tets.get(owner as usize).is_some(), "frame {number}: vertex {v} is lost");
     }
@@ -77,7 +79,8 @@ fn rebuilds_in_flight_are_fresh_builds() {
     let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }.unwrap();
     let device = &host.device;
     let mesh = kuhn_jittered([5, 4, 6], 0.2, 3).unwrap();
-    // SAFETY: plain creation, used in order; a slot's memory is touched again when its fence says so.
+    // SAFETY: objects are created and used in the order that Vulkan asks for; the memory of a slot is used again only
+    // after its fence is signalled.
     unsafe {
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(host.family);
         let pool = device.create_command_pool(&info.flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER), None).unwrap();
@@ -93,7 +96,7 @@ fn rebuilds_in_flight_are_fresh_builds() {
             })
             .collect();
         let mut recorders: [Option<Recorder<'_>>; SLOTS] = [None, None];
-        let held = |gpu: &Gpu| gpu.allocator().lock().unwrap().generate_report().total_capacity_bytes;
+        let held = |gpu: &Gpu| gpu.allocated().unwrap().total_capacity_bytes;
         let (total, mut bytes) = (frames(), 0);
         for i in 0..total + SLOTS as u32 {
             let slot = &mut slots[i as usize % SLOTS];
@@ -119,8 +122,8 @@ fn rebuilds_in_flight_are_fresh_builds() {
             recorders[i as usize % SLOTS] = Some(recorder);
             device.end_command_buffer(slot.commands).unwrap();
             let submit = [vk::SubmitInfo::default().command_buffers(std::slice::from_ref(&slot.commands))];
-            // The queue's lock is the one that `gpu` has for its own submissions.
-            device.queue_submit(*queue.lock().unwrap(), &submit, slot.fence).unwrap();
+            // The queue's lock is the one that `gpu` takes for its own submissions.
+            queue.locked(&mut |queue| device.queue_submit(queue, &submit, slot.fence).unwrap());
             slot.shown = Some(moved);
             if i == SLOTS as u32 {
                 bytes = held(&gpu);

@@ -1,4 +1,4 @@
-//! `olbvh.glsl` in a shader of a host's own gives the answers of the library, by address and by descriptors.
+//! `olbvh.glsl` in a host's shader gives the answers of the library, by address and by descriptors.
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
@@ -13,7 +13,7 @@ use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{LocateOptions, locate, locate_all};
 use submit::submit;
 
-/// A host's kernel: five words per point.
+/// A host's kernel, which writes five words per point.
 const KERNEL: &str = r#"
 #version 460
 #define OLBVH_TRAVERSE
@@ -83,7 +83,8 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
     let addresses = gpu.upload("olbvh.test.scene", &[scene.addresses()]).unwrap();
     let list = scene.list(addresses.all());
     let sets = [[(0, input.all()), (1, output.all())].to_vec(), (3..).zip(list).collect::<Vec<_>>()];
-    // SAFETY: plain creation and use of a pipeline with its sets; `run` waits, and everything is destroyed afterwards.
+    // SAFETY: a pipeline and its sets are created and used as Vulkan asks for; `run` waits, and everything is destroyed
+    // afterwards.
     unsafe {
         let layouts = sets.clone().map(|set| {
             let binding = |(i, _): &(u32, BufferRef)| {
@@ -138,10 +139,10 @@ fn check(binding: Binding) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     let mesh = kuhn_jittered([9, 8, 7], 0.3, 5).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    // Vertices, and points of a lattice that reaches out of the mesh.
+    // Vertices, and points of a lattice that extends beyond the mesh.
     let mut points = mesh.points.clone();
     points.extend((0..3000).map(|i| [(i % 13) as f32 * 0.81 - 0.5, (i / 13 % 13) as f32 * 0.73 - 0.4, (i / 169) as f32 * 0.47 - 0.3]));
-    // A linear field: its values are those of the places, its gradient is the same everywhere.
+    // A linear field: its value at a point follows from the coordinates, and its gradient is constant.
     let values: Vec<f32> = mesh.points.iter().map(|p| 3.0 + p[0] + 2.0 * p[1] - p[2]).collect();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
@@ -157,7 +158,7 @@ fn check(binding: Binding) {
             if owner == u32::MAX {
                 continue;
             }
-            // Beyond the surface a point has the nearest cell as its owner, and none that contains it.
+            // A point outside of the surface is owned by the nearest tetrahedron, and no tetrahedron contains it.
             assert!(owners as usize == all[i].len() || owners == 0, "{what}: {owners} owners of {:?}", all[i]);
             let p = points[i];
             assert!((f32::from_bits(value) - (3.0 + p[0] + 2.0 * p[1] - p[2])).abs() < 1e-3, "{what}: {}", f32::from_bits(value));
@@ -186,7 +187,8 @@ fn by_descriptors() {
     check(Binding::Descriptors);
 }
 
-/// Nothing of our own kernels is left in it, and members of structs are called what they are called on the host.
+/// The exported file contains nothing that only the kernels of the library use, and members of structs have the names
+/// that they have on the host.
 #[test]
 fn other_programs_see_what_is_theirs() {
     for ours in ["OLBVH_WIDE", "u64vec2", "BUFFER16", "RECORDS", ".olbvh_"] {

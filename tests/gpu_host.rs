@@ -1,4 +1,4 @@
-//! Embedding: a device, queue, allocator and pipeline cache that are the host's, and recording that does nothing but record.
+//! Embedding: the host's device, queue, allocator and pipeline cache, and recording that does nothing but record.
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
@@ -49,11 +49,13 @@ fn a_hosts_device_allocator_and_cache_are_used_and_left() {
         let options = GpuOptions { binding: Some(binding), ..GpuOptions::default() };
         // SAFETY: the host's handles belong together and outlive `gpu`.
         let gpu = unsafe { Gpu::from_raw(lent, &options) }.unwrap();
-        assert!(Arc::ptr_eq(gpu.allocator(), &allocator));
+        let _mesh = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let held = allocator.lock().unwrap().generate_report().total_allocated_bytes;
+        assert!(held > 0 && gpu.allocated().unwrap().total_allocated_bytes == held, "the allocator is the host's");
         assert_eq!(owners(&gpu, &mesh), expected);
     }
     assert_eq!(allocator.lock().unwrap().generate_report().allocations.len(), 0, "everything is given back");
-    // SAFETY: no pipeline of the cache is being made; the allocator frees its blocks while the device is alive.
+    // SAFETY: no pipeline is being made with the cache; the allocator frees its blocks while the device still exists.
     unsafe { host.device.destroy_pipeline_cache(cache, None) };
     drop(allocator);
 }
@@ -81,7 +83,7 @@ fn what_is_not_enabled_is_not_used() {
     assert!(odd.unwrap_err().to_string().contains("queue family 99"));
 }
 
-/// What was logged.
+/// The messages that were logged.
 struct Log(Mutex<Vec<String>>);
 
 static LOG: Log = Log(Mutex::new(Vec::new()));
@@ -104,16 +106,16 @@ unsafe extern "system" fn list_nothing(
     count: *mut u32,
     _: *mut vk::ExtensionProperties,
 ) -> vk::Result {
-    // SAFETY: the caller's place for the count.
+    // SAFETY: `count` is the caller's valid pointer.
     unsafe { *count = 0 };
     vk::Result::SUCCESS
 }
 
 static PROPERTIES: OnceLock<vk::PFN_vkGetPhysicalDeviceProperties2> = OnceLock::new();
 
-/// The driver's own properties, and subgroups of up to 128 lanes.
+/// The driver's properties, with subgroups of up to 128 lanes.
 unsafe extern "system" fn vary_subgroups(physical: vk::PhysicalDevice, properties: *mut vk::PhysicalDeviceProperties2<'_>) {
-    // SAFETY: a chain of the caller's structs, each of which begins like this one.
+    // SAFETY: `properties` is a chain of the caller's valid structs, each of which starts like `BaseOutStructure`.
     unsafe {
         PROPERTIES.get().unwrap()(physical, properties);
         let mut next = (*properties).p_next.cast::<vk::BaseOutStructure<'_>>();
@@ -126,7 +128,8 @@ unsafe extern "system" fn vary_subgroups(physical: vk::PhysicalDevice, propertie
     }
 }
 
-/// Size control is a part of Vulkan 1.3, listed or not; where sizes vary and it is not enabled, a warning says so.
+/// Subgroup size control is a part of Vulkan 1.3, whether its extension is listed or not. If sizes vary and it is not
+/// enabled, a warning says so.
 #[test]
 fn subgroup_size_control_is_found_and_missed() {
     let host = Host::new();
@@ -135,7 +138,7 @@ fn subgroup_size_control_is_found_and_missed() {
     zero.enumerate_device_extension_properties = list_nothing;
     let bare = ash::Instance::from_parts_1_3(functions.handle(), zero, one.clone(), functions.fp_v1_3().clone());
     let (listed, unlisted) = (Requirements::check(functions, host.physical), Requirements::check(&bare, host.physical));
-    // SAFETY: the handle is one of this instance.
+    // SAFETY: the physical device belongs to this instance.
     let version = unsafe { functions.get_physical_device_properties(host.physical) }.api_version;
     assert!(unlisted.extensions.is_empty());
     assert_eq!(unlisted.subgroup_size_control, listed.subgroup_size_control && version >= vk::API_VERSION_1_3);
@@ -148,7 +151,7 @@ fn subgroup_size_control_is_found_and_missed() {
     let warned = || LOG.0.lock().unwrap().iter().filter(|text| text.contains("no size control enabled")).count();
     for (instance, warnings) in [(functions, 0), (&varying, 1)] {
         let enabled = Enabled { subgroup_size_control: false, ..host.enabled() };
-        // SAFETY: as above; what is not enabled is not used.
+        // SAFETY: as above; features that are not enabled are not used.
         drop(unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), enabled, ..host.lend() }, &GpuOptions::default()) }.unwrap());
         assert_eq!(warned(), if listed.subgroup_size_control { warnings } else { 0 });
     }
@@ -162,7 +165,7 @@ fn one_device_serves_many_threads() {
     let expected = owners(&Gpu::new(&GpuOptions::default()).unwrap(), &mesh);
     let host = Host::new();
     let lent = HostDevice { device: watching(&host.device), ..host.lend() };
-    // SAFETY: as above. No self-test, which would compile kernels before the threads do.
+    // SAFETY: as above. There is no self-test, since it would compile kernels before the threads do.
     let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions { trust: true, ..GpuOptions::default() }) }.unwrap();
     let start = Barrier::new(4);
     std::thread::scope(|scope| {
@@ -177,11 +180,11 @@ fn one_device_serves_many_threads() {
     assert_eq!(live(&host.device), 0, "of a kernel that two threads compile at a time one pipeline is left");
 }
 
-/// Whatever fails in opening: what had been made on the host's device is gone.
+/// If any call fails while a device is opened, everything made on the host's device is destroyed again.
 #[test]
 fn a_failed_opening_leaves_nothing() {
     let host = Host::new();
-    // SAFETY: as above; the watched functions do what the device's own do, or fail.
+    // SAFETY: as above; the watched functions call the device's own functions, or fail.
     let open = |options: &GpuOptions| unsafe { Gpu::from_raw(HostDevice { device: watching(&host.device), ..host.lend() }, options) };
     let gpu = open(&GpuOptions::default()).unwrap();
     let target = Some(Target { each: gpu.subgroup_size() + 1, ..gpu.target().clone() });
@@ -194,7 +197,7 @@ fn a_failed_opening_leaves_nothing() {
         for (name, before) in FALLIBLE.iter().flat_map(|name| [0, 1, 4].map(|before| (*name, before))) {
             FAILING.set((name, before));
             let opened = open(&options);
-            // Some are not needed so often, or not at all.
+            // Some functions are called less often, or not at all.
             let failed = FAILING.replace(("", 0)) == (name, 0) && opened.is_err();
             assert!(failed || before > 0 || name.contains("descriptor") || name.contains("query"), "{name} did not fail");
             drop(opened);
@@ -206,7 +209,7 @@ fn a_failed_opening_leaves_nothing() {
 fn nothing_is_made(binding: Binding) {
     let host = Host::tracing();
     let options = GpuOptions { binding: Some(binding), ..GpuOptions::default() };
-    // SAFETY: as above; the counted functions do what the device's own do.
+    // SAFETY: as above; the counted functions call the device's own functions.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let mesh = kuhn_jittered([6; 3], 0.3, 1).unwrap();
     let frame = Frame::new(&gpu, &mesh);
@@ -230,8 +233,9 @@ fn nothing_is_made(binding: Binding) {
     let before = CALLS.get();
     for _ in 0..3 {
         submit(&gpu, "olbvh.test.frame", |r| {
-            // SAFETY: the commands of `r`, which records nothing meanwhile; the pools are kept until `run` has waited for them.
-            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
+            // SAFETY: these are the commands of `r`, which records nothing meanwhile; the pools are kept until `run`
+            // has waited for the commands.
+            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools)?;
             ARMED.set(true);
             let result = record(&mut recorder).and_then(|()| recorder.finish());
             ARMED.set(false);
@@ -245,7 +249,7 @@ fn nothing_is_made(binding: Binding) {
     assert_eq!(CALLS.get(), before, "calls made while recording");
     let found: Vec<u32> = gpu.download(&frame.memory, frame.output.owners.part(0, 4 * mesh.points.len() as u64)).unwrap();
     assert_eq!(found, owners(&gpu, &mesh));
-    // The count counts.
+    // Calls are counted at all.
     ARMED.set(true);
     let buffer = gpu.buffer("olbvh.test.counted", 64 << 20);
     ARMED.set(false);
@@ -266,7 +270,7 @@ fn recording_neither_makes_nor_submits_nor_waits_by_descriptors() {
     nothing_is_made(Binding::Descriptors);
 }
 
-/// Pools without room, or with too little, grow once, and serve ever after.
+/// Pools without enough room grow once, and serve from then on.
 #[test]
 fn pools_grow_as_they_are_used() {
     let gpu = Gpu::new(&GpuOptions { binding: Some(Binding::Descriptors), ..GpuOptions::default() }).unwrap();
@@ -278,7 +282,7 @@ fn pools_grow_as_they_are_used() {
     for _ in 0..3 {
         submit(&gpu, "olbvh.test.frame", |r| {
             // SAFETY: as above.
-            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools);
+            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), None) }.with_pools(&mut pools)?;
             frame.record(&mut recorder)?;
             recorder.finish()
         })

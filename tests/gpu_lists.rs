@@ -1,4 +1,5 @@
-//! `Lists::Boundary` on the device: trees and answers are the reference's to the bit, and the answers those of `Lists::All`.
+//! `Lists::Boundary` on the device: trees and answers equal those of the reference implementation to the bit, and the
+//! answers equal those of `Lists::All`.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod submit;
@@ -27,7 +28,7 @@ fn options(alpha: f32, assign: Assign, lists: Lists) -> BuildOptions {
     BuildOptions { alpha, assign, lists, ..BuildOptions::default() }
 }
 
-/// A mesh, its topology, and the same on a device.
+/// A mesh and its topology, on the host and on a device.
 struct Subject {
     name: String,
     mesh: Mesh,
@@ -41,7 +42,7 @@ impl Subject {
         Self { name: name.into(), mesh, topology, device }
     }
 
-    /// The tree that the reference builds, after a look whether the device builds the same.
+    /// The tree that the device builds, which must equal that of the reference implementation.
     fn tree(&self, gpu: &Gpu, options: &BuildOptions) -> (Tree, TreeArrays) {
         let tree = Tree::build(gpu, &self.device, options).unwrap();
         let expected = build(&self.mesh, &self.topology, options).unwrap();
@@ -71,7 +72,7 @@ impl Subject {
             let used = &raw[..=(i % 5).min(3)];
             let sum: f32 = used.iter().sum();
             let p = [0, 1, 2].map(|c| used.iter().zip(&v).map(|(w, v)| w / sum * v[c]).sum::<f32>());
-            // Some of them an ulp aside.
+            // Every third point is moved by an ulp.
             points.push(if i % 3 == 0 { p.map(|x| if next() < 0.5 { x.next_up() } else { x.next_down() }) } else { p });
         }
         points
@@ -92,7 +93,7 @@ impl Subject {
         for (i, list) in lists.iter().enumerate() {
             assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
         }
-        // Each with the owner of the point before as a hint.
+        // Every point has the owner of the point before as its hint.
         let hints: Vec<u32> = std::iter::once(NONE).chain(expected.iter().map(|e| e.owner)).take(points.len()).collect();
         let (input, hint_buffer) = (gpu.upload("olbvh.test.points", &points).unwrap(), gpu.upload("olbvh.test.hints", &hints).unwrap());
         let count = points.len() as u64;
@@ -109,7 +110,7 @@ impl Subject {
         expected
     }
 
-    /// The slices of a tree, as the reference cuts them.
+    /// The slices over a tree, which must equal those of the reference implementation.
     fn slices(&self, gpu: &Gpu, options: &BuildOptions) -> Vec<(Vec<u8>, Vec<u32>)> {
         let (tree, host) = self.tree(gpu, options);
         let settings = SliceSettings { plane: Plane::Normal([1.0, -2.0, 0.7]), layers: 3, size: [37, 21], ..SliceSettings::default() };
@@ -127,7 +128,7 @@ impl Subject {
         bands
     }
 
-    /// Colours and the number of samples in the mesh.
+    /// The colours of a picture, and the number of its samples in the mesh.
     fn picture(&self, gpu: &Gpu, options: &BuildOptions) -> (Vec<[u32; 4]>, u64) {
         let (tree, host) = self.tree(gpu, options);
         let field = Field { name: "x".into(), on: On::Points, values: self.mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect() };
@@ -143,7 +144,7 @@ fn loaded(file: &str) -> Mesh {
     olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap().mesh
 }
 
-/// Meshes whose cells do not overlap.
+/// Meshes whose tetrahedra do not overlap.
 fn closed(gpu: &Gpu) -> Vec<Subject> {
     let mut closed = vec![
         Subject::new(gpu, "kuhn", kuhn([8; 3]).unwrap()),
@@ -224,7 +225,7 @@ fn overlaps() {
     quiet(&gpu);
 }
 
-/// Entries of meshes beyond 2^20 tetrahedra have halves for quarters.
+/// In meshes of more than 2^20 tetrahedra, entries hold halves instead of quarters.
 #[test]
 fn more_than_a_million() {
     let gpu = gpu(Binding::Address);
@@ -236,7 +237,7 @@ fn more_than_a_million() {
     quiet(&gpu);
 }
 
-/// Cells that reach through a plate call for a tree of a single node, whose list is every cell.
+/// Tetrahedra that reach through a plate call for a tree of a single node, which lists all of them.
 #[test]
 fn long_lists_make_leaves_finer() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -260,14 +261,15 @@ fn long_lists_make_leaves_finer() {
             assert!(a.owner == b.owner || !inside(a), "{fineness}: {a:?}, {b:?}");
         }
     }
-    // As fine as there is memory for beside the one before, which stays if there is none.
+    // The tree gets as fine as the memory beside the first tree allows; without any, the first tree stays.
     let options = BuildOptions { fineness: Fineness::Pictures, ..alpha };
     let measured = gpu.with_memory(1 << 40);
     Tree::build(&measured, &plate.device, &alpha).unwrap();
     let level = |memory: u64| Tree::build(&gpu.with_memory(memory), &plate.device, &options).unwrap().status().level;
     let [none, some, enough] = [measured.memory_peak(), 4 * measured.memory_peak(), 1 << 30].map(level);
     assert!(none == 0 && some > 0 && enough > some, "{none} {some} {enough}");
-    // A body that fills its bounds has short lists as it is; rays pass by what is empty around a small one in cells of a million entries.
+    // The lists of a body that fills its bounds are short as they are. For pictures, leaves are as fine as a million
+    // entries allow, so that rays pass over the empty space around a small body.
     let cube = Subject::new(&gpu, "cube", kuhn([16; 3]).unwrap());
     let level = |fineness| cube.tree(&gpu, &BuildOptions { fineness, ..alpha }).0.status().level;
     assert_eq!(Fineness::EVERY.map(level), [4, 4, 5]);

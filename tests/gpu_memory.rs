@@ -1,4 +1,4 @@
-//! What a build allocates.
+//! Memory that a build allocates.
 
 #![allow(clippy::unwrap_used)]
 
@@ -9,7 +9,7 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 
 fn allocated(gpu: &Gpu) -> u64 {
-    gpu.allocator().lock().unwrap().generate_report().total_allocated_bytes
+    gpu.allocated().unwrap().total_allocated_bytes
 }
 
 /// The paper's largest mesh at α = 0: 12,290,298 tetrahedra, 98,322,384 entries, level 7, 2,396,745 nodes.
@@ -26,7 +26,7 @@ fn jets_fits_in_two_gibibytes() {
     assert!(total < 2 << 30, "{total} bytes");
 }
 
-/// After a build only the tree is left, and the peak is what the plan says.
+/// After a build only the tree is left, and the peak is the one planned.
 #[test]
 fn a_build_allocates_what_it_needs() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -43,7 +43,7 @@ fn a_build_allocates_what_it_needs() {
             FilterScratch::carve(&gpu, a, on_device.input().tets, &options, &capacity)?;
             SortedScratch::carve(&gpu, a, &capacity)
         });
-        // The head of 512 bytes and the rounding of each buffer beside it.
+        // Allows for the head of 512 bytes and the rounding of each buffer.
         let slack = 8192;
         assert!(tree.scratch_bytes() <= planned.unwrap() + slack, "{assign}: {} scratch bytes", tree.scratch_bytes());
         let host = tree.download().unwrap();
@@ -54,7 +54,7 @@ fn a_build_allocates_what_it_needs() {
     }
 }
 
-/// Dropped buffers wait for others of nearly their size, up to a limit, as long as a handle is there.
+/// Dropped buffers are kept for new ones of nearly their size, up to a limit, as long as a handle exists.
 #[test]
 fn a_pool_keeps_what_is_dropped() {
     const MIB: u64 = 1 << 20;
@@ -70,7 +70,7 @@ fn a_pool_keeps_what_is_dropped() {
     }
     let again = buffer(MIB - MIB / 16);
     assert_eq!((again.size(), handle_of(again)), (MIB - MIB / 16, handle));
-    // It still holds as much as at first.
+    // The buffer still has its full size.
     let words: Vec<u32> = (0..1 << 18).collect();
     let written = pooled.upload("olbvh.test.kept", &words).unwrap();
     assert_eq!(pooled.download::<u32>(&written, written.all()).unwrap(), words);

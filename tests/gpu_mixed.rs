@@ -1,4 +1,5 @@
-//! What was built over one mesh answers nothing about another, or about one on another device: refused, not read out of bounds.
+//! A structure that was built over one mesh refuses queries about another mesh, or about one on another device, instead
+//! of reading out of bounds.
 
 #![allow(clippy::unwrap_used)]
 
@@ -55,7 +56,7 @@ fn another_mesh_is_refused() {
     }
 }
 
-/// Handles of one device are alike, whatever memory or kernels they allow.
+/// Handles of one device are interchangeable, whatever memory or target they have.
 #[test]
 fn another_device_is_refused() {
     let [gpu, elsewhere] = [(); 2].map(|()| Gpu::new(&GpuOptions::default()).unwrap());
@@ -71,7 +72,7 @@ fn another_device_is_refused() {
     Tree::build(&same, &here, &options).unwrap();
 }
 
-/// What is built over a mesh keeps the mesh's memory: a mesh that got the same place later would be taken for the first.
+/// A structure keeps the memory of its mesh: otherwise, a later mesh at the same place would be taken for the first.
 #[test]
 fn trees_keep_the_place_of_their_mesh() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 24);

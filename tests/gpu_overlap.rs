@@ -1,4 +1,5 @@
-//! Overlaps on the device are the reference's, and so is what they take: poses and lists that the conformance suite lacks.
+//! Overlaps on the device, and their counters, equal those of the reference implementation, for poses and lists that
+//! the conformance suite lacks.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::conformance::{HostAndDevice, check_overlap};
@@ -44,7 +45,7 @@ fn long_lists_take_several_submissions() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
-    // A primitive that touches none of 20,000 others in its cell, and one that touches all.
+    // A tetrahedron that touches none of 20,000 others in its cell, and one that touches all of them.
     let many = HostAndDevice::new(&gpu, Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]), &options).unwrap();
     let apart = Mesh::new(
         vec![

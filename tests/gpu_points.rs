@@ -1,7 +1,9 @@
-//! Ten million points on faces, edges and vertices and at random in a jittered Kuhn grid: none is lost, and every tree names the same owners.
+//! Ten million points on faces, edges and vertices and at random in a jittered Kuhn grid: none is lost, and every tree
+//! gives the same owners.
 //!
-//! `OLBVH_TEST_POINTS=10000000` runs them all; without it a part, to keep the suite short, and the output says so. Drivers other than the reference
-//! get a smaller grid too: on SwiftShader most of the time went into the seven trees over it.
+//! `OLBVH_TEST_POINTS=10000000` runs all of them; otherwise a part is run, to keep the suite short, and the output says
+//! so. Drivers other than the reference driver also get a smaller grid: on SwiftShader, most of the time went into the
+//! seven trees over it.
 
 #![allow(clippy::unwrap_used)]
 
@@ -16,7 +18,7 @@ use std::env;
 const FULL: usize = 10_000_000;
 const SOME: usize = 100_000;
 
-/// Whether tests run on the reference driver, lavapipe 25 with 256 bits, or on none that is named.
+/// Whether tests run on the reference driver, lavapipe 25 with 256 bits, or without a named driver.
 fn is_reference() -> bool {
     let driver = env::var("OLBVH_TEST_DRIVER").unwrap_or_default();
     env::var("OLBVH_TEST_VALIDATION").is_err() && (driver.is_empty() || driver == "lavapipe25-256")
@@ -35,7 +37,7 @@ fn mix(mut h: u32) -> u32 {
     h ^ (h >> 16)
 }
 
-/// Point number `i`: a vertex, on an edge, on a face, or anywhere, in turns; never outside the grid.
+/// Point number `i`: by turns a vertex, on an edge, on a face, or anywhere; never outside of the grid.
 fn point(mesh: &Mesh, cells: f32, i: usize) -> [f32; 3] {
     let mut state = mix(i as u32 ^ 0x51ed_270b);
     let mut next = || {
@@ -64,10 +66,10 @@ fn point(mesh: &Mesh, cells: f32, i: usize) -> [f32; 3] {
     [0, 1, 2].map(|k| (a * v[0][k] + b * v[1][k] + c * v[2][k]).clamp(0.0, cells))
 }
 
-/// α, and how many of a thousand points its trees are asked for: lists grow with α, to thousands of cells at 4.
+/// α, and how many of a thousand points are located in its trees. Lists grow with α, to thousands of entries at 4.
 const SHARES: [(f32, usize); 4] = [(0.0, 450), (1.0, 400), (2.0, 145), (4.0, 5)];
 
-/// Which cells are numbered one way, and which the other.
+/// Whether the vertices of each tetrahedron are numbered in positive orientation.
 fn signs(mesh: &Mesh) -> Vec<bool> {
     let positive = |ids: &[u32; 4]| {
         let [a, b, c, d] = ids.map(|i| DVec3::from_array(mesh.points[i as usize].map(f64::from)));
@@ -76,8 +78,8 @@ fn signs(mesh: &Mesh) -> Vec<bool> {
     mesh.tets.iter().map(positive).collect()
 }
 
-/// The share of `n` points in the trees of one α and every assignment, a third each, with both kinds of lists, beside a tree of
-/// α = 0: each point is located three times.
+/// Locates the share of `n` points of one α: a third of it with each assignment, in trees with both kinds of lists, and
+/// in a tree of α = 0. Each point is thus located three times.
 fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     let (alpha, share) = SHARES[which];
     let before: usize = SHARES[..which].iter().map(|s| s.1).sum();
@@ -85,7 +87,8 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     let gpu = Gpu::new(&GpuOptions { binding: Some(binding), ..GpuOptions::default() }).unwrap();
     let side = if is_reference() || n == FULL { 40 } else { 16 };
     let mesh = kuhn_jittered([side; 3], 0.2, 11).unwrap();
-    // Where cells overlap, a walk may name another one that holds the point (SPEC 3.1); none has turned over here.
+    // Where tetrahedra overlap, a walk may find another one that contains the point (SPEC 3.1). Here, none has turned
+    // over.
     assert!(signs(&mesh) == signs(&kuhn([side; 3]).unwrap()));
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let build =

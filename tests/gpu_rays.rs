@@ -1,4 +1,5 @@
-//! The ray tracing baseline, by ray queries and by ray-tracing pipelines where the device has them: what it finds is right, and what it loses is counted.
+//! The ray tracing baseline, by ray queries and by ray-tracing pipelines where the device has them: the owners that it
+//! finds are right, and the points that it loses are counted.
 #![allow(clippy::unwrap_used)]
 
 use olbvh::baseline::{RayMethod, Rays};
@@ -10,7 +11,7 @@ use olbvh::query::{LocateOptions, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
-/// Whether the device traces rays that way; says so loudly where not. The reference driver must.
+/// Whether the device traces rays by this method; prints a message if not. The reference driver must.
 fn has_rays(gpu: &Gpu, method: RayMethod) -> bool {
     let has = method.of(gpu);
     if !has {
@@ -27,7 +28,7 @@ fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod, points: &[[f32; 3]])
     (rays, found.owners, found.barycentrics)
 }
 
-/// The mesh with its coordinates multiplied, and points in and around it.
+/// The mesh with its coordinates scaled, and points in and around it.
 fn scaled(mut mesh: Mesh, by: [f32; 3]) -> (Mesh, Vec<[f32; 3]>) {
     mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] * by[c]));
     let hi = mesh.points.iter().fold([0.0f32; 3], |hi, p| [0, 1, 2].map(|c| hi[c].max(p[c])));
@@ -86,7 +87,8 @@ fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
             mesh.points.len()
         );
         assert!(lost[0] * 1000 <= inside, "{name}: {} of {inside} points are lost", lost[0]);
-        // Every face once: two of the four of each tetrahedron, and half of those on the surface again.
+        // Every face is counted once: two of the four faces of each tetrahedron, and half of those on the surface in
+        // addition.
         let surface = device.neighbours().unwrap().iter().flatten().filter(|&&n| n == u32::MAX).count();
         assert_eq!(2 * rays.faces() as usize, 4 * mesh.tets.len() + surface);
         assert!(structure.bytes() <= structure.built_bytes() + 4096 && rays.bytes() > structure.bytes());

@@ -1,4 +1,5 @@
-//! Slices, pictures and overlaps recorded behind a build, of a mesh that moves: what the owning forms and the reference find, in one command buffer.
+//! Slices, pictures and overlaps of a moving mesh, recorded after a build into one command buffer, equal those of the
+//! owning calls and of the reference implementation.
 
 #![allow(clippy::unwrap_used)]
 
@@ -28,10 +29,10 @@ use olbvh::render::{Bounds, Plan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
 use submit::submit;
 
-/// Pairs that the frames have room for.
+/// The number of pairs that the frames have room for.
 const ROOM: usize = 1300;
 
-/// Frame `i` of a mesh that turns and swells.
+/// Frame `i` of a mesh that turns and grows.
 fn moved(mesh: &Mesh, i: u32) -> Mesh {
     let (sin, cos) = (0.4 * i as f32).sin_cos();
     let mut moved = mesh.clone();
@@ -78,7 +79,8 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
     status
 }
 
-/// The picture is that of the owning form, and its plan that of the host; how many samples were found, and skipped.
+/// Compares the picture with that of the owning call, and its plan with that of the host. Returns the number of samples
+/// found, and skipped.
 fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], device: &DeviceMesh, tree: &Tree, grid: &Grid) -> [u64; 2] {
     let (plan, picture) = (&queries.plan, &queries.picture);
     let owned = render(device, tree, plan, (values, On::Points), Some(&queries.normals), &|_, _| {}).unwrap();
@@ -95,7 +97,7 @@ fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], device: &Device
     [low[1], low[2]]
 }
 
-/// All owners of the mesh's points, or as many of them as there was room for; how many there are.
+/// Compares all owners of the mesh's points, or as many as there was room for. Returns their number.
 fn compare_owners(gpu: &Gpu, queries: &Queries, locator: &Locator<'_>, points: &[[f32; 3]]) -> usize {
     let expected: Vec<Vec<u32>> = points.iter().map(|&p| locator.owners(p)).collect();
     let ends: Vec<u32> = read(gpu, queries, queries.owners.ends, points.len());
@@ -183,7 +185,7 @@ fn by_descriptors() {
     frames(Binding::Descriptors);
 }
 
-/// One round at a time, in submissions of their own, ends where the owning forms end.
+/// Rounds in separate submissions, one at a time, end with the result of the owning calls.
 #[test]
 fn rounds_go_on_where_they_ended() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -209,7 +211,7 @@ fn rounds_go_on_where_they_ended() {
     let carve = |a: &mut Arena| SliceMemory::carve(a, [5, 5], 5);
     let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
-    // As many voxels, but more side by side.
+    // The same number of voxels, but more side by side.
     let wide = olbvh::slicing::VoxelGrid { size: [25, 1], ..voxels };
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
     let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
@@ -230,7 +232,7 @@ fn rounds_go_on_where_they_ended() {
     assert!(submissions > 1 || copies < 6000);
     assert_eq!(status.inside + status.touched + status.empty, 25);
     let answers: Vec<u32> = gpu.download(&buffer, memory.answers.part(0, 100)).unwrap();
-    // All rounds in one recording.
+    // All rounds in one recording give the same.
     submit(&gpu, "olbvh.test.rounds", |r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(40))).unwrap();
     assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
     assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
@@ -254,7 +256,7 @@ fn rounds_go_on_where_they_ended() {
     let buffer = gpu.buffer("olbvh.test.pairs", Arena::measure(carve).unwrap()).unwrap();
     let (memory, found) = carve(&mut Arena::new(buffer.all())).unwrap();
     let status = || gpu.download::<OverlapStatus>(&buffer, memory.status).unwrap()[0];
-    // Too few rounds to count: nothing is written, and it says so.
+    // With too few rounds to count all pairs, nothing is written, and the status says so.
     submit(&gpu, "olbvh.test.rounds", |r| {
         cmd_count_pairs(r, &few_scene, &scene, &memory, Rounds::begin(1))?;
         cmd_list_pairs(r, &few_scene, &scene, &memory, found, Rounds::begin(1))
@@ -271,7 +273,7 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(gpu.download::<[u32; 2]>(&buffer, found.part(0, 8 * expected.len() as u64)).unwrap(), expected);
 }
 
-/// A picture in several recordings is that of one: of the volume, or of a surface across it.
+/// A picture drawn in several recordings equals that of one recording: of a volume, or of a surface across it.
 fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso: bool) -> Vec<[f32; 4]> {
     let (surfaces, step) = if iso { (vec![0.7], 0.1) } else { (vec![], 0.2) };
     let settings = RenderSettings { size: [4, 3], step: Some(step), iso: surfaces, ..RenderSettings::default() };
@@ -315,7 +317,8 @@ fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso
     colors
 }
 
-/// What a recording cannot know beforehand is told by the status: boxes too large for the mesh, and a mesh of nothing.
+/// The status reports what a recording cannot know beforehand: boxes too large for the mesh, and a mesh without valid
+/// tetrahedra.
 #[test]
 fn what_cannot_be_asked_is_told() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();

@@ -1,4 +1,5 @@
-//! The recorder's own hazard check: whichever barrier is left out, it objects. So no barrier is missing where the check looks, and none is superfluous.
+//! The recorder's hazard check objects to whichever barrier is left out. So no barrier is missing where the check
+//! looks, and none is superfluous.
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
@@ -27,7 +28,7 @@ use olbvh::query::{
 };
 use submit::submit;
 
-/// Copies each part, as a caller would use it next.
+/// Copies from each part, as a caller would use it next.
 fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
     for (i, part) in parts.iter().enumerate() {
         let n = part.size().min(4);
@@ -35,7 +36,7 @@ fn read(r: &mut Recorder<'_>, parts: &[BufferRef], sink: &Buffer) {
     }
 }
 
-/// Records `work` once as it is, then once without each of its barriers: the first must pass, the others must be refused.
+/// Records `work` once as it is, which must pass, and once without each of its barriers, which must be refused.
 fn every_barrier_counts(gpu: &Gpu, what: &str, work: impl Fn(&mut Recorder<'_>) -> olbvh::Result<()>) -> usize {
     let labels = submit(gpu, "olbvh.test.whole", |r| {
         work(r)?;
@@ -136,7 +137,8 @@ fn queries() {
     assert!(barriers >= 70, "{barriers}");
 }
 
-/// Sorted points, location that takes several dispatches, since a leaf could be that long, and values at what was located.
+/// Sorted points, location that takes several dispatches, since leaves could be this long, and values at the located
+/// points.
 #[test]
 fn location() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -168,7 +170,7 @@ fn location() {
     assert!(matches!(unordered, Err(Error::Invalid(_))));
 }
 
-/// Barriers of the host's between commands of ours count once it has told of them.
+/// The host's own barriers between commands of this crate count once the host has reported them.
 #[test]
 fn barriers_of_a_host() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
@@ -194,7 +196,8 @@ fn barriers_of_a_host() {
     assert_eq!(barriers, 2);
 }
 
-/// An address that a host forgot, or that a kernel cannot load from, is refused before a device follows it; a rehearsal needs none.
+/// An address that a host forgot, or that a kernel cannot load from, is refused before a device uses it. A rehearsal
+/// needs no addresses.
 #[test]
 fn addresses_of_a_host() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();

@@ -1,4 +1,5 @@
-//! Slices on the device are the reference's, kinds and owners to the bit, values but for flushed denormals: meshes that the conformance suite lacks.
+//! Slices on the device equal those of the reference implementation, kinds and owners to the bit, values except for
+//! flushed denormals, for meshes that the conformance suite lacks.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -39,7 +40,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh, trees: &[(f32, Assign)], settings: 
                 for i in 0..expected.kinds.len() {
                     let decided = |b: &Band| (b.kinds[i], b.owners[i]);
                     assert_eq!(decided(&expected), decided(&found), "{what}: voxel {i} of {:?}", found.rows);
-                    // Devices may flush denormal products of a value; nothing else may differ.
+                    // Devices may flush denormal products of a value; everything else must be equal.
                     let (a, b) = (expected.values[i], found.values[i]);
                     let same = a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-36;
                     assert!(same, "{what}: value {a} or {b} of voxel {i} of {:?}", found.rows);
@@ -72,7 +73,7 @@ fn by_address() {
         println!("NOT RUN: slices with lists of 20,000 entries and of flow_sphere_50k on SwiftShader, where they take many minutes");
         return;
     }
-    // Lists that no dispatch can search at once.
+    // Lists that no dispatch can search in one go.
     let one = kuhn_jittered([1; 3], 0.0, 0).unwrap();
     let many = Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]);
     let mut touched =
@@ -107,7 +108,8 @@ fn an_error_of_the_sink_ends_the_stack() {
     assert!(result.is_err_and(|e| e.to_string().contains("full")));
 }
 
-/// Where cells overlap, the owner is found from the owner of the voxel before: of the same one, however many voxels are sliced at once.
+/// Where tetrahedra overlap, the owner of a voxel is found from that of the voxel before. That is the same one however
+/// many voxels are sliced at a time.
 #[test]
 fn memory_makes_no_difference_where_cells_overlap() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 25);
@@ -133,7 +135,7 @@ fn memory_makes_no_difference_where_cells_overlap() {
     assert_eq!(bands, 1);
     let second = one.tets.len() as u32;
     assert!(all.iter().any(|&t| t < second) && all.iter().any(|&t| t >= second && t != u32::MAX));
-    // Memory for 70 rows, of which 64 begin where runs do.
+    // Memory for 70 rows, of which only 64 are used, since bands start where runs do.
     let _rest = gpu.buffer("olbvh.test.rest", gpu.memory_left() - 70 * 40 * 40 - (1 << 14)).unwrap();
     let (in_parts, bands) = owners();
     assert_eq!(bands, 9);

@@ -1,4 +1,5 @@
-//! Shapes of the kernels change times, never results: primitives are in the conformance suite, here a mesh, its tree and all queries under every row.
+//! Targets change times, never results. The conformance suite tests primitives; here a mesh, its tree and all queries
+//! are tested with every row of the table.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::baseline::Lbvh;
@@ -13,7 +14,7 @@ use olbvh::render::{Bounds, Prepared, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
 
-/// Everything that a device says of a mesh.
+/// All results of a device for a mesh.
 #[derive(PartialEq)]
 struct Answers {
     trees: [TreeArrays; 2],

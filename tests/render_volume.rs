@@ -1,4 +1,4 @@
-//! Pictures of the reference renderer: independent of the tree, equal to brute force, equal to the one kept.
+//! Pictures of the CPU reference: they do not depend on the tree, equal those of brute force, and equal a stored one.
 
 #![allow(clippy::unwrap_used)]
 
@@ -10,7 +10,7 @@ use olbvh::reference::vertices::CellRange;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
 use olbvh::render::{Background, Bounds, RenderSettings, TransferFunction};
 
-/// A jittered grid with the analytic field, moved off the origin.
+/// A jittered grid with the analytic field, moved away from the origin.
 fn grid(cells: [u32; 3]) -> Mesh {
     let mut mesh = kuhn_jittered(cells, 0.3, 5).unwrap();
     mesh.points.iter_mut().for_each(|p| *p = [p[0] * 0.7 - 3.0, p[1] + 11.0, p[2] * 1.3]);
@@ -29,13 +29,13 @@ fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &Ren
     render(&scene, &|_, _| ())
 }
 
-/// How far apart two pictures are at most.
+/// The largest difference between two pictures.
 fn distance(a: &[u8], b: &[u8]) -> u8 {
     assert_eq!(a.len(), b.len());
     a.iter().zip(b).map(|(a, b)| a.abs_diff(*b)).max().unwrap_or(0)
 }
 
-/// Each sample belongs to one of two halves of the cells, on whatever axis they are cut.
+/// Each sample belongs to one of two halves of the octree cells, on whatever axis these are cut.
 #[test]
 fn parts_share_the_samples() {
     let mesh = grid([7, 6, 5]);
@@ -79,7 +79,7 @@ fn the_picture_does_not_depend_on_the_tree() {
     }
 }
 
-/// The picture and the oracle differ by more than 2/255 in at most a thousandth of the pixels.
+/// Asserts that the picture and the oracle differ by more than 2/255 in at most a thousandth of the pixels.
 fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
     let topology = topology(mesh).unwrap();
     let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
@@ -142,8 +142,9 @@ fn fields_of_cells_and_holes_in_fields_agree_with_brute_force() {
     assert_as_brute_force("cells with NaN", &mesh, &settings("iso"));
 }
 
-/// A field that is linear in space has planes for iso-surfaces: a pixel shows the one that its ray meets first within the mesh, in the one colour that a
-/// plane has in parallel light, and with one seen through the other both, whatever the tree, and with nothing skipped.
+/// The iso-surfaces of a field that is linear in space are planes. A pixel shows the plane that its ray meets first
+/// within the mesh, in the single colour that a plane has in parallel light; or, where one is seen through the other,
+/// both. This holds for every tree.
 #[test]
 fn surfaces_of_a_linear_field_are_planes() {
     let mut mesh = kuhn([9, 8, 10]).unwrap();
@@ -183,7 +184,7 @@ fn surfaces_of_a_linear_field_are_planes() {
         for (i, pixel) in picture.pixels.chunks(4).enumerate() {
             let (origin, direction) = plan.rays.ray(i as u32 % plan.size[0], i as u32 / plan.size[0]);
             let rise: f32 = (0..3).map(|c| gradient[c] * direction[c]).sum();
-            // Planes that the ray meets, by distance, those near the edge of the mesh aside.
+            // The planes that the ray meets, by distance. Pixels with one near the surface of the mesh are left out.
             let mut hits: Vec<(f32, f32)> = isos.iter().map(|&iso| ((iso - value(origin)) / rise, iso)).collect();
             hits.sort_by(|a, b| a.0.total_cmp(&b.0));
             let depth = |t: f32| {

@@ -1,11 +1,11 @@
-//! Rules of the source: who may use whom, and how things are named.
+//! Rules of the source: which module may use which, and how things are named.
 
 #![allow(clippy::unwrap_used)]
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-/// What benchmarks and cases ask: all that computes.
+/// The modules that benchmarks and conformance cases use: all that compute.
 const MEASURED: &[&str] = &[
     "baseline",
     "build",
@@ -23,7 +23,8 @@ const MEASURED: &[&str] = &[
     "tree",
 ];
 
-/// What each module may use, itself aside (DESIGN §3: dependencies point one way). `error` and `lib.rs` are everybody's.
+/// The modules that each module may use besides itself: dependencies point one way. Every module may use `error`, and
+/// `lib.rs` may use all.
 const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
     ("layout", &[]),
@@ -34,7 +35,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("tree", &["error", "layout", "mesh", "options", "reference"]),
     ("render", &["error", "layout", "mesh", "options", "reference", "tree"]),
     ("formats", &["error", "layout", "mesh", "options", "reference", "render"]),
-    // `kernels` holds what is generated for `gpu`'s pipelines, and `gpu` runs the self-test of `primitives` before it trusts a device.
+    // `kernels` contains what is generated for the pipelines of `gpu`, and `gpu` runs the self-test of `primitives`
+    // before it trusts a device.
     ("gpu", &["error", "kernels", "primitives"]),
     ("kernels", &["error", "gpu", "layout", "options"]),
     ("primitives", &["error", "gpu", "kernels", "layout"]),
@@ -71,14 +73,14 @@ fn sources() -> Vec<(PathBuf, String)> {
     found.into_iter().map(|f| (f.strip_prefix(&root).unwrap().to_path_buf(), fs::read_to_string(f).unwrap())).collect()
 }
 
-/// The module that a file belongs to; `None` for the program and `lib.rs`.
+/// The module of a file; `None` for the program and `lib.rs`.
 fn module(file: &Path) -> Option<String> {
     let first = file.components().next()?.as_os_str().to_string_lossy().into_owned();
     let name = first.strip_suffix(".rs").unwrap_or(&first);
     (name != "bin" && name != "lib").then(|| name.to_string())
 }
 
-/// The identifiers behind every `crate::`, groups in braces included.
+/// The identifiers after every `crate::`, also in groups in braces.
 fn used(text: &str) -> Vec<String> {
     let ident = |s: &str| s.trim().chars().take_while(|c| c.is_alphanumeric() || *c == '_').collect::<String>();
     let mut used = Vec::new();
@@ -133,7 +135,7 @@ fn the_rule_sees_uses() {
     assert!(used("// crate::gpu\nuse crate::Error;").is_empty());
 }
 
-/// `olbvh.<stage>.<thing>`, thing may have parts.
+/// Whether a name has the form `olbvh.<stage>.<thing>`; the thing may have parts.
 fn is_name(name: &str) -> bool {
     let parts: Vec<&str> = name.split('.').collect();
     let word =
@@ -146,7 +148,7 @@ fn kernels_are_named_by_stage_and_thing() {
     let mut n = 0;
     for (kernel, buffers) in olbvh::kernels::interfaces() {
         assert!(is_name(kernel), "{kernel}");
-        // What rays meet is told in their payload.
+        // What a ray meets is returned in its payload, not in a buffer.
         let told = kernel.ends_with("_missed") || kernel.ends_with("_hit");
         assert!(buffers.is_empty() == told && buffers.iter().all(|b| !b.is_empty()), "{kernel}: {buffers:?}");
         n += 1;

@@ -1,4 +1,4 @@
-//! The body: a mesh in the host's memory, deformed every frame, with olbvh's arrays beside it.
+//! The body: a mesh in the host's memory, deformed every frame, and the arrays of olbvh for it.
 
 use crate::host::{Host, HostBuffer};
 use anyhow::{Context, Result};
@@ -13,10 +13,10 @@ use olbvh::options::BuildOptions;
 use olbvh::primitives::Arena;
 use std::path::Path;
 
-/// What each frame in flight has for itself.
+/// What each frame in flight has of its own.
 pub struct Deformed {
     pub positions: HostBuffer,
-    /// The addresses that the shaders get; see `olbvh.glsl`.
+    /// The addresses that the shaders receive; see `olbvh.glsl`.
     pub tree: HostBuffer,
     pub set: Option<vk::DescriptorSet>,
     memory: HostBuffer,
@@ -41,7 +41,7 @@ pub struct Body {
     sets: Option<(vk::DescriptorPool, vk::DescriptorSetLayout)>,
 }
 
-/// The faces that only one tetrahedron has.
+/// The faces that belong to only one tetrahedron.
 fn surface(tets: &[[u32; 4]]) -> Vec<u32> {
     let mut faces: Vec<([u32; 3], [u32; 3])> = tets
         .iter()
@@ -72,7 +72,8 @@ impl Body {
         let faces = surface(&mesh.tets);
         let triangles = host.filled("triangles", &faces, vk::BufferUsageFlags::INDEX_BUFFER)?;
 
-        // Sizes first: what most trees need. Where a deformed body would need more, the device builds a coarser one.
+        // Sizes come first: those that most trees need. If the tree of a deformed body needs more, the device builds a
+        // coarser one.
         let options = BuildOptions::default();
         let capacity = Capacity::usual(tets, 7);
         let carve_slot = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?));
@@ -134,7 +135,7 @@ impl Body {
     /// Records stage 0 and the construction of a slot's tree.
     pub fn record(&self, r: &mut Recorder<'_>, slot: usize) -> olbvh::Result<()> {
         let Deformed { mesh, arrays, .. } = &self.slots[slot];
-        // The scratch memory is that of the frame before.
+        // The frame before used the same scratch memory.
         r.barrier("frame.before → frame.mesh");
         cmd_prepare_mesh(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
@@ -156,7 +157,7 @@ impl Body {
     }
 }
 
-/// A layout and a pool for the arrays of a scene, where there are no buffer addresses.
+/// A layout and a pool for the arrays of a scene, for devices without buffer addresses.
 fn descriptor_pool(host: &Host, sets: usize) -> Result<(vk::DescriptorPool, vk::DescriptorSetLayout)> {
     let count = SceneBuffers::COUNT as u32;
     let bindings: Vec<_> = (0..count)
@@ -166,7 +167,7 @@ fn descriptor_pool(host: &Host, sets: usize) -> Result<(vk::DescriptorPool, vk::
         })
         .collect();
     let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: count * sets as u32 }];
-    // SAFETY: plain creation; `Body::free` destroys both.
+    // SAFETY: objects are created as Vulkan asks for; `Body::free` destroys both.
     unsafe {
         let layout = host.device.create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)?;
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets as u32).pool_sizes(&sizes);

@@ -1,4 +1,5 @@
-//! The host: a small offscreen Vulkan renderer that knows nothing of olbvh. Instance, device, one graphics queue, an allocator, images, buffers.
+//! The host: a small offscreen Vulkan renderer that knows nothing about olbvh, with instance, device, one graphics
+//! queue, an allocator, images and buffers.
 
 use anyhow::{Context, Result, bail};
 use ash::vk;
@@ -16,9 +17,9 @@ unsafe extern "system" fn collect(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: Vulkan passes valid callback data; `user` is the box that `Host` keeps until the messenger is gone.
+    // SAFETY: Vulkan passes valid callback data; `user` is the box that `Host` keeps until the messenger is destroyed.
     let (data, messages) = unsafe { (&*data, &*user.cast::<Messages>()) };
-    // SAFETY: a C string for the duration of the call.
+    // SAFETY: the message is a C string that is valid for the duration of the call.
     let text = unsafe { data.message_as_c_str() }.map(|t| t.to_string_lossy().into_owned()).unwrap_or_default();
     if !text.contains("loader") {
         messages.lock().unwrap().push(text);
@@ -42,7 +43,7 @@ pub struct Host {
 
 impl Host {
     pub fn new(addresses: bool) -> Result<Self> {
-        // SAFETY: plain creation; `drop` destroys everything once, children first.
+        // SAFETY: objects are created as Vulkan asks for; `drop` destroys each of them once, children first.
         unsafe {
             let entry = ash::Entry::load()?;
             let has_debug = entry
@@ -68,7 +69,7 @@ impl Host {
             let families = instance.get_physical_device_queue_family_properties(physical);
             let both = vk::QueueFlags::GRAPHICS | vk::QueueFlags::COMPUTE;
             let family = families.iter().position(|f| f.queue_flags.contains(both)).context("no queue for graphics and compute")? as u32;
-            // What olbvh would like, asked of it before there is a device.
+            // What olbvh would like to have enabled, asked before there is a device.
             let wanted = olbvh::gpu::Requirements::check(&instance, physical);
             if !wanted.missing.is_empty() {
                 bail!("the device lacks {}", wanted.missing.join(", "));
@@ -116,7 +117,7 @@ impl Host {
         self.allocator.as_ref().expect("taken in drop only")
     }
 
-    /// Fails if a validation layer had anything to say.
+    /// Fails if a validation layer reported anything.
     pub fn check(&self) -> Result<()> {
         let messages = self.debug.as_ref().map(|d| d.2.lock().unwrap().clone()).unwrap_or_default();
         if messages.is_empty() { Ok(()) } else { bail!("validation: {}", messages.join("\n")) }
@@ -141,7 +142,7 @@ impl Host {
         }
     }
 
-    /// A buffer that the processor writes, with this content.
+    /// A buffer that the processor writes, filled with `data`.
     pub fn filled<T: bytemuck::Pod>(&self, name: &str, data: &[T], usage: vk::BufferUsageFlags) -> Result<HostBuffer> {
         let mut buffer = self.buffer(name, size_of_val(data) as u64, usage, MemoryLocation::CpuToGpu)?;
         buffer.write(data);
@@ -167,13 +168,13 @@ impl Host {
     }
 
     pub fn free(&self, buffer: HostBuffer) {
-        // SAFETY: the device is idle when the renderer lets its buffers go.
+        // SAFETY: the device is idle when the renderer frees its buffers.
         unsafe { self.device.destroy_buffer(buffer.handle, None) };
         let _ = self.allocator().lock().unwrap().free(buffer.allocation);
     }
 
     pub fn free_image(&self, image: HostImage) {
-        // SAFETY: the device is idle when the renderer lets its images go.
+        // SAFETY: the device is idle when the renderer frees its images.
         unsafe {
             self.device.destroy_image_view(image.view, None);
             self.device.destroy_image(image.handle, None);
@@ -184,7 +185,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        // SAFETY: whoever used the device is gone; the allocator gives its blocks back before the device goes.
+        // SAFETY: nothing uses the device any more; the allocator frees its blocks before the device is destroyed.
         unsafe {
             let _ = self.device.device_wait_idle();
             drop(self.allocator.take());
@@ -214,9 +215,9 @@ impl HostBuffer {
         &self.allocation.mapped_slice().expect("read by the processor")[..self.size as usize]
     }
 
-    /// The buffer as olbvh takes it.
+    /// The buffer in the form that olbvh takes.
     pub fn part(&self) -> olbvh::gpu::BufferRef {
-        // SAFETY: the whole buffer, made with the usage that olbvh asks for.
+        // SAFETY: this is the whole buffer, made with the usage that olbvh asks for.
         unsafe { olbvh::gpu::BufferRef::from_raw(self.handle, 0, self.size, self.address) }
     }
 }

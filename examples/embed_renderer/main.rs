@@ -1,5 +1,6 @@
-//! A renderer with its own Vulkan device embeds olbvh: a body is deformed every frame, its tree is rebuilt in the renderer's command buffer and memory,
-//! and the fragment shader that draws a cut through the body asks the tree for the field inside. Nothing is read back but the pictures.
+//! A renderer with its own Vulkan device embeds olbvh. A body is deformed every frame, its tree is rebuilt in the
+//! renderer's command buffer and memory, and the fragment shader that draws a cut through the body asks the tree for
+//! the field inside. Nothing is read back but the pictures.
 //!
 //! ```text
 //! cargo run --release --example embed_renderer -- [FRAMES] [OUT.png] [--descriptors]
@@ -25,7 +26,7 @@ use std::io::BufWriter;
 use std::time::Instant;
 
 const SIZE: [u32; 2] = [480, 360];
-/// Frames in flight: each has its own positions and tree.
+/// The number of frames in flight, each of which has its own positions and tree.
 const SLOTS: usize = 2;
 
 fn main() -> Result<()> {
@@ -51,12 +52,12 @@ fn main() -> Result<()> {
             ..Enabled::default()
         },
     };
-    // SAFETY: the handles belong together, and `gpu` is dropped before `host`, when the device is idle.
+    // SAFETY: the handles belong together, and `gpu` is dropped before `host`, while the device is idle.
     let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }?;
     let body = Body::load(&host, &gpu, SLOTS)?;
     let pictures = Pictures::new(&host, SIZE, SLOTS, body.set_layout())?;
     let result = animate(&host, &gpu, body, &pictures, frames, out);
-    // SAFETY: waits for what is still in flight, also after an error.
+    // SAFETY: this waits for what is still in flight, also after an error.
     unsafe { host.device.device_wait_idle() }?;
     pictures.free(&host);
     result?;
@@ -91,12 +92,13 @@ fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: 
     encoder.set_frame_delay(1, 20)?;
     let mut writer = encoder.write_header()?;
 
-    // What a frame records is rehearsed once: afterwards nothing is compiled any more.
+    // The recording of a frame is rehearsed once, so that nothing is compiled later.
     let mut rehearsal = Recorder::rehearse(gpu);
     body.record(&mut rehearsal, 0)?;
     rehearsal.finish()?;
 
-    // SAFETY: pool, buffers and fences are made here and destroyed below or with the device; a slot is used again when its fence says so.
+    // SAFETY: pool, buffers and fences are made here and destroyed below or with the device; a slot is used again only
+    // after its fence is signalled.
     unsafe {
         let info = vk::CommandPoolCreateInfo::default().queue_family_index(host.family);
         let pool = device.create_command_pool(&info.flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER), None)?;
@@ -122,7 +124,8 @@ fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: 
             let mut recorder = Recorder::new(gpu, commands[slot], None);
             body.record(&mut recorder, slot)?;
             recorder.finish()?;
-            recorders[slot] = Some(recorder); // it owns descriptor sets, where there are any, until the fence
+            // The recorder owns descriptor sets, if there are any, until the fence is signalled.
+            recorders[slot] = Some(recorder);
             let built = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
                 .dst_access_mask(vk::AccessFlags::SHADER_READ)];

@@ -1,4 +1,4 @@
-//! The host's pictures: render pass, two pipelines, and what it takes to get them to a file.
+//! The host's pictures: render pass, two pipelines, and what is needed to write pictures to a file.
 
 use crate::host::{Host, HostBuffer, HostImage};
 use anyhow::{Context, Result};
@@ -9,7 +9,7 @@ use std::path::Path;
 const COLOR: vk::Format = vk::Format::R8G8B8A8_UNORM;
 const DEPTH: vk::Format = vk::Format::D32_SFLOAT;
 
-/// Compiles a shader of this folder; `olbvh.glsl` is what the crate exports.
+/// Compiles a shader of this folder. `olbvh.glsl` is the file that the crate exports.
 fn compile(host: &Host, name: &str, kind: shaderc::ShaderKind, descriptors: bool) -> Result<vk::ShaderModule> {
     let folder = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/embed_renderer/shaders");
     let text = std::fs::read_to_string(folder.join(name)).with_context(|| name.to_owned())?;
@@ -27,11 +27,11 @@ fn compile(host: &Host, name: &str, kind: shaderc::ShaderKind, descriptors: bool
         options.add_macro_definition("OLBVH_DESCRIPTORS", None);
     }
     let code = compiler.compile_into_spirv(&text, kind, name, "main", Some(&options))?;
-    // SAFETY: SPIR-V fresh from the compiler.
+    // SAFETY: the SPIR-V comes from the compiler.
     Ok(unsafe { host.device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(code.as_binary()), None) }?)
 }
 
-/// What the shaders get as push constants: see `shaders/cut.vert`.
+/// The push constants of the shaders: see `shaders/cut.vert`.
 #[repr(C)]
 #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
 pub struct Push {
@@ -39,11 +39,11 @@ pub struct Push {
     pub plane: [f32; 4],
     pub corner: [f32; 4],
     pub right: [f32; 4],
-    /// Address of the tree, two words.
+    /// The address of the tree, two words.
     pub tree: [u32; 2],
 }
 
-/// What is drawn in a frame.
+/// What a frame draws.
 pub struct Drawing<'a> {
     pub positions: &'a HostBuffer,
     pub values: &'a HostBuffer,
@@ -68,7 +68,7 @@ pub struct Pictures {
 impl Pictures {
     pub fn new(host: &Host, size: [u32; 2], in_flight: usize, tree_set: Option<vk::DescriptorSetLayout>) -> Result<Self> {
         let device = &host.device;
-        // SAFETY: plain creation; `free` destroys it all once.
+        // SAFETY: objects are created as Vulkan asks for; `free` destroys each of them once.
         unsafe {
             let attachment = |format, layout| {
                 vk::AttachmentDescription::default()
@@ -132,7 +132,8 @@ impl Pictures {
         }
     }
 
-    /// Records a picture and its copy to the processor. What it reads must be visible to vertex input and fragment shaders.
+    /// Records a picture and its copy to memory of the processor. What it reads must be visible to vertex input and
+    /// fragment shaders.
     pub fn record(&self, host: &Host, commands: vk::CommandBuffer, slot: usize, d: &Drawing<'_>) {
         let (device, [width, height]) = (&host.device, self.size);
         let clear = [
@@ -181,7 +182,7 @@ impl Pictures {
     }
 }
 
-/// The surface with its vertices, or the rectangle of the cut without any.
+/// The pipeline of the surface, with vertices, or of the rectangle of the cut, without.
 fn pipeline(
     host: &Host,
     [width, height]: [u32; 2],
@@ -228,7 +229,7 @@ fn pipeline(
         .color_blend_state(&blend)
         .layout(layout)
         .render_pass(pass);
-    // SAFETY: all structs outlive the call; the modules are needed until then only.
+    // SAFETY: all structs outlive the call; the modules are needed only until then.
     unsafe {
         let made = host.device.create_graphics_pipelines(vk::PipelineCache::null(), &[info], None);
         modules.into_iter().for_each(|m| host.device.destroy_shader_module(m, None));

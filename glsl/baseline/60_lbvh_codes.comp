@@ -1,8 +1,9 @@
 #version 460
+// LBVH baseline, codes: the Morton code of the middle of every tetrahedron's box on the finest level. Bad tetrahedra
+// sort after all others.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// LBVH baseline, codes: the Morton code of the middle of every tetrahedron's box at the finest level. Bad cells go behind all others.
 ARGUMENTS(6)
     uint tets;
     uint stride;

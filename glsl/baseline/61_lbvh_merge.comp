@@ -1,9 +1,10 @@
 #version 460
+// LBVH baseline, hierarchy: an invocation climbs from every leaf. At each node, the first to arrive stores its half and
+// stops; the second goes on (Apetrei 2014). No invocation waits for another, so no forward progress between workgroups
+// is needed. On Mesa 22.3, lavapipe suspends the whole workgroup at a memory barrier as at a control barrier, and Metal
+// before 3.2 has only control barriers. This loop survives neither, so a workgroup is one subgroup there.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
-// LBVH baseline, hierarchy: every leaf climbs; at each node the first to arrive leaves its half and stops, the second goes on (Apetrei 2014).
-// Nobody waits for anybody, so no forward progress between workgroups is needed. On Mesa 22.3 lavapipe a memory barrier suspends the whole workgroup
-// as a control barrier does, and Metal before 3.2 has none but control barriers, which this loop does not survive: there a workgroup is one subgroup.
 ARGUMENTS(9)
     uint tets;
 END_ARGUMENTS
@@ -13,7 +14,8 @@ BUFFER(2, readonly, uint, boundary)
 BUFFER(3, readonly, uint, codes)
 BUFFER(4, readonly, uint, ids)
 BUFFER16(5, coherent, LbvhNode, nodes)
-BUFFER(6, coherent, uint, arrivals) // per internal node, filled with all ones: the other end of the half that came first
+// Per internal node, filled with NONE: the other end of the half that came first.
+BUFFER(6, coherent, uint, arrivals)
 BUFFER(7, writeonly, uint, root)    // reference of the root
 BUFFER(8, readonly, MeshStatus, status)
 
@@ -28,7 +30,7 @@ bool closer(uint i, uint j) {
 }
 
 void main() {
-    uint valid = tets - status.at[0].bad; // the others are behind them
+    uint valid = tets - status.at[0].bad; // bad tetrahedra come after the valid ones
     uint first = item_index(), last = first, me = first | BINARY_LEAF;
     vec3 lo, hi;
     bool climbs = first < valid;

@@ -1,13 +1,14 @@
 #version 460
+// LBVH baseline, point location: tests every tetrahedron whose box contains the point. A search that a dispatch leaves
+// unfinished is kept in the outputs for the next one.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// LBVH baseline, point location: every primitive whose box holds the point. What a dispatch leaves undone waits in the outputs for the next.
 ARGUMENTS(11)
     uint count;
     uint fresh;  // not 0: nothing has been done yet
-    uint budget; // nodes and candidates per point and dispatch
+    uint budget; // nodes and tetrahedra per point and dispatch
     float tolerance;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -19,7 +20,8 @@ RECORDS(5, uvec4, cells)
 RECORDS(6, vec4, vertices)
 BUFFER(7, readonly, float, points)
 BUFFER(8, READ_WRITE, uint, owners)
-BUFFER16(9, READ_WRITE, uvec4, barycentrics) // of points not done: all ones, where to go on, what is known of the best candidate
+// Of unfinished points: NONE, where to resume, and what is known of the best candidate.
+BUFFER16(9, READ_WRITE, uvec4, barycentrics)
 BUFFER(10, READ_WRITE, uint, unfinished)
 #include "shared/binary_owner.glsl"
 
@@ -28,7 +30,7 @@ void main() {
     uint waits = 0u;
     uvec4 state = uvec4(0u);
     if (i < count && fresh == 0u) state = barycentrics.at[i];
-    // No weight has these bits, which are a NaN that no operation makes.
+    // No barycentric coordinate has the bits of NONE, which are a NaN that no operation produces.
     if (i < count && (fresh != 0u || state.x == NONE)) {
         Grid g = grid.at[0];
         vec3 at = vec3(points.at[3u * i], points.at[3u * i + 1u], points.at[3u * i + 2u]);

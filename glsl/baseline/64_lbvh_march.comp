@@ -1,4 +1,4 @@
 #version 460
-// LBVH baseline: marching in the binary tree.
+// LBVH baseline: marches rays through the binary tree.
 #define BINARY_TREE
 #include "query/volume_march.glsl"

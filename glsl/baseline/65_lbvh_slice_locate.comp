@@ -1,4 +1,4 @@
 #version 460
-// LBVH baseline: centres of voxels in the binary tree.
+// LBVH baseline: locates the centres of voxels in the binary tree.
 #define BINARY_TREE
 #include "query/slice_locate.glsl"

@@ -1,4 +1,4 @@
 #version 460
-// LBVH baseline: boxes of voxels in the binary tree.
+// LBVH baseline: tests the boxes of voxels in the binary tree.
 #define BINARY_TREE
 #include "query/slice_touch.glsl"

@@ -1,19 +1,20 @@
 #version 460
+// LBVH baseline, overlap: finds the tetrahedra of a mesh that intersect one of the other mesh, by the narrow-phase test
+// of those whose boxes meet.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-// LBVH baseline, overlap: which primitives of a mesh intersect one of the other's, by the narrow phase with those whose boxes meet.
 layout(constant_id = 2) const uint OWN_STRIDE = 3;
 layout(constant_id = 3) const uint STRIDE = 3;
-layout(constant_id = 4) const uint EACH_ONCE = 0; // of overlap_tets.glsl
+layout(constant_id = 4) const uint EACH_ONCE = 0; // for overlap_tets.glsl
 ARGUMENTS(14)
     uint tets;
-    uint budget; // nodes and candidates per primitive and dispatch
+    uint budget; // nodes and tests per tetrahedron and dispatch
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
 BUFFER16(1, readonly, LbvhNode, nodes)
 BUFFER(2, readonly, uint, root)
 BUFFER(3, readonly, uint, ids)
@@ -24,16 +25,18 @@ RECORDS(7, uvec4, own_cells)
 BUFFER(8, readonly, float, own_positions)
 BUFFER(9, readonly, uint, bad)
 BUFFER16(10, readonly, NodeFrame, frame)
-BUFFER(11, READ_WRITE, uint, places)   // where to go on, zeroed; all ones: done
-BUFFER(12, READ_WRITE, uint, hits)     // one bit per primitive, zeroed
+BUFFER(11, READ_WRITE, uint, places)   // where to resume, zeroed; NONE: done
+BUFFER(12, READ_WRITE, uint, hits)     // one bit per tetrahedron, zeroed
 BUFFER(13, READ_WRITE, OverlapStatus, status)
 #include "shared/overlap_tets.glsl"
 #include "shared/binary_tree.glsl"
 
-vec3 lo, hi; // the primitive's box within the other mesh's bounds, in that mesh's normalised coordinates, which keep the order of points
+// The tetrahedron's box within the other mesh's bounds, in the normalised coordinates of that mesh, which keep the
+// order of points.
+vec3 lo, hi;
 
 bool enters(uint reference) {
-    if ((reference & BINARY_LEAF) != 0u) return true; // the candidate's own box decides
+    if ((reference & BINARY_LEAF) != 0u) return true; // the tetrahedron's own box decides
     vec3 node_lo, node_hi;
     box_of(reference, node_lo, node_hi);
     return boxes_meet(node_lo, node_hi, lo, hi);

@@ -1,9 +1,10 @@
 #version 460
+// Ray tracing baseline: lists every face of a mesh once, with the tetrahedra on either side (Wald et al. 2019). FILL 0
+// counts, FILL 1 writes.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Ray query baseline: the faces of a mesh, each once, with the tetrahedra on either side (Wald et al. 2019). FILL 0 counts, FILL 1 writes.
 layout(constant_id = 2) const uint FILL = 0;
 ARGUMENTS(8)
     uint tets;
@@ -12,7 +13,7 @@ RECORDS(0, vec4, vertices)
 RECORDS(1, uvec4, cells)
 BUFFER(2, readonly, uint, bad)
 BUFFER16(3, readonly, uvec4, neighbours)
-BUFFER(4, READ_WRITE, uint, places)  // FILL 0: faces of each tetrahedron; FILL 1: number of the first
+BUFFER(4, READ_WRITE, uint, places)  // FILL 0: faces of each tetrahedron; FILL 1: number of its first face
 BUFFER(5, writeonly, uint, indices)  // three vertices per face
 ALIGNED_BUFFER(8, 6, writeonly, uvec2, sides) // tetrahedra in front of and behind each face, or NONE
 BUFFER(7, READ_WRITE, uint, longest) // bits of a length that no edge exceeds, zeroed

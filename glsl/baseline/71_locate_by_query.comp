@@ -1,8 +1,8 @@
 #version 460
+// Ray tracing baseline: rays are traced by ray queries in a compute shader.
 #extension GL_EXT_ray_query : require
 #include "shared/kernel.glsl"
 #include "baseline/locate_by_ray.glsl"
-// Rays traced from a compute shader.
 
 uvec2 first_face(vec3 origin, float most) {
     rayQueryEXT query;

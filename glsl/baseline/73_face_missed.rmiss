@@ -1,4 +1,5 @@
 #version 460
+// Ray tracing baseline, miss shader: the ray meets no face.
 #extension GL_EXT_ray_tracing : require
 layout(location = 0) rayPayloadInEXT uvec2 face;
 

@@ -1,9 +1,9 @@
+// Ray tracing baseline: the first face that a short ray from a point meets gives the tetrahedron around the point (Wald
+// et al. 2019). The device's intersections are not exact, so a tetrahedron is an answer only if it contains the point;
+// a point whose ray slips past an edge is not found. The including shader traces the ray.
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Ray tracing baseline: the first face that a short ray from a point meets tells the tetrahedron around the point (Wald et al. 2019). The device's
-// intersections are not exact, so a tetrahedron is an answer only if it holds the point; a ray that slips past an edge loses its point.
-// The including shader traces the ray.
 ARGUMENTS(8)
     uvec2 scene; // address of the acceleration structure
     uint count;
@@ -19,10 +19,10 @@ BUFFER(6, writeonly, uint, owners)
 BUFFER16(7, writeonly, vec4, barycentrics)
 #include "shared/candidates.glsl"
 
-const vec3 WAY = vec3(0.36, 0.48, 0.8); // unit, and in no plane of a regular grid
+const vec3 WAY = vec3(0.36, 0.48, 0.8); // of unit length, and in no plane of a regular grid
 const float SCALE = 9.094947017729282379150390625e-13; // 2^-40: the coordinates of the scene are in [0, 2)
 
-// The first face on the way, or NONE, and whether its front is seen.
+// The first face that the ray meets, or NONE, and whether the ray meets its front.
 uvec2 first_face(vec3 origin, float most);
 
 void locate(uint i) {
@@ -36,7 +36,7 @@ void locate(uint i) {
         uvec2 face = first_face(x * SCALE, uintBitsToFloat(longest.at[0]) * (1.0625 * SCALE));
         if (face.x != NONE) {
             uvec2 pair = sides.at[face.x];
-            // Next to certain is the one that the ray left.
+            // Almost certainly, the point lies in the tetrahedron on the side that the ray comes from.
             pair = face.y != 0u ? pair.xy : pair.yx;
             for (uint side = 0u; side < 2u && owner == NONE; ++side) {
                 if (pair[side] == NONE) continue;

@@ -1,14 +1,14 @@
 #version 460
+// Finds bad tetrahedra (SPEC 2.3) and the bounds of the vertices that valid tetrahedra use. Floats are compared as
+// ordered unsigned keys: nothing is rounded, and the order of the atomic operations does not matter.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/ordered.glsl"
-// Bad cells (SPEC 2.3), and the bounds of the vertices that valid cells use. Floats are ordered as unsigned keys: no rounding, and
-// the order of atomics does not matter.
 ARGUMENTS(4)
     uint tets;
     uint points;
     uint stride;  // floats from one point to the next
-    uint share;   // tetrahedra of a workgroup
+    uint share;   // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER(0, readonly, float, positions)
 RECORDS(1, uvec4, cells)
@@ -17,11 +17,11 @@ BUFFER(3, READ_WRITE, MeshStatus, status)
 
 #include "shared/positions.glsl"
 
-const uint LIMIT = (125u + 127u) << 23; // coordinates from 2^125 on count as infinite
+const uint LIMIT = (125u + 127u) << 23; // coordinates of magnitude 2^125 and more count as infinite
 
 uvec3 magnitude(vec3 x) { return floatBitsToUint(x) & 0x7fffffffu; }
 
-// A key; denormals count as 0.
+// The ordered key of a float. Denormals count as 0.
 uint key_of(float x) {
     uint bits = floatBitsToUint(x);
     return ordered((bits & 0x7f800000u) == 0u ? 0u : bits);

@@ -1,9 +1,10 @@
 #version 460
+// Makes the grid from the bounds (SPEC 2.1). Where the host divides floats, this kernel divides integers, since
+// Vulkan's division is not correctly rounded.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/ordered.glsl"
-// From the bounds to the grid (SPEC 2.1), by integers where the host divides: Vulkan's division is not correctly rounded.
 ARGUMENTS(2)
     uint unused;
 END_ARGUMENTS
@@ -17,7 +18,8 @@ float divide_1024(float e) {
     uint bits = floatBitsToUint(e);
     uint divisor = (bits & 0x007fffffu) | 0x00800000u;
     int exponent = int(bits >> 23) - 127;
-    // quotient of 2^k by 2^23 * m, m in [1, 2): in (2^-1, 1]
+    // The quotient 2^23 / (2^23 * m), m in [1, 2), lies in (1/2, 1]. It is doubled unless it is 1, so that its first
+    // bit is set.
     uint remainder = 0x00800000u;
     int scale = 10 - exponent + 127;
     if (divisor != 0x00800000u) {
@@ -25,14 +27,14 @@ float divide_1024(float e) {
         scale -= 1;
     }
     uint quotient = 0u;
-    for (int i = 0; i < 25; ++i) { // 24 bits and one to round by
+    for (int i = 0; i < 25; ++i) { // 24 bits, and one for rounding
         quotient = quotient << 1 | uint(remainder >= divisor);
         if (remainder >= divisor) remainder -= divisor;
         remainder <<= 1;
     }
     bool up = (quotient & 1u) != 0u && (remainder != 0u || (quotient & 2u) != 0u);
     quotient = (quotient >> 1) + uint(up);
-    // A carry out of the mantissa moves into the exponent by itself.
+    // A carry out of the mantissa increments the exponent.
     return uintBitsToFloat((uint(scale) << 23) + (quotient - 0x00800000u));
 }
 

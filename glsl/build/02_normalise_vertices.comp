@@ -1,8 +1,9 @@
 #version 460
+// Writes 16 bytes per vertex: its normalised coordinates, which every query reads, and its cell of the finest grid,
+// which the construction and the search of lists read.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Vertices in normalised coordinates, which every query reads, and their finest cells, which the construction reads: 16 bytes each.
 ARGUMENTS(3)
     uint points;
     uint stride; // floats from one point to the next

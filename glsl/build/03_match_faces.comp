@@ -1,16 +1,17 @@
 #version 460
+// Finds the two tetrahedra that share each face (SPEC 2.3) with a hash table with open addressing. A face is searched
+// for first in the slots near the place of its smallest vertex, which its neighbours in the file have just used, so
+// that this memory is likely to be cached; then anywhere in the table. mates[face] receives the other face (see
+// mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/mates.glsl"
-// Finds the two tetrahedra of every face (SPEC 2.3) through a table with open addressing. A face looks first near the place of its
-// smallest vertex, where its neighbours in the file looked just before (memory that is still close), then anywhere.
-// mates[face] becomes the other face (see mates.glsl): the same whichever came first, since a word only grows.
 ARGUMENTS(7)
     uint tets;
     uint slots;      // of the table
-    uint near_slots; // of a vertex
+    uint near_slots; // of the table per vertex, searched first
 END_ARGUMENTS
 RECORDS(0, vec4, vertices)
 RECORDS(1, uvec4, cells)
@@ -18,7 +19,7 @@ BUFFER(2, readonly, uint, bad)
 BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled with NONE
 BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
 BUFFER(5, READ_WRITE, MeshStatus, status)
-BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron without volume, zeroed
+BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
 
 const uint NEAR_PROBES = 16u;
 const uint MAX_PROBES = 8192u;
@@ -46,7 +47,7 @@ void main() {
         uvec4 ids = words(cells.at[t]);
         Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
         float vol = volume(tet);
-        // The sign in the caller's order follows from the parity of the permutation.
+        // The sign of the volume in the caller's order of vertices follows from the parity of the permutation.
         uvec4 r = tet.rank;
         uint inversions = uint(r.y < r.x) + uint(r.z < r.x) + uint(r.w < r.x) + uint(r.z < r.y) + uint(r.w < r.y) + uint(r.w < r.z);
         without_volume = uint(vol == 0.0);
@@ -63,7 +64,8 @@ void main() {
             for (; probe < MAX_PROBES; ++probe) {
                 uint slot = near_base + place;
                 place = place + 1u == near_slots ? 0u : place + 1u;
-                // Anywhere anew at each probe: where the faces of many vertices crowd, long stretches of the table are full.
+                // Every probe is hashed anew: where the faces of many vertices crowd, long stretches of the table are
+                // full.
                 if (probe >= NEAR_PROBES) umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, slot, unused);
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;

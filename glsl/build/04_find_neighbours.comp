@@ -1,14 +1,14 @@
 #version 460
+// Turns the mates of faces into neighbours, in place, and sets boundary bits (SPEC 2.3).
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/mates.glsl"
-// From the mates of faces to neighbours, in their place, and boundary bits (SPEC 2.3).
 ARGUMENTS(5)
     uint tets;
 END_ARGUMENTS
 BUFFER(0, readonly, uint, bad)
-BUFFER(1, readonly, uint, flat_cells) // one bit per tetrahedron without volume
-BUFFER16(2, READ_WRITE, uvec4, neighbours) // mates before
+BUFFER(1, readonly, uint, flat_cells) // one bit per tetrahedron, set if it has no volume
+BUFFER16(2, READ_WRITE, uvec4, neighbours) // mates on entry
 BUFFER(3, READ_WRITE, uint, boundary) // one bit per tetrahedron, zeroed
 BUFFER(4, READ_WRITE, MeshStatus, status)
 #include "shared/bad.glsl"
@@ -24,7 +24,8 @@ void main() {
             for (uint f = 0u; f < 4u; ++f) {
                 bool paired = mates[f] != ALONE && mates[f] != CROWDED;
                 if (paired) across[f] = face_of_mate(mates[f]) >> 2;
-                // Both on one side are a fold, unless one is flat and has none.
+                // Two tetrahedra on the same side of a face are a fold, unless one of them is flat: a flat one lies on
+                // no side.
                 bool same_side = paired && (mates[f] & SIDE) != 0u;
                 if (!paired || (same_side && !is_flat(across[f]))) on_boundary = 1u;
             }

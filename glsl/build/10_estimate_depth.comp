@@ -1,12 +1,13 @@
 #version 460
+// Depth, 1 of 2 (SPEC 2.4): sums the estimates of Eq. 11, and counts the candidates (the entries with `Aabb`) that
+// every level would have.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Depth, 1 of 2 (SPEC 2.4): the sum of the estimates of Eq. 11, and the number of entries that every level would have.
 ARGUMENTS(5)
     uint tets;
     uint stride;
-    uint share; // tetrahedra of a workgroup
+    uint share; // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
@@ -16,7 +17,7 @@ BUFFER(4, READ_WRITE, BuildStatus, status)
 #include "shared/positions.glsl"
 #include "shared/bad.glsl"
 
-// 64-bit sums of the workgroup: 0 the estimates, 1 + k the entries of level k.
+// 64-bit sums of the workgroup: element 0 sums the estimates, element 1 + k the candidates of level k.
 shared uint low[12];
 shared uint high[12];
 
@@ -42,8 +43,9 @@ void main() {
         precise vec3 size = hi - lo;
         precise vec3 extent = floor(vec3(canonical(size.x), canonical(size.y), canonical(size.z)) * g.inv.xyz);
         float largest = min(max(max(extent.x, extent.y), extent.z), 1024.0);
-        sums[0].x += max(floatBitsToUint(largest) >> 23, 127u) - 127u; // its logarithm, downwards
-        uvec3 first = quantize(g, lo), last = quantize(g, hi); // the box of the vertices' cells, since quantization is monotone
+        sums[0].x += max(floatBitsToUint(largest) >> 23, 127u) - 127u; // its base-2 logarithm, rounded down, at least 0
+        // Since quantization is monotone, these are the corners of the box of the vertices' cells.
+        uvec3 first = quantize(g, lo), last = quantize(g, hi);
         [[unroll]] for (uint level = 0u; level <= MAX_LEVEL; ++level) {
             uvec3 n = (last >> MAX_LEVEL - level) - (first >> MAX_LEVEL - level) + 1u;
             uint before = sums[1u + level].x, product = n.x * n.y * n.z;

@@ -1,23 +1,23 @@
 #version 460
+// Depth, 2 of 2 (SPEC 2.4): chooses the largest level that the mean estimate allows (Eq. 12, in integers) and whose
+// candidates and memory fit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Depth, 2 of 2 (SPEC 2.4): the largest level that the mean estimate allows (Eq. 12, in integers) and whose entries
-// and bytes fit.
 ARGUMENTS(4)
     uint tets;
     uint alpha;    // in units of 1/65536
-    uint capacity; // most entries
-    uint per_tet;  // most entries per valid tetrahedron,
-    uint ample;    // unless there are no more than these
-    uint deepest;  // most levels
+    uint capacity; // most candidates
+    uint per_tet;  // most candidates per valid tetrahedron,
+    uint ample;    // except that this many are always allowed
+    uint deepest;  // deepest level allowed
     uint budget[2]; // most words of all arrays, low word first
-    uint box_words; // per node
+    uint box_words; // words of a box, per node
 END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, mesh)
 BUFFER16(1, READ_WRITE, Grid, grid)
 BUFFER(2, READ_WRITE, BuildStatus, status)
-BUFFER(3, writeonly, uint, candidates) // word for the scans: entries of Aabb at the chosen level
+BUFFER(3, writeonly, uint, candidates) // word for the scans: candidates of the chosen level
 
 bool less_equal(uvec2 a, uvec2 b) { return a.y < b.y || (a.y == b.y && a.x <= b.x); } // low word first
 
@@ -28,7 +28,8 @@ uvec2 plus(uvec2 a, uint b) {
 
 uvec2 total(uint level) { return uvec2(status.at[0].total[2u * level], status.at[0].total[2u * level + 1u]); }
 
-// The most that a tree of that level can take: P, PO, CO, NO, flags, masks, boxes. A level has no more nodes than entries or cells.
+// The most words that a tree of this level can take: P, PO, CO, NO, flags, masks, boxes. A level has at most as many
+// nodes as it has entries or cells.
 uvec2 most_words(uint level) {
     uint nodes = 1u, internal = 0u, leaves = 1u;
     for (uint k = 1u; k <= level; ++k) {

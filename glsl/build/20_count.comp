@@ -1,9 +1,10 @@
 #version 460
+// Codes, 1 of 2: counts the candidates of every tetrahedron, or its shares of up to SHARE candidates, of which it has
+// at least one. `counts` has one more element, for the total. With CLEAR, the kernel also clears the marks that a finer
+// level has left.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes, 1 of 2: cells in the quantized box of every tetrahedron, or shares of up to SHARE of them, one at least; one more element for the total. Where a
-// finer level has left marks, they are cleared on the way.
 layout(constant_id = 2) const uint SHARE = 1;
 layout(constant_id = 3) const uint CLEAR = 0;
 ARGUMENTS(6)

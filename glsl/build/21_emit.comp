@@ -1,9 +1,9 @@
 #version 460
+// Codes, 2 of 2 (Aabb): every invocation writes a run of ROWS entries, whichever tetrahedra they belong to, so that a
+// large tetrahedron among small ones does not become a long loop.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes, 2 of 2 (Aabb): every invocation writes a run of entries, whichever tetrahedra they belong to, so one large tetrahedron
-// among small ones is no long loop.
 ARGUMENTS(8)
     uint tets;
     uint capacity;
@@ -31,6 +31,8 @@ void main() {
     uvec3 at = candidate(box, first - offsets.at[t]);
     for (uint i = first; i < end; ++i) {
         if (i >= next) {
+            // A while loop: SwiftShader loses what lanes that leave a do-while loop early have computed in their last
+            // pass.
             while (next <= i && t + 1u < tets) next = offsets.at[++t + 1u];
             box = coarser(finest_box(t), g.level);
             at = box.lo;

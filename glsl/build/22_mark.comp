@@ -1,22 +1,22 @@
 #version 460
+// Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes 32 tetrahedra, few or
+// none of which are on the boundary, and marks the first share of each; with LATER, it takes one other share.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Lists::Boundary (SPEC 2.6): marks the cells that boundary primitives touch. An invocation takes 32 tetrahedra, of which few or none are on the
-// boundary, the first share of each; LATER one other share.
 layout(constant_id = 2) const uint ASSIGN = 0;
 ARGUMENTS(9)
     uint tets;
-    uint capacity; // shares
+    uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 RECORDS(4, vec4, vertices)
-BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
-BUFFER(6, readonly, uint, shares)  // their number
+BUFFER(5, readonly, uint, offsets) // index of the first share of every tetrahedron
+BUFFER(6, readonly, uint, shares)  // number of shares
 BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves; zeroed
 BUFFER(8, readonly, uint, boundary)
 #include "shared/cells.glsl"

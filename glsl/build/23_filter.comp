@@ -1,29 +1,31 @@
 #version 460
+// Codes of all lists but the paper's, 1 of 3: decides which candidates are entries, and counts them. An invocation
+// takes a share of up to 32 candidates of one tetrahedron, and answers with one word. With LISTS 0, the entries are the
+// candidates that the assignment keeps (SPEC 2.2). Otherwise (SPEC 2.6) they are those of them that lie in marked
+// cells, and the unmarked cells whose centre a non-boundary tetrahedron clearly contains; centres in doubt are left to
+// the next kernel.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Codes of all but the paper's lists, 1 of 3: which candidates are entries, and how many. An invocation takes a share of 32 candidates of one
-// tetrahedron, a word of answers. With LISTS of all primitives they are those that an assignment keeps (SPEC 2.2); else (2.6) of those what lies in
-// marked cells, and besides the unmarked cells whose centre the tetrahedron clearly holds. What is in doubt about centres is left to the next kernel.
 layout(constant_id = 2) const uint ASSIGN = 1;
 layout(constant_id = 4) const uint LISTS = 0; // 1: marked cells and seeds
 ARGUMENTS(13)
     uint tets;
-    uint capacity; // shares
+    uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 RECORDS(4, vec4, vertices)
-BUFFER(5, readonly, uint, offsets) // of the shares of every tetrahedron
-BUFFER(6, readonly, uint, shares)  // their number
+BUFFER(5, readonly, uint, offsets) // index of the first share of every tetrahedron
+BUFFER(6, readonly, uint, shares)  // number of shares
 BUFFER(7, writeonly, uint, hits)   // one bit per candidate
 BUFFER(8, writeonly, uint, counts) // hits per share
 BUFFER(9, readonly, uint, marks)
 BUFFER(10, readonly, uint, boundary)
-BUFFER(11, writeonly, uint, doubts)       // shares with centres in doubt: tetrahedra, or tets and the number of another share
+BUFFER(11, writeonly, uint, doubts)       // shares with centres in doubt: t for a first share, tets + i for another
 BUFFER(12, READ_WRITE, uint, doubt_count) // zeroed
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
@@ -41,7 +43,7 @@ void main() {
     uint t = share.t;
     CellBox box = coarser(finest_box(t), g.level);
     uint n = candidates_of(box, share.first);
-    if (n == 0u) { // a bad one
+    if (n == 0u) { // a bad tetrahedron
         hits.at[share.index] = 0u;
         counts.at[share.index] = 0u;
         return;

@@ -1,13 +1,14 @@
 #version 460
+// Codes of all lists but the paper's, 2 of 3: decides about centres on faces, edges or vertices, or too near to them.
+// There are few, but each needs a star of tetrahedra; in the previous kernel, every such centre would hold up all lanes
+// of a subgroup.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Codes of all but the paper's lists, 2 of 3: centres on faces, edges, vertices, or too near to them. There are few, but each takes a star of
-// tetrahedra to decide, which the kernel before would do for as many again as it has lanes.
 ARGUMENTS(12)
     uint tets;
-    uint capacity; // shares
+    uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
@@ -29,7 +30,8 @@ BUFFER(11, readonly, uint, doubt_count)
 #include "shared/marks.glsl"
 #include "shared/seeds.glsl"
 
-// Whether t is a seed of an unmarked cell with this centre, which it holds not clearly: no lower one contains it, or it is near and none does.
+// Whether t is a seed of an unmarked cell whose centre it does not clearly contain: either it contains the centre and
+// no lower-numbered tetrahedron does, or it is near the centre and no tetrahedron contains it.
 bool owns_centre(uint t, Weights own, vec3 centre) {
     uint beaten_below = own.inside ? t : NONE;
     star[0] = t;

@@ -1,23 +1,25 @@
 #version 460
+// Checks whether the entries that the filter kept fit. If they do not, the next coarser level is counted and filtered.
+// Such an attempt lies between every two dispatches of this kernel; its dispatches are empty once the entries fit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/groups.glsl"
-// Whether the entries that the filter kept fit. Where they do not, the next coarser level is counted and filtered: between two of these kernels stands a try,
-// whose dispatches are empty once it fits.
 layout(constant_id = 2) const uint EACH = 64; // items per workgroup of those dispatches
 ARGUMENTS(8)
     uint tets;
-    uint capacity; // entries
-    uint first;    // not 0: nothing has been tried yet
+    uint capacity; // most entries
+    uint first;    // not 0: no attempt has been made yet
 END_ARGUMENTS
 BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, READ_WRITE, BuildStatus, status)
-BUFFER(2, writeonly, uint, shares)  // their number, and the entries, at the level that was filtered last
-BUFFER(3, READ_WRITE, uint, entries)
-BUFFER(4, readonly, uint, tried_shares) // the same two, of the try
-BUFFER(5, readonly, uint, tried_entries)
-BUFFER(6, READ_WRITE, uint, live)   // tetrahedra of the try and one, or 0
-BUFFER(7, writeonly, uint, groups)  // x, y, z: over tetrahedra and one, over words of a bit for each, over tetrahedra
+BUFFER(2, writeonly, uint, shares)  // number of shares at the level that was filtered last
+BUFFER(3, READ_WRITE, uint, entries) // number of entries at that level
+BUFFER(4, readonly, uint, tried_shares) // number of shares of the attempt
+BUFFER(5, readonly, uint, tried_entries) // number of entries of the attempt
+BUFFER(6, READ_WRITE, uint, live)   // tets + 1 if there is an attempt, else 0
+// Workgroups (x, y, z) of three dispatches: over tets + 1 items, over words of one bit per tetrahedron, over
+// tetrahedra.
+BUFFER(7, writeonly, uint, groups)
 
 void plan(uint slot, uint items) {
     uvec3 size = groups_for(items, EACH);

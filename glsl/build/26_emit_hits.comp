@@ -1,18 +1,18 @@
 #version 460
+// Codes of all lists but the paper's, 3 of 3: writes the entries of the candidates that were hit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Codes of all but the paper's lists, 3 of 3: the entries of the candidates that were hit.
 ARGUMENTS(10)
     uint tets;
-    uint capacity; // shares
-    uint room;     // entries
+    uint capacity; // most shares
+    uint room;     // most entries
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER16(1, readonly, uvec4, quantized)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-BUFFER(4, readonly, uint, offsets) // of the shares
+BUFFER(4, readonly, uint, offsets) // index of the first share of every tetrahedron
 BUFFER(5, readonly, uint, shares)
 BUFFER(6, readonly, uint, hits)
 BUFFER(7, readonly, uint, places) // scanned counts of the shares

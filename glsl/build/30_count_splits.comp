@@ -1,8 +1,8 @@
 #version 460
+// Splits, 1 of 2: counts how many nodes end on each level in every run of ROWS codes: counts[level * runs + run].
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Splits, 1 of 2: how many nodes end on each level in every run of ROWS codes: counts[level * runs + run].
 ARGUMENTS(4)
     uint capacity;
 END_ARGUMENTS

@@ -1,21 +1,21 @@
 #version 460
+// Plans the nodes. STAGE 0 computes the length of the table of splits from the number of entries. STAGE 1 computes NO
+// and the dispatches over the leaves and over the nodes of each level from the scanned table.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/groups.glsl"
-// From the number of entries to the length of the table of splits (STAGE 0); from the scanned table to NO and the dispatches of the
-// leaves and the levels (STAGE 1).
 layout(constant_id = 2) const uint STAGE = 0;
 layout(constant_id = 3) const uint EACH = 64; // items per workgroup of the dispatches planned here
 ARGUMENTS(7)
-    uint capacity; // entries
+    uint capacity; // most entries
     uint nodes;    // capacity of the node arrays
     uint run;      // codes per run
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, uint, entries)
 BUFFER(2, readonly, uint, places)          // scanned table of splits
-BUFFER(3, writeonly, uint, table_length)   // of the splits
+BUFFER(3, writeonly, uint, table_length)   // length of the table of splits
 BUFFER(4, READ_WRITE, BuildStatus, status)
 BUFFER(5, writeonly, uint, groups)         // x, y, z: per level 0…10, then the leaves
 BUFFER(6, readonly, uint, node_total)      // total of the table's scan

@@ -1,13 +1,13 @@
 #version 460
+// Splits, 2 of 2: writes where leaves end (PO) and, for every node of the levels above, its last child (CO), without a
+// sort by level. Where a node ends, its last child on the next level ends too, and that child is counted at the same
+// moment. CO therefore needs no search, and the paper's CI array of n_m words is not needed.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Splits, 2 of 2: where leaves end (PO), and node by node on the levels above the last child (CO), in place of a sort by level. Where a node
-// ends, so does its last child on the next level, which is being counted at the same moment: CO needs no search (the paper's CI array of n_m
-// words is not needed).
 ARGUMENTS(7)
     uint capacity;
-    uint nodes; // capacity
+    uint nodes; // capacity of the node arrays
 END_ARGUMENTS
 BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, entries)
@@ -27,12 +27,15 @@ void main() {
         grid.at[0].first_leaf = first_leaf;
         po.at[0] = 0u;
         co.at[0] = 0u;
-        if (n == 0u) po.at[1] = 0u;
+        // A tree that does not fit also has a root, with an empty list.
+        if (n == 0u || status.at[0].overflow != 0u) po.at[1] = 0u;
     }
     if (run >= runs || status.at[0].overflow != 0u) return;
     uint level = grid.at[0].level;
     uint first = run * ROWS, end = min(n, first + ROWS);
-    uint node[12]; // one more than `levels` of the status, whose type, layout included, the optimiser would choose otherwise
+    // One element more than `levels` of the status: otherwise the optimiser would use the type of that array, layout
+    // included.
+    uint node[12];
     for (uint k = 0u; k <= level; ++k) node[k] = places.at[k * runs + run];
     uint code = codes.at[first];
     for (uint i = first; i < end; ++i) {

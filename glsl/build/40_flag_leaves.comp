@@ -1,8 +1,9 @@
 #version 460
+// Leaves, 1 of 2 (Alg. 1): sets boundary flags, in parallel over entries, so that a long leaf does not become a long
+// loop.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Leaves, 1 of 2 (Alg. 1, boundary flags): parallel over entries, so that a long leaf is no long loop.
 ARGUMENTS(6)
     uint capacity;
 END_ARGUMENTS
@@ -20,7 +21,7 @@ void main() {
     uint first = first_item();
     if (first >= n || status.at[0].overflow != 0u) return;
     uint end = min(n, first + ROWS);
-    // The leaf of the first entry: the first whose end lies behind it.
+    // The leaf of the first entry is the first leaf that ends after it.
     uint lo = 0u, hi = status.at[0].leaves - 1u;
     while (lo < hi) {
         uint mid = lo + (hi - lo) / 2u;

@@ -1,19 +1,19 @@
 #version 460
+// Leaves, 1 of 2 with Lists::Boundary, where the boundary flags are known: writes into the top bits of every entry of P
+// which quarters of its leaf's cell the entry is near, so that a search can skip most of a list.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Leaves, 1 of 2 under Lists::Boundary, whose flags are known: the quarters of its leaf's cell that each entry is near to, by which a search passes most of
-// a list over, into the top bits of P.
 ARGUMENTS(7)
     uint capacity;
-    uint id_mask; // bits of an entry that are its primitive
+    uint id_mask; // bits of an entry that hold its tetrahedron
 END_ARGUMENTS
 BUFFER(0, readonly, uint, entries)
 BUFFER16(1, READ_WRITE, Grid, grid)
 BUFFER(2, readonly, BuildStatus, status)
 BUFFER(3, readonly, uint, codes)
 RECORDS(4, uvec4, cells)
-BUFFER16(5, readonly, uvec4, quantized) // the vertices, of which the last word is the finest cell
+BUFFER16(5, readonly, uvec4, quantized) // vertices; the last word is the cell of the finest grid
 BUFFER(6, READ_WRITE, uint, p)
 #include "shared/quarters.glsl"
 

@@ -1,4 +1,7 @@
 #version 460
+// Leaves, 2 of 2 (Alg. 1): writes the box of every leaf, where boxes are stored, from the code of its last entry; the
+// flag of leaves outside of the mesh (see src/reference/leaves.rs); the mask of each leaf's octants; and statistics.
+// Where cells are MARKED (Lists::Boundary), the mark of a leaf's cell is its flag.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -6,9 +9,6 @@
 #include "shared/boxes.glsl"
 #include "shared/assign.glsl"
 #include "shared/separate.glsl"
-// Leaves, 2 of 2 (Alg. 1): the box of every leaf where boxes are stored, from the code of its last entry; the flag of
-// leaves outside of the mesh (see src/reference/leaves.rs); the mask of its octants; statistics. Where cells are MARKED (Lists::Boundary), that is the
-// flag.
 layout(constant_id = 2) const uint BOXES = 0;
 layout(constant_id = 3) const uint MARKED = 0;
 ARGUMENTS(11)
@@ -31,7 +31,7 @@ BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 const uint MAX_TOUCH_TESTS = 16u;
 const uint MAX_LIST_FOR_OCTANTS = 16384u;
 
-// Whether one of the first primitives of a leaf touches its cell.
+// Whether one of the first MAX_TOUCH_TESTS tetrahedra of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {
     vec3 h = half_cell(g, g.level), centre = cell_centre(h, unmorton(code));
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
@@ -45,7 +45,7 @@ bool touched(Grid g, uint begin, uint end, uint code) {
     return false;
 }
 
-// The octants that the entries of a leaf's list are near to; all of them for the longest lists.
+// The octants that the entries of a leaf are near; all octants for lists longer than MAX_LIST_FOR_OCTANTS.
 uint octants(Grid g, uint begin, uint end) {
     if (end - begin > MAX_LIST_FOR_OCTANTS) return ALL_OCTANTS;
     uint mask = 0u;

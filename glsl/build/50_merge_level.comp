@@ -1,9 +1,10 @@
 #version 460
+// Computes one level of internal nodes from their children (Alg. 2): boundary flag, child mask, and the union of the
+// boxes where boxes are stored. Dispatched once per level, from the level above the leaves up to the root, with a
+// barrier between levels.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// One level of internal nodes from their children (Alg. 2): boundary flag, child mask, and the union of boxes where they are stored.
-// Dispatched from the level above the leaves up to the root, with a barrier between levels.
 layout(constant_id = 2) const uint BOXES = 0;
 ARGUMENTS(8)
     uint level;
@@ -27,7 +28,7 @@ void main() {
     uint flag = 0u, mask = 0u;
     for (uint child = begin; child <= end; ++child) {
         flag |= flags.at[child >> 5u] >> (child & 31u) & 1u;
-        uint leaf = child; // the last one below
+        uint leaf = child; // the last leaf below the child
         for (uint k = level + 1u; k < g.level; ++k) leaf = co.at[leaf + 1u];
         mask |= 1u << (codes.at[po.at[leaf - g.first_leaf + 1u] - 1u] >> shift & 7u);
         if (BOXES != 0u) {

@@ -1,10 +1,11 @@
 #version 460
+// Ranges of a field, 1 of 3: every valid tetrahedron with finite values adds the range of its values to the nodes that
+// its quantized box meets on the deepest level where the box has at most SPAN cells along each axis, so that large
+// tetrahedra do not become long loops. Twin of src/reference/ranges.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/ordered.glsl"
-// Ranges of a field, 1 of 3: every valid tetrahedron with finite values adds its own to the nodes that its quantized box meets, on the deepest level where
-// that is at most SPAN cells along each axis: so large tetrahedra are no long loops. Twin of src/reference/ranges.rs.
 layout(constant_id = 2) const uint ON_CELLS = 0;
 ARGUMENTS(9)
     uint tets;
@@ -17,7 +18,8 @@ BUFFER(4, readonly, uint, field) // one float per point or tetrahedron, as bits
 BUFFER(5, readonly, uint, masks)
 BUFFER(6, readonly, uint, co)
 BUFFER(7, readonly, BuildStatus, status)
-BUFFER(8, READ_WRITE, uint, ranges) // zeroed; two keys per node, the lower end's complemented, so that both only grow
+// Two keys per node, the lower end complemented, so that both only grow. Zeroed.
+BUFFER(8, READ_WRITE, uint, ranges)
 #include "shared/cells.glsl"
 #include "shared/children.glsl"
 
@@ -32,7 +34,7 @@ void main() {
     uvec4 values = ON_CELLS != 0u ? uvec4(field.at[t]) : uvec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
     uint lo = 0u, hi = 0u;
     for (uint i = 0u; i < 4u; ++i) {
-        if (!is_finite(values[i])) return; // nowhere in it is a value
+        if (!is_finite(values[i])) return; // no point of it has a value
         lo = max(lo, ~ordered(values[i]));
         hi = max(hi, ordered(values[i]));
     }
@@ -40,7 +42,7 @@ void main() {
     CellBox finest = finest_box(t), box = coarser(finest, g.level);
     uint level = g.level;
     while (max(max(box.size.x, box.size.y), box.size.z) > SPAN) box = coarser(finest, --level);
-    // The smallest node around the whole box.
+    // The smallest node that contains the whole box.
     uint first = morton(box.lo), last = morton(box.lo + box.size - 1u);
     uint from = first == last ? level : level - 1u - uint(findMSB(first ^ last)) / 3u;
     uint top = find_node(0u, 0u, from, first >> (3u * (level - from)));

@@ -1,8 +1,8 @@
 #version 460
+// Ranges of a field, 2 of 3: adds the ranges of the nodes of a level to those of their children. Dispatched once per
+// level, from the root down to the level above the leaves, with a barrier between levels.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
-// Ranges of a field, 2 of 3: what the nodes of a level were given is true of their children. Dispatched from the root down to the level above the
-// leaves, with a barrier between levels.
 ARGUMENTS(3)
     uint level;
 END_ARGUMENTS

@@ -1,9 +1,10 @@
 #version 460
+// Ranges of a field, 3 of 3: converts the keys of leaves to floats, and gives every other node the union of its
+// children's ranges. Dispatched once per level, from the leaves up to the root, with a barrier between levels. Floats
+// are handled as bits throughout, since devices may flush denormals.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/ordered.glsl"
-// Ranges of a field, 3 of 3: from keys to floats for the leaves, the union of the children's ranges for others. Dispatched from the leaves up to the root,
-// with a barrier between levels. Bits throughout: devices may flush denormals.
 ARGUMENTS(3)
     uint level;
 END_ARGUMENTS
@@ -27,7 +28,7 @@ void main() {
             hi = max(hi, ordered(ranges.at[2u * child + 1u]));
         }
     }
-    // Nothing seen: from ∞ to −∞, which no union changes.
+    // A node without values gets the empty range from ∞ to −∞, which changes no union.
     ranges.at[2u * node] = hi == 0u ? INFINITY : unordered(~lo);
     ranges.at[2u * node + 1u] = hi == 0u ? INFINITY | 0x80000000u : unordered(hi);
 }

@@ -1,6 +1,7 @@
 #version 460
+// Copies vectors of four words, ROWS per invocation; neighbouring invocations copy neighbouring vectors. Its rate is
+// what other kernels are compared with.
 #include "shared/kernel.glsl"
-// Copies vectors of four words, ROWS per invocation, those of neighbours side by side: the rate that other kernels are compared with.
 ARGUMENTS(2)
     uint count; // vectors
 END_ARGUMENTS

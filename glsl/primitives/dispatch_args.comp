@@ -1,11 +1,11 @@
 #version 460
+// Computes the arguments of an indirect dispatch, of at least one workgroup, from a count in device memory.
 #include "shared/kernel.glsl"
 #include "shared/groups.glsl"
-// From a count in device memory to the arguments of an indirect dispatch: one workgroup at least.
 ARGUMENTS(2)
     uint count;     // upper limit, whatever the device's count says
     uint per_group; // items that one workgroup takes
-    uint skip;      // items that no workgroup takes
+    uint skip;      // items that are left out
 END_ARGUMENTS
 BUFFER(0, readonly, uint, live)
 BUFFER(1, writeonly, uint, groups) // x, y, z

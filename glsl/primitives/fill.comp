@@ -1,6 +1,6 @@
 #version 460
+// Sets every word to one value, ROWS per invocation; neighbouring invocations write neighbouring words.
 #include "shared/kernel.glsl"
-// Sets every word to one value, ROWS per invocation, those of neighbours side by side.
 ARGUMENTS(1)
     uint count;
     uint value;

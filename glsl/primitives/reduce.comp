@@ -1,7 +1,8 @@
 #version 460
+// Sum, minimum or maximum of u32 values. The first pass writes one partial result per workgroup; the second pass is one
+// workgroup over the partial results.
 #include "shared/kernel.glsl"
 #include "shared/workgroup.glsl"
-// Sum, smallest or largest of u32 values. First pass: one partial per workgroup. Second pass: one workgroup over the partials.
 layout(constant_id = 2) const uint OPERATION = 0; // 0 add, 1 min, 2 max
 ARGUMENTS(3)
     uint count;
@@ -11,7 +12,7 @@ BUFFER(0, readonly, uint, live)
 BUFFER(1, readonly, uint, values)
 BUFFER(2, writeonly, uint, partial)
 
-// The smallest is the complement of the largest complement.
+// The minimum is the complement of the maximum of the complements.
 void main() {
     uint n = min(count, live.at[0]);
     uint flip = OPERATION == 1u ? NONE : 0u;

@@ -1,7 +1,7 @@
 #version 460
+// Exclusive scan, 2 of 3: one workgroup scans the sums of the tiles in place and writes the total.
 #include "shared/kernel.glsl"
 #include "shared/workgroup.glsl"
-// Exclusive scan, 2 of 3: one workgroup scans the sums of the tiles in place and writes the total.
 ARGUMENTS(3)
     uint count;
     uint tile; // values per tile

@@ -1,7 +1,7 @@
 #version 460
+// Exclusive scan, 1 of 3: sums every tile of WORKGROUP * ROWS values.
 #include "shared/kernel.glsl"
 #include "shared/workgroup.glsl"
-// Exclusive scan, 1 of 3: the sum of every tile of WORKGROUP * ROWS values.
 ARGUMENTS(3)
     uint count;
 END_ARGUMENTS
@@ -16,6 +16,6 @@ void main() {
     uint sum = 0u;
     for (uint i = first; i < end; ++i) sum += values.at[i];
     sum = workgroup_add(sum);
-    // Folding into two dimensions may add groups behind the last tile.
+    // Folding into two dimensions may add workgroups after the last tile.
     if (local_index() == 0u && first < n) sums.at[group_index()] = sum;
 }

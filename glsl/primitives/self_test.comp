@@ -1,6 +1,6 @@
 #version 460
+// The start-up self-test, whose answers are known: a long loop, a ballot, a subgroup scan. 64 invocations report.
 #include "shared/kernel.glsl"
-// Known answers of the start-up self-test: a long loop, a ballot, a subgroup scan. 64 invocations report.
 ARGUMENTS(1)
     uint iterations;
 END_ARGUMENTS
@@ -9,7 +9,7 @@ BUFFER(0, READ_WRITE, uint, lanes) // 64 loop counts, 64 ballot counts, 64 sums
 void main() {
     uint i = local_index();
     uint n = 0u;
-    // The limit hides behind memory, so that no compiler can count the loop away.
+    // The limit is an argument, so that no compiler can evaluate the loop.
     if (i < 64u) lanes.at[i] = 0u;
     for (uint k = 0u; k < iterations; ++k) {
         n += 1u + (n >> 31u);

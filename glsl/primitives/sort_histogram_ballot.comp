@@ -1,7 +1,7 @@
 #version 460
+// Radix sort, one tile per workgroup: digits are counted in shared memory. For processors with many narrow cores.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
-// Radix sort, tiles of a workgroup: digits are counted in shared memory. For processors with many narrow cores.
 ARGUMENTS(3)
     uint count;
     uint shift;

@@ -1,8 +1,8 @@
 #version 460
+// Radix sort, serial tiles: every invocation counts the digits of its own ROWS pairs, without a barrier. For processors
+// that run a workgroup as loops over wide vectors. Neighbouring invocations own neighbouring columns of the table.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
-// Radix sort, serial tiles: every invocation counts the digits of its own ROWS pairs, without a barrier. For processors that
-// run a workgroup as loops over wide vectors. Neighbouring invocations own neighbouring columns of the table.
 ARGUMENTS(3)
     uint count;
     uint shift;

@@ -1,8 +1,8 @@
 #version 460
+// Plans the passes of a sort from the number of pairs: their workgroups, and the length of the table of counts.
 #include "shared/kernel.glsl"
 #include "shared/groups.glsl"
 #include "shared/sort.glsl"
-// From the number of pairs to what the passes need: workgroups, and the length of the table of counts.
 ARGUMENTS(3)
     uint count;
     uint tile;      // pairs per tile

@@ -1,8 +1,8 @@
 #version 460
+// Radix sort, one tile per workgroup: equal digits of a subgroup find each other by ballots, so the order within a tile
+// is kept. A tile is processed row by row; the next place of every digit stays in shared memory.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
-// Radix sort, tiles of a workgroup: equal digits of a subgroup find each other by ballots, so the order within a tile is kept.
-// A tile is passed row by row; the running place of every digit stays in shared memory.
 layout(constant_id = 3) const uint MAX_SUBGROUPS = 8; // at least WORKGROUP / subgroup size
 ARGUMENTS(6)
     uint count;
@@ -44,7 +44,7 @@ void main() {
         barrier();
         if (live_item && before == 0u) row_counts[gl_SubgroupID * DIGITS + d] = size;
         barrier();
-        // Places of this row: one invocation walks the subgroups of a digit.
+        // Places of this row: for each digit, one invocation goes through the subgroups.
         for (uint digit = local_index(); digit < DIGITS; digit += WORKGROUP) {
             uint place = running[digit];
             for (uint s = 0u; s < gl_NumSubgroups; ++s) {

@@ -1,7 +1,7 @@
 #version 460
+// Radix sort, serial tiles: every invocation moves its own pairs to the places in the scanned table.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
-// Radix sort, serial tiles: every invocation moves its own pairs to the places that the scanned table names.
 ARGUMENTS(6)
     uint count;
     uint shift;

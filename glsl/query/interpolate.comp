@@ -1,6 +1,9 @@
 #version 460
+// Interpolates a field at located points. A point without an owner gets NaN.
 #include "shared/kernel.glsl"
-// Values of a field at located points; NaN without an owner.
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
 layout(constant_id = 2) const uint ON_CELLS = 0;
 ARGUMENTS(5)
     uint count;
@@ -21,8 +24,7 @@ void main() {
     } else if (owner != NONE) {
         uvec4 ids = words(cells.at[owner]);
         vec4 b = barycentrics.at[i];
-        precise float v = (b.x * field.at[ids.x] + b.y * field.at[ids.y]) + (b.z * field.at[ids.z] + b.w * field.at[ids.w]);
-        value = v;
+        value = weighed(b, vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]));
     }
     values.at[i] = value;
 }

@@ -1,12 +1,14 @@
 #version 460
+// Point location (SPEC 3.1). An invocation takes RUN points. It searches for each point first around a given
+// tetrahedron: the owner of the point before, or a hint. If that fails, it descends to the point's leaf by child masks,
+// and searches the leaf's list or walks. Lists are searched in parts of at most PART_LENGTH entries per dispatch; parts
+// after the first use no runs. Between parts, the best candidate is kept in the outputs. Twin of
+// src/reference/locate.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Point location (SPEC 3.1). An invocation takes RUN points, and looks for each first around where it starts: the owner of the one before, or a hint. Where
-// that fails, in the point's leaf, by descent over child masks, then by a list or a walk. Lists are searched in parts of at most PART_LENGTH entries per
-// dispatch, those after the first without runs; between parts the best candidate waits in the outputs. Twin of src/reference/locate.rs.
-layout(constant_id = 2) const uint GUIDE = 0; // what `guides` has: nothing, HINTS or ORDER
+layout(constant_id = 2) const uint GUIDE = 0; // what `guides` holds: 0 (nothing), HINTS or ORDER
 layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
 layout(constant_id = 5) const uint RUN = 1;
@@ -34,11 +36,11 @@ RECORDS(12, uvec4, neighbours)
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
-const uint LEAST_PART = 16384u; // where parts are longer, points are still located around the same owners
+const uint LEAST_PART = 16384u; // most entries of a list whose owner guides the next point, also where parts are longer
 const uint HINTS = 1u; // a tetrahedron per point, or NONE
-const uint ORDER = 2u; // which point is at each place
+const uint ORDER = 2u; // the number of the point at each place
 
-// A point, in the units of the mesh and in normalised coordinates.
+// A point: its number, and its place in the units of the mesh and in normalised coordinates.
 struct Point {
     uint i;
     vec3 at;
@@ -57,9 +59,9 @@ void main() {
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
     Point a = point_at(g, place);
-    uint from = NONE; // where the next stride begins
-    uint left = 0u;   // steps that it may still take; 0: it has ended
-    bool in_leaf = part > 0u; // whether it began in the point's leaf
+    uint from = NONE; // where the next stride starts
+    uint left = 0u;   // steps that this stride may still take; 0: it has ended
+    bool in_leaf = part > 0u; // whether this stride started in the point's leaf
     if (GUIDE == HINTS && part == 0u) {
         from = guides.at[a.i];
         left = from == NONE ? 0u : HINTED;
@@ -67,7 +69,8 @@ void main() {
     while (place < end) {
         Stand stand = stand_nowhere();
         if (left > 0u) stand = stand_in(from);
-        // As far as strides lead: point after point, each pass an answer or a step, so that invocations do not wait for each other.
+        // Point after point, as long as strides succeed. Every pass is an answer or a step, so that invocations do not
+        // wait for each other.
         bool at_face = false;
         while (left > 0u && place < end) {
             Sides sides = sides_of(stand, a.x);
@@ -111,7 +114,7 @@ void main() {
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
             a = point_at(g, place);
-            // Where a list goes on in the next part, the owner is not known yet.
+            // If the list continues in the next part, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;
             left = known ? HINTED : 0u;

@@ -1,10 +1,10 @@
 #version 460
+// Lists every tetrahedron that contains a point, in ascending order, or only the owner where none does (SPEC 3.1). FILL
+// 0 counts, FILL 1 writes; both search lists in parts. `owners` are the answers of locate.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Every primitive that contains a point, ascending; where none does, the owner alone (SPEC 3.1). FILL 0 counts, FILL 1 writes, list by list in
-// parts. `owners` are the answers of locate.
 layout(constant_id = 2) const uint FILL = 0;
 layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
@@ -24,14 +24,14 @@ RECORDS(6, uvec4, cells)
 RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)
 BUFFER(9, readonly, uint, owners)
-BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: where the next one goes
+BUFFER(10, READ_WRITE, uint, places) // FILL 0: counts, zeroed; FILL 1: place of the next tetrahedron found
 BUFFER(11, READ_WRITE, uint, found)
 RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
 
-// Writes from `place` on those of the star of x in `owner` that contain x; their number.
+// Writes those tetrahedra of the star of x in `owner` that contain x, from `place` on. Returns their number.
 uint list_star(uint owner, vec3 x, uint place) {
     Best unused = no_best();
     arrive(owner, x, unused);
@@ -61,7 +61,7 @@ void main() {
     Tet own = load_tet(words(cells.at[owners.at[i]]));
     uint place = places.at[i];
     if (!weights(own, x).inside) {
-        // The nearest cell, which nothing contains.
+        // No tetrahedron contains the point: its owner is the nearest one.
         if (part == 0u) {
             if (FILL != 0u && place < capacity) found.at[place] = owners.at[i];
             places.at[i] = place + 1u;

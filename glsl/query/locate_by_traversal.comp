@@ -1,11 +1,11 @@
 #version 460
+// Point location by the paper's traversal (SPEC 3.2), a baseline that must agree with the descent. The node predicate
+// tests the point's cell, in integers.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/node.glsl"
-// Point location through the paper's traversal (SPEC 3.2): a baseline that must agree with the descent. The node predicate tests the point's
-// cell, in integers.
 layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint LISTS = 0;
 ARGUMENTS(12)

@@ -1,11 +1,12 @@
 #version 460
+// Overlap (SPEC 3.5), end of step 1: decides which tetrahedra intersect the other mesh by their vertices, and which
+// must be searched for in its tree. An invocation takes 32 tetrahedra, one word of answers. Twin of
+// src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/overlap.glsl"
-// Overlap (SPEC 3.5), end of step 1: which primitives intersect the other mesh by their vertices, and which have to be searched for in its tree. One
-// invocation per 32 primitives, a word of answers. Twin of src/reference/overlap.rs.
 ARGUMENTS(9)
     uint tets;
     uint stride;
@@ -16,8 +17,8 @@ RECORDS(2, uvec4, own_cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, places)
 BUFFER(5, readonly, uint, around)
-BUFFER(6, writeonly, uint, hits)    // one bit per primitive
-BUFFER(7, writeonly, uint, waiting) // in no order
+BUFFER(6, writeonly, uint, hits)    // one bit per tetrahedron
+BUFFER(7, writeonly, uint, waiting) // in no particular order
 BUFFER(8, READ_WRITE, OverlapStatus, status)
 
 vec3 own_position(uint i) {

@@ -1,9 +1,9 @@
 #version 460
+// Overlap (SPEC 3.5), first kernel: computes the frames of both trees' cells in the normalised coordinates of the joint
+// grid over both bounds. Twin of `joint_grid` and `node_frame` in src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Overlap (SPEC 3.5), before all: the cells of either tree in the normalised coordinates of the grid over both bounds. Twin of `joint_grid` and
-// `node_frame` in src/reference/overlap.rs.
 ARGUMENTS(8)
     uint tets_a;
     uint tets_b;

@@ -1,4 +1,6 @@
 #version 460
+// Overlap (SPEC 3.5): finds all pairs that touch. FILL 0 counts them, FILL 1 writes them after the scanned counts,
+// except those beyond the capacity. Twin of src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -7,8 +9,6 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-// Overlap (SPEC 3.5): all pairs that touch, counted (FILL 0), then written (FILL 1) behind the scanned counts; those
-// past the capacity are not. Twin of src/reference/overlap.rs.
 layout(constant_id = 2) const uint EACH_ONCE = 1;
 layout(constant_id = 3) const uint BUDGET = 256;
 layout(constant_id = 4) const uint OWN_STRIDE = 3;
@@ -18,7 +18,7 @@ ARGUMENTS(15)
     uint tets;
     uint capacity; // pairs that `found` holds
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
 BUFFER(1, readonly, uint, masks)
 BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
@@ -30,7 +30,7 @@ BUFFER(8, readonly, float, own_positions)
 BUFFER(9, readonly, uint, bad)
 BUFFER16(10, readonly, NodeFrame, frame)
 BUFFER16(11, READ_WRITE, SearchState, states) // zeroed
-BUFFER(12, READ_WRITE, uint, places) // FILL 0: counts; FILL 1: where the pairs of a primitive begin
+BUFFER(12, READ_WRITE, uint, places) // FILL 0: counts; FILL 1: where the pairs of a tetrahedron start
 BUFFER(13, writeonly, uvec2, found)
 BUFFER(14, READ_WRITE, OverlapStatus, status)
 #include "shared/tree.glsl"
@@ -47,7 +47,7 @@ void main() {
     uint t = item_index();
     uint unfinished = 0u, narrow = 0u, pairs = 0u;
     SearchState state = SearchState(NONE, 0u, 0u, 0u);
-    // Nothing is written before all pairs are counted, or if 32 bits cannot number them.
+    // Nothing is written before all pairs are counted, or if their number does not fit into 32 bits.
     bool waits = FILL != 0u && status.at[0].unfinished != 0u;
     if (waits && t == 0u) unfinished = 1u;
     if (t < tets && !waits && (FILL == 0u || status.at[0].pairs[1] == 0u)) {

@@ -1,17 +1,18 @@
 #version 460
+// Overlap (SPEC 3.5), step 1: finds the vertices that lie in the other mesh: those in the cell of a non-boundary leaf,
+// and those that a tetrahedron in the list of a boundary leaf contains. Lists are searched in parts of at most
+// PART_LENGTH entries per dispatch. Twin of src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-// Overlap (SPEC 3.5), step 1: which vertices lie in the other mesh: those in a cell of a non-boundary leaf, and those that a list says so. Lists
-// are searched in parts of at most PART_LENGTH entries per dispatch. Twin of src/reference/overlap.rs.
 layout(constant_id = 2) const uint PART_LENGTH = 16384;
 ARGUMENTS(13)
     uint points;
     uint stride; // floats from one point to the next
     uint part;  // number of this dispatch
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `vertices`
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `vertices`
 BUFFER(1, readonly, uint, masks)
 BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
@@ -22,7 +23,7 @@ RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, own_positions)
 BUFFER(9, readonly, uint, used)
 BUFFER(10, READ_WRITE, uint, places) // 1: in the other mesh
-BUFFER(11, READ_WRITE, uint, around) // one bit per tetrahedron of the other mesh: holds a vertex of this one
+BUFFER(11, READ_WRITE, uint, around) // one bit per tetrahedron of the other mesh: it contains a vertex of this one
 BUFFER(12, READ_WRITE, OverlapStatus, status)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"

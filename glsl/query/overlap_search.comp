@@ -1,4 +1,6 @@
 #version 460
+// Overlap (SPEC 3.5), steps 2 and 3: every tetrahedron that no vertex has decided descends the other tree, first to its
+// non-boundary nodes, then to the lists of boundary leaves. Twin of src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -7,8 +9,6 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/overlap.glsl"
-// Overlap (SPEC 3.5), steps 2 and 3: primitives that no vertex decides descend the other tree, first to its non-boundary nodes, then to the lists of
-// boundary leaves. Twin of src/reference/overlap.rs.
 layout(constant_id = 2) const uint EACH_ONCE = 1;
 layout(constant_id = 3) const uint BUDGET = 256;
 layout(constant_id = 4) const uint OWN_STRIDE = 3;
@@ -16,7 +16,7 @@ layout(constant_id = 5) const uint STRIDE = 3;
 ARGUMENTS(15)
     uint most; // length of `waiting`
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, as all up to `positions`
+BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
 BUFFER(1, readonly, uint, masks)
 BUFFER(2, readonly, uint, co)
 BUFFER(3, readonly, uint, po)
@@ -39,7 +39,7 @@ bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) 
 bool walk_ended = false;
 Grid g;
 uvec3 lo, hi;
-vec3 v[4]; // of the primitive, in the joint frame
+vec3 v[4]; // of the tetrahedron, in the joint frame
 uint phase;
 
 bool touches_node(Node node) {
@@ -70,7 +70,8 @@ void add_wide(uint n, bool elected) {
 void main() {
     uint i = item_index();
     uint unfinished = 0u, narrow = 0u, by_node = 0u;
-    if (i < min(status.at[0].waiting, most) && states.at[i].code != NONE) {
+    // The root of an empty tree has no boundary flag, but is not full of mesh.
+    if (i < min(status.at[0].waiting, most) && states.at[i].code != NONE && !is_empty_tree(grid.at[0].level)) {
         SearchState state = states.at[i];
         g = grid.at[0];
         joint = g;

@@ -1,6 +1,6 @@
 #version 460
+// Overlap (SPEC 3.5): marks the points that are vertices of valid tetrahedra.
 #include "shared/kernel.glsl"
-// Overlap (SPEC 3.5): which points are vertices of valid tetrahedra.
 ARGUMENTS(3)
     uint tets;
 END_ARGUMENTS

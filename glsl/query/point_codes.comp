@@ -1,9 +1,9 @@
 #version 460
+// Computes the keys that points are sorted by: the CODE_BITS highest bits of the Morton code of their cell. Points
+// where no mesh can be come last. Twin of `order_of` in src/reference/locate.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// What points are sorted by: the Morton code of their cell, as many bits of it as CODE_BITS; those where no mesh can be come last. Twin of `order_of` in
-// src/reference/locate.rs.
 layout(constant_id = 2) const uint CODE_BITS = 22;
 ARGUMENTS(4)
     uint count;

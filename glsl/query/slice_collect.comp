@@ -1,9 +1,10 @@
 #version 460
+// Slicing (SPEC 3.4), between the two parts: lists the voxels whose boxes must be tested, in no particular order, so
+// that the test costs nothing for the others. An invocation takes one run of voxels. A run is listed once, and its
+// voxels that need no test are counted.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), between the parts: the voxels whose boxes must be looked at, in no order, so that looking at them costs nothing for the others.
-// One invocation per run of voxels. A run is listed once; how many voxels are settled without it is counted.
 layout(constant_id = 2) const uint RUN = 64;
 ARGUMENTS(5)
     uint width; // of the rows
@@ -19,7 +20,7 @@ BUFFER(4, writeonly, TouchState, states)
 void main() {
     uint i = item_index(), count = 0u, inside = 0u, wait = 0u;
     uvec2 lines = rows_of_run(RUN, rows, height, i / width);
-    // Only once all centres have been located.
+    // A run is listed only once all centres have been located.
     if (lines.y > 0u && status.at[0].locating == 0u) {
         count = lines.y;
         inside = runs.at[i].inside;
@@ -35,7 +36,7 @@ void main() {
     place = subgroupBroadcastFirst(place);
     if (wait > 0u) runs.at[i].waiting = 0u;
     uint line = lines.x * width + i % width;
-    // Row by row: what stands side by side there is near to the same.
+    // Row by row, since neighbours in a row are near the same tetrahedra.
     for (uint k = 0u; k < RUN; ++k) {
         uint voxel = line + k * width;
         bool waits = wait > 0u && k < count && answers.at[voxel] == SLICE_PENDING;

@@ -1,3 +1,3 @@
 #version 460
-// Centres of voxels in the octree.
+// Locates the centres of voxels in the octree.
 #include "query/slice_locate.glsl"

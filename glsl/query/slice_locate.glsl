@@ -1,19 +1,20 @@
+// Slicing (SPEC 3.4), first part: finds the tetrahedron that contains the centre of each voxel, and the value of the
+// field there. An invocation takes a run of voxels of one column. It searches for each voxel in the tetrahedron of the
+// one before, then by a short walk across faces, before it searches the structure. Neighbouring invocations take
+// neighbouring runs, so that they are in the same tetrahedra and leave them together. Twin of src/reference/slice.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/structure.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), first part: which cell the centre of each voxel lies in, and the field there. An invocation takes a run of voxels below each
-// other, and looks for each in the cell of the one before and a short walk across faces from it, before it asks the structure. Invocations side by side
-// have runs side by side: they are in the same cells and leave them together. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint RUN = 64;
 layout(constant_id = 3) const uint WALK = 6;
-const uint LEAP = 8u; // voxels of a run that are found to be empty at once
-layout(constant_id = 5) const uint PART = 0; // centres in other cells than the plan's belong to another block
-layout(constant_id = 6) const uint BUDGET = 8192; // candidates tested per run and dispatch, roughly
-layout(constant_id = 7) const uint TOLERANCE = 0; // a float's bits
-layout(constant_id = 8) const uint FIELD = 0; // there is one
+const uint LEAP = 8u; // voxels of a run that one test can find to be empty
+layout(constant_id = 5) const uint PART = 0; // not 0: centres outside of the plan's cells belong to another block
+layout(constant_id = 6) const uint BUDGET = 8192; // tetrahedra tested per run and dispatch, roughly
+layout(constant_id = 7) const uint TOLERANCE = 0; // the bits of a float
+layout(constant_id = 8) const uint FIELD = 0; // not 0: there is a field
 layout(constant_id = 9) const uint ON_CELLS = 0;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint fresh; // not 0: nothing has been done yet
@@ -35,10 +36,10 @@ STRUCTURE(10)
 
 SlicePlan plan;
 RunState state;
-uint column, line; // of the run: its place in the rows, its first voxel
-uvec2 row;         // of the next voxel: in its layer, its layer
+uint column, line; // of the run: its place in a row, and its first voxel
+uvec2 row;         // of the next voxel: its row in the layer, and the layer
 
-// Where the run stands, and the field there.
+// The tetrahedron that the run has reached, and the field at its corners.
 Stand stand;
 vec4 held;
 
@@ -47,7 +48,7 @@ void enter(uint t) {
     if (FIELD != 0u) held = field_in(stand);
 }
 
-// Across the face that says outside most; false if nothing is behind it.
+// Steps through the face with the most negative weight. Returns false if that is not possible.
 bool go_on(Sides sides) {
     Exchange e;
     if (!step_on(stand, sides, e)) return false;
@@ -55,7 +56,7 @@ bool go_on(Sides sides) {
     return true;
 }
 
-// The next voxel of the run.
+// Writes the answer for the next voxel of the run.
 void settle(uint answer, float value) {
     uint voxel = line + state.next * plan.width;
     answers.at[voxel] = answer;
@@ -65,13 +66,13 @@ void settle(uint answer, float value) {
     row = ends ? uvec2(0u, row.y + 1u) : row;
 }
 
-// The next voxel, the box of which must be looked at.
+// Marks the next voxel as one whose box must be tested.
 void wait() {
     ++state.waiting;
     settle(SLICE_PENDING, 0.0);
 }
 
-// The next voxel, which lies so in the stand.
+// Settles the next voxel, whose centre lies in the stand.
 void settle_inside(Sides sides) {
     state.hint = stand.t;
     ++state.inside;
@@ -81,18 +82,19 @@ void settle_inside(Sides sides) {
 #ifndef BINARY_TREE
 #include "shared/cell_range.glsl"
 
-// Cells of the finest grid around the last voxel outside that nothing comes near to, an octree cell; none at first.
+// The finest-grid cells of the empty octree cell around the last voxel that was outside; none at first.
 uvec3 empty_lo = uvec3(1u), empty_hi = uvec3(0u);
 
 bool within_empty(uvec3 lo, uvec3 hi) { return all(lessThanEqual(empty_lo, lo)) && all(lessThanEqual(hi, empty_hi)); }
 
-// Whether the voxel at `at` lies in those cells, as the one before did.
+// Whether the voxel at `at` lies in the same empty cells as the one before.
 bool is_still_empty(Grid g, vec3 at) {
     uvec3 lo, hi;
     return reached_cells(g, at, plan.reach.xyz, lo, hi) && within_empty(lo, hi);
 }
 
-// Whether nothing can touch the voxel at `at`, the centre of which is in no cell: it lies outside of the bounds, or in one empty octree cell.
+// Whether nothing can touch the voxel at `at`, whose centre lies in no tetrahedron: it lies outside of the bounds, or
+// in one empty octree cell.
 bool is_empty(Grid g, vec3 at) {
     uvec3 lo, hi;
     if (!reached_cells(g, at, plan.reach.xyz, lo, hi)) return true;
@@ -129,7 +131,8 @@ void main() {
         stand = stand_nowhere();
         if (stands) enter(state.hint);
         for (uint work = 0u; state.next < count && work < BUDGET; ++work) {
-            // As far as strides lead: voxel after voxel without a look at the structure, mostly without a look at another cell.
+            // Voxel after voxel, as long as strides succeed: the structure is not searched, and mostly no other
+            // tetrahedron is read.
             uint misses = 0u;
             for (; stands && state.next < count && work < BUDGET; ++work) {
                 vec3 at = voxel_centre(plan, row_origin(plan, row), column);
@@ -159,7 +162,7 @@ void main() {
                 continue;
             }
             if (is_still_empty(g, at)) {
-                // What lies between two voxels of a layer that are in the same cells is there too.
+                // If two voxels of a layer lie in the empty cells, so do those between them.
                 uint leap = min(LEAP, min(count - state.next, plan.height - row.x));
                 vec3 last = voxel_centre(plan, row_origin(plan, uvec2(row.x + leap - 1u, row.y)), column);
                 if (!is_ours(g, last) || !is_still_empty(g, last)) leap = 1u;

@@ -1,9 +1,9 @@
 #version 460
+// Slicing (SPEC 3.4), first kernel: prepares the voxels for the other kernels, from the units of the mesh and the
+// bounds, which only the device knows. Twin of `VoxelGrid::over` in src/slicing/mod.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Slicing (SPEC 3.4), before all: voxels in the units of the mesh as the kernels need them, over bounds that only the device knows. Twin of
-// `VoxelGrid::over` in src/slicing/mod.rs.
 ARGUMENTS(2)
     float origin[3];
     float across[3];
@@ -25,7 +25,7 @@ BUFFER16(1, writeonly, SlicePlan, plans)
 
 vec4 wide(float a[3]) { return vec4(a[0], a[1], a[2], 0.0); }
 
-// To the nearest integer, halves away from 0. The difference to the floor is exact, which x + 0.5 is not.
+// Rounds to the nearest integer, halves away from 0. The difference to the floor is exact; x + 0.5 is not.
 float rounded(float x) {
     float whole = floor(abs(x));
     precise float rest = abs(x) - whole;
@@ -33,7 +33,8 @@ float rounded(float x) {
     return x < 0.0 ? -up_or_down : up_or_down;
 }
 
-// x in normalised coordinates, in steps of 2^-42. Devices may flush denormals, so of those the mantissa is taken.
+// x in normalised coordinates, in steps of 2^-42. Devices may flush denormals, so these are converted by their
+// mantissa.
 float steps(float x, float scale) {
     uint bits = floatBitsToUint(x);
     if ((bits & 0x7f800000u) == 0u) {
@@ -61,7 +62,7 @@ void main() {
     plan.listed = 0u;
     plan.first_cell = first_cell;
     plan.last_cell = last_cell;
-    // 2 / scale: a half axis beyond is larger than twice the mesh, and need not be scaled.
+    // 2 / scale: a larger half axis is more than twice as large as the mesh, and need not be scaled.
     float most = uintBitsToFloat((255u << 23) - floatBitsToUint(g.scale));
     vec4 axes[3] = vec4[3](wide(half0), wide(half1), wide(half2)), normalised[3];
     bool flat_box = false, large = false;

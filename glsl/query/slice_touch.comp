@@ -1,3 +1,3 @@
 #version 460
-// Boxes of voxels in the octree.
+// Tests the boxes of voxels in the octree.
 #include "query/slice_touch.glsl"

@@ -1,3 +1,7 @@
+// Slicing (SPEC 3.4), second part: for the listed voxels, whose centre lies in no tetrahedron, finds the boundary
+// tetrahedron that touches the box and is closest to the centre. The octree is searched in its boundary leaves, in
+// Morton order; the binary tree in the nodes above boundary tetrahedra, in the order of places. Twin of
+// src/reference/slice.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -7,14 +11,12 @@
 #include "shared/cell_range.glsl"
 #include "shared/separate.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), second part: for voxels whose centre lies in no cell, the boundary primitive that touches the box and is closest to the
-// centre; they have been listed. Boundary leaves only, in Morton order; in the binary tree nodes above boundary primitives, in the order of places. Twin of src/reference/slice.rs.
 #ifdef BINARY_TREE
 ARGUMENTS(7 + STRUCTURE_BUFFERS)
 #else
 ARGUMENTS(8 + STRUCTURE_BUFFERS)
 #endif
-    uint budget; // nodes and candidates per voxel and dispatch
+    uint budget; // nodes and tetrahedra per voxel and dispatch
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
@@ -32,7 +34,7 @@ TouchState state;
 vec3 x;    // centre of the voxel in normalised coordinates
 vec3 h[3]; // half axes of its box
 
-// Keeps the closest of the primitives that touch the box.
+// Keeps t if it touches the box and is the closest one so far; of two equally close ones, the lower id.
 void measure(uint t) {
     uvec4 ids = words(cells.at[t]);
     Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
@@ -54,13 +56,13 @@ bool enters(uint reference) {
     vec3 lo, hi;
     box_of(reference, lo, hi);
     vec3 v[4] = vec3[4](difference(lo, x), difference(hi, x), difference(lo, x), difference(hi, x));
-    // Twice what `box_touches` allows, which is more the larger a primitive is.
+    // Twice the slack of `box_touches`, which grows with the size of a tetrahedron.
     precise vec3 reach = ((abs(h[0]) + abs(h[1])) + abs(h[2])) + 2.0 * touch_slack(v, h);
     return all(lessThanEqual(v[0], reach)) && all(lessThanEqual(-reach, v[1])) && box_square(v) <= state.square;
 }
 #include "shared/binary_walk.glsl"
 
-// Goes on with a voxel; true once it is done. `code` of the state is a place here.
+// Continues with a voxel. Returns true once it is done. Here, `code` of the state is a place.
 bool measure_all(Grid g, vec3 centre, vec3 reach) {
     uvec3 lo, hi;
     if (!reached_cells(g, centre, reach, lo, hi)) return true;
@@ -84,13 +86,13 @@ uint leaf_level;
 bool enters(Node node);
 #include "shared/leaf_walk.glsl"
 
-// Leaves are marked with the octants that their primitives come near to.
+// The mask of a leaf holds the octants that its tetrahedra are near.
 bool enters(Node node) {
     if (!is_boundary_node(node.index)) return false;
     return node.level < leaf_level || leaf_level == MAX_LEVEL || (child_mask(node.index) & octants_met(node.level, node.code)) != 0u;
 }
 
-// Of entries from `begin` on those that are boundary primitives, a bit each.
+// Of the entries in `left`, from `begin` on, those that are boundary tetrahedra, one bit each.
 uint at_boundary(uint begin, uint left) {
     uint found = 0u;
     for (; left != 0u; left &= left - 1u) {
@@ -100,18 +102,19 @@ uint at_boundary(uint begin, uint left) {
     return found;
 }
 
-// What an entry of a leaf is measured for: its box meets the cells, and so do the quarters of the leaf's cell that it is near to. Where the cells meet
-// several along an axis, any of them will do.
+// What the entries to be measured in a leaf must satisfy: their quantized box meets the cells [lo, hi], and they are
+// near the quarter of the leaf's cell that these cells meet. Along an axis where the cells meet several quarters,
+// quarters are not tested.
 Sought sought_in(Grid g, uint code) {
     uvec3 reach = reach_of(g, 1u), met = quarters_met(g, code, lo, hi);
     met = mix(uvec3(0u), met, equal(met & met - 1u, uvec3(0u)));
     return Sought(x, lo - min(lo, reach), hi + reach, in_entry(g, met));
 }
 
-// Goes on with a voxel; true once it is done.
+// Continues with a voxel. Returns true once it is done.
 bool measure_all(Grid g, vec3 centre, vec3 reach) {
     if (!reached_cells(g, centre, reach, lo, hi) || !is_boundary_node(0u)) return true;
-    // Beyond the cells of a block its lists and flags are not those of the whole mesh.
+    // Outside of the cells of a block, its lists and flags are not those of the whole mesh.
     lo = max(lo, unpack_cell(plans.at[0].first_cell));
     hi = min(hi, unpack_cell(plans.at[0].last_cell));
     if (any(greaterThan(lo, hi))) return true;

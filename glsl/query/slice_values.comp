@@ -1,11 +1,12 @@
 #version 460
+// Slicing (SPEC 3.4), last part: counts the voxels whose centre lies in no tetrahedron by kind, and writes their values
+// of the field, if there is one. Twin of src/reference/slice.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
 #include "shared/voxels.glsl"
-// Slicing (SPEC 3.4), last part: voxels with their centre in no cell, by kind, and their values of a field if there is one. Twin of src/reference/slice.rs.
 layout(constant_id = 2) const uint ON_CELLS = 0;
 layout(constant_id = 3) const uint LINEAR = 0;
 layout(constant_id = 4) const uint FIELD = 1;
@@ -22,7 +23,7 @@ BUFFER(6, readonly, uint, answers)
 BUFFER(7, writeonly, float, values)
 BUFFER(8, READ_WRITE, SliceStatus, status)
 
-// The value of a voxel with its centre at x that its owner touches.
+// The value of a voxel with its centre at x that `owner` touches.
 float touched_value(uint owner, vec3 x) {
     if (ON_CELLS != 0u) return field.at[owner];
     uvec4 ids = words(cells.at[owner]);
@@ -39,7 +40,7 @@ float touched_value(uint owner, vec3 x) {
 void main() {
     uint i = item_index(), touched = 0u;
     SlicePlan plan = plans.at[0];
-    // Only once all answers are there.
+    // Voxels are counted only once all answers are known.
     if (i < min(plan.listed, voxels) && (status.at[0].locating | status.at[0].touching) == 0u) {
         uint voxel = states.at[i].voxel, answer = answers.at[voxel];
         touched = uint(answer != NONE);

@@ -1,14 +1,15 @@
 #version 460
+// Finds the nodes in which something is visible: a value in one of the ranges that are drawn. Twin of `visible` in
+// src/reference/ranges.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-// Which nodes have something to see: a value within one of the ranges that are drawn. Twin of `visible` in src/reference/ranges.rs.
 ARGUMENTS(4)
     uint drawn_ranges;
 END_ARGUMENTS
 BUFFER(0, readonly, BuildStatus, status)
 BUFFER(1, readonly, float, ranges) // of the field, two per node
-BUFFER(2, readonly, float, drawn)  // two per range, ascending, apart
+BUFFER(2, readonly, float, drawn)  // two per range; the ranges are ascending and disjoint
 BUFFER(3, writeonly, uint, marks)  // one bit per node
 
 bool is_visible(float lo, float hi) {
@@ -18,7 +19,7 @@ bool is_visible(float lo, float hi) {
     precise float a = canonical(lo) - canonical(rounding), b = canonical(hi) + canonical(rounding);
     a = canonical(a);
     b = canonical(b);
-    // The first range that does not end before.
+    // The first range that does not end before a.
     uint first = 0u, behind = drawn_ranges;
     while (first < behind) {
         uint mid = first + (behind - first) / 2u;

@@ -1,3 +1,7 @@
+// Ray intervals (SPEC 3.3): the interval of a ray spans from the first to the last boundary leaf that it meets or, in
+// the binary tree, box of a boundary tetrahedron. Where some values are transparent, the marks of visible nodes replace
+// the boundary flags. In a block of a mesh (PART), only samples in the block's cells count, and rays continue from
+// their state after the blocks in front of it. Twin of src/reference/volume/interval.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -7,18 +11,14 @@
 #include "shared/boxes.glsl"
 #include "shared/frame.glsl"
 #include "shared/rays.glsl"
-// Ray intervals (SPEC 3.3): from the first to the last boundary leaf that a ray meets, or in the binary tree the box of a boundary primitive.
-// Where values are transparent the marks of visible nodes stand in for the boundary flags.
-// Twin of src/reference/volume/interval.rs.
-// Of a block of a mesh, only samples in its cells: rays go on where they stand after the blocks in front of it.
 layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint PART = 0;
 ARGUMENTS(6 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-RECORDS(1, uvec4, cells)    // for the binary tree
-RECORDS(2, vec4, vertices)  // for the binary tree
+RECORDS(1, uvec4, cells)    // for the binary tree only
+RECORDS(2, vec4, vertices)  // for the binary tree only
 BUFFER16(3, readonly, Frame, frames)
 BUFFER16(4, READ_WRITE, RayState, states)
 BUFFER16(5, READ_WRITE, vec4, colors)
@@ -57,14 +57,14 @@ void extend() {
     last = max(last, left);
 }
 
-// Nothing in a box that the interval spans already can extend it.
+// Whether the interval already spans the box of the last `hit`, so that nothing in that box can extend it.
 bool is_spanned() { return first <= entered && left <= last; }
 
 #ifdef BINARY_TREE
 #include "shared/binary_tree.glsl"
 const uint MAX_VISITS = 24000u; // loop limit
 
-// In the units of the mesh, but for rounding, which the slack of the boxes covers.
+// x in the units of the mesh, but for rounding, which the slack of the boxes covers.
 vec3 in_units(vec3 x) {
     precise vec3 unit = x * two_to(-40);
     precise vec3 r = g.lo.xyz + unit * uintBitsToFloat((254u << 23) - floatBitsToUint(g.scale));
@@ -87,15 +87,16 @@ bool visit_all() {
     for (uint work = 0u; work < MAX_VISITS; ++work) {
         place = next_place(walk, work, MAX_VISITS);
         if (place >= WALK_PAUSED) break;
-        extend(); // by the box that `enters` saw last
+        extend(); // by the box that `enters` tested last
     }
     return place == WALK_DONE;
 }
 #else
 #include "shared/tree.glsl"
 
-Slabs lower, upper; // of the children of the node that is looked at: they share three planes per axis
-uint marked_from, marked; // flags of these children, a bit each, from the node of this index on
+// The lower and the upper children of the current node along each axis: they share three planes per axis.
+Slabs lower, upper;
+uint marked_from, marked; // flags of these children, one bit each, starting with node marked_from
 
 void enter_node(Node node, uint mask, uint first_child) {
     uint word = first_child >> 5u, shift = first_child & 31u;
@@ -118,7 +119,8 @@ bool meets(Node node) {
     return hit(Slabs(mix(lower.near, upper.near, up), mix(lower.far, upper.far, up)));
 }
 
-// First for where the mesh begins, nearest nodes first, then for where it ends, farthest first.
+// The tree is traversed twice: first for the start of the interval, nearest nodes first, then (from_behind) for its
+// end, farthest nodes first.
 bool from_behind;
 uint flip;
 #define FLIP flip
@@ -135,7 +137,7 @@ bool keeps(Node node) {
 #define KEEPS(node) keeps(node)
 
 bool visit_leaf(Node node) {
-    extend(); // by the node that was asked about last, this one
+    extend(); // by the node tested last, this one
     return false;
 }
 #include "shared/traverse.glsl"
@@ -156,8 +158,8 @@ bool visit_all() {
 }
 #endif
 
-// The first of the samples [k, end) that the block's cells are not ahead of; `past`: that lies behind them. Cells are monotone along a ray, so those between
-// the two are the block's.
+// The first of the samples [k, end) that has reached the block's cells or, with `past`, has left them behind. Cells are
+// monotone along a ray, so the samples between these two are the block's.
 uint first_sample(vec3 direction, uint k, uint end, bool past) {
     uvec3 lo = unpack_cell(plan.first_cell), hi = unpack_cell(plan.last_cell);
     bvec3 up = greaterThanEqual(direction, vec3(0.0));
@@ -172,7 +174,8 @@ uint first_sample(vec3 direction, uint k, uint end, bool past) {
     return k;
 }
 
-// Where a ray that stands so goes on in the block, which it meets in the samples of `state`.
+// The state with which a ray continues in a block that it meets in the samples of `state`, where `before` is its state
+// after the blocks in front.
 RayState go_on(RayState state, RayState before, vec3 direction) {
     state.next = first_sample(direction, max(state.next, before.next), state.end, false);
     state.end = first_sample(direction, state.next, state.end, true);
@@ -201,7 +204,7 @@ void main() {
         last = -1.0;
         bool within = all(lessThanEqual(g.lo.xyz, origin)) && all(lessThanEqual(origin, g.hi.xyz));
         if (within && starts_within()) first = last = 0.0;
-        // Too many nodes to visit: all of the bounds, which holds every leaf.
+        // If there are too many nodes to visit, the interval spans the bounds, which contain every leaf.
         if (!opaque && !visit_all() && hit(g.lo.xyz, g.hi.xyz)) extend();
         if (first <= last && !opaque) {
             precise float begin = floor(clamp(first * view.inverse_step - 1.5, 0.0, MAX_SAMPLES));

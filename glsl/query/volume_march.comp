@@ -1,3 +1,3 @@
 #version 460
-// Marching in the octree.
+// Marches rays through the octree.
 #include "query/volume_march.glsl"

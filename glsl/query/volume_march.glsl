@@ -1,3 +1,7 @@
+// Marching (SPEC 3.3): takes samples at distances (k + 1/2)·Δ from the ray's origin, front to back, until the ray is
+// opaque or the dispatch's budget is spent. With ISO, a ray accumulates the iso-surfaces between two samples, not the
+// samples themselves. With SKIP, the tree is asked for stretches without anything visible as soon as a sample adds
+// nothing. Twin of src/reference/volume/march.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -5,15 +9,12 @@
 #include "shared/structure.glsl"
 #include "shared/frame.glsl"
 #include "shared/rays.glsl"
-// Marching (SPEC 3.3): samples (k + 1/2)·Δ from the ray's origin, front to back, until the ray is opaque or a dispatch's share of work is done.
-// With ISO it is not samples that add to a ray, but the surfaces between two of them. With SKIP the tree is asked for stretches without anything to see
-// as soon as a sample adds nothing. Twin of src/reference/volume/march.rs.
 layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
 layout(constant_id = 6) const uint ISO = 0;
 ARGUMENTS(10 + STRUCTURE_BUFFERS)
     uint items;  // pixels in whole blocks
-    uint budget; // candidates tested per ray and dispatch, roughly
+    uint budget; // tetrahedra tested per ray and dispatch, roughly
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
@@ -33,17 +34,17 @@ RenderPlan plan;
 #include "shared/skip.glsl"
 #include "shared/held.glsl"
 
-const uint WALK = 6u;   // steps of a walk across faces before the structure is asked
-const uint BURST = 32u; // passes before rays that wait for the structure are served
+const uint WALK = 6u;   // steps of a walk across faces before the structure is searched
+const uint BURST = 32u; // passes along walks before rays that wait for the structure are served
 
-// The ray, and where it stands.
+// The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
-uint ahead; // samples to the next one that is looked at
+uint ahead; // distance to the next sample that is taken
 
-// The tetrahedron of the last sample and what is read of it, corner by corner as in the stand.
+// The tetrahedron of the last sample and its data per corner, in the order of the stand's corners.
 Stand stand;
 vec4 held_values;
 vec4 held_normals[3];
@@ -60,7 +61,7 @@ void enter(uint t) {
     }
 }
 
-// On to the next tetrahedron; false if there is none.
+// Steps to the next tetrahedron. Returns false if there is none.
 bool go_on(Sides at) {
     Exchange e;
     if (!step_on(stand, at, e)) return false;
@@ -72,7 +73,7 @@ bool go_on(Sides at) {
     return true;
 }
 
-// Colour, and opacity of one step, at a value.
+// The colour, and the opacity of one step, at a value.
 vec4 lookup(float value) {
     precise float x = clamp((value - view.value_lo) * view.value_scale, 0.0, 1.0) * float(TABLE - 1u);
     uint i = min(whole_of(x), TABLE - 2u);
@@ -82,7 +83,8 @@ vec4 lookup(float value) {
     return r;
 }
 
-// Light on a sample: factor and added white of its colour, added opacity. Twin of `Lighting::shade`.
+// Light on a sample with normal n: a factor for its colour, white added to its colour, and added opacity. Twin of
+// `Lighting::shade`.
 vec3 shade(vec3 n) {
     float square = dot_product(n, n);
     if (square < 1e-8) return vec3(1.0, 0.0, 0.0);
@@ -101,7 +103,7 @@ vec3 shade(vec3 n) {
     return vec3(factor, added, rim);
 }
 
-// Adds a colour at these barycentric coordinates of the stand.
+// Adds a colour to the ray, at barycentric coordinates b of the stand.
 void add(vec4 color, vec4 b) {
     if (SHADING != 0u) {
         vec3 lit = shade(vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])));
@@ -134,7 +136,7 @@ void add_surfaces(uint k, float before, float value) {
     }
 }
 
-// Whether the tree is to be asked first how far there is nothing to see.
+// Whether the tree must first be asked how far nothing is visible.
 bool is_to_look() { return SKIP != 0u && state.next >= state.check; }
 
 void pass_by() {
@@ -146,9 +148,10 @@ void pass_by() {
 }
 
 #ifndef BINARY_TREE
-// Passes by samples where no primitive comes near, those in one cell of the octree at once: rays beside the mesh catch up with rays in it.
+// Passes samples that no tetrahedron is near, all those of one octree cell together, so that rays beside the mesh catch
+// up with rays in it.
 void pass_empty(Grid g, inout uint work) {
-    for (; state.next < state.end && !is_to_look(); ++work) {
+    for (; state.next < state.end && !is_to_look() && work < budget; ++work) {
         uvec3 finest = quantize(g, sample_at(view, origin, direction, state.next));
         uint level = empty_level(g.level, morton(finest));
         if (level == 0u) return;
@@ -161,7 +164,7 @@ void pass_empty(Grid g, inout uint work) {
 }
 #endif
 
-// Adds the next sample, which lies so in the tetrahedron of the stand.
+// Adds the next sample, which lies in the tetrahedron of the stand.
 void take(Sides sides) {
     uint k = state.next, before = state.last;
     pass_by();
@@ -206,10 +209,10 @@ void main() {
         if (stands) enter(state.hint);
         ahead = 1u;
         uint misses = 0u; // steps of the walk to the next sample
-        uint known = state.check >> 30u; // of the best candidate
+        uint known = state.check >> 30u; // flags of the best candidate
         state.check &= 0x3fffffffu;
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
-            // As far as the walk leads, without a look at the tree: a pass is a sample, after a step if one is needed.
+            // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed.
             for (uint pass = 0u; pass < BURST && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
                 vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
                 Sides sides = sides_of(stand, x);
@@ -230,7 +233,7 @@ void main() {
                 if (!hidden) {
                     state.check = behind;
                 } else if (ISO != 0u) {
-                    // The stretch is on one side of every surface: its first and its last sample tell all.
+                    // The stretch lies on one side of every surface, so its first and its last sample are enough.
                     ahead = max(behind - state.next, 2u) - 1u;
                     state.check = state.next + 1u;
                 } else {
@@ -245,7 +248,7 @@ void main() {
             vec3 x = normalise(g, at);
             misses = 0u;
             uint owner = NONE;
-            // Outside of the bounds there is nothing to ask for.
+            // Outside of the bounds there is nothing to find.
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
                 OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, known, state.smallest));
                 bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
@@ -255,7 +258,7 @@ void main() {
                 state.smallest = search.best.smallest;
                 if (!ended) break;
             }
-            stands = owner != NONE; // behind a gap the structure is asked first
+            stands = owner != NONE; // after a gap, the structure is searched first
             if (stands) {
                 enter(owner);
                 take(sides_of(stand, x));
@@ -263,7 +266,7 @@ void main() {
                 pass_by();
             }
         }
-        if (ahead > 1u) state.check = state.next; // to be found out again
+        if (ahead > 1u) state.check = state.next; // `ahead` is not stored: the tree is asked again
         state.check |= known << 30u;
         state.hint = stands ? stand.t : NONE;
         unfinished = uint(state.next < state.end);

@@ -1,10 +1,10 @@
 #version 460
+// Volume rendering (SPEC 3.3), first kernel: copies the host's view and transfer function, and computes what depends on
+// the bounds, which only the device knows. Twin of `interval_slack` in src/render/plan.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/frame.glsl"
-// Volume rendering (SPEC 3.3), before all: the host's view and transfer function, and what follows for bounds that only the device knows.
-// Twin of `interval_slack` in src/render/plan.rs.
 ARGUMENTS(4)
     uint width;
     uint height;

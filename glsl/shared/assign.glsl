@@ -1,5 +1,5 @@
-// Does a tetrahedron touch a cell? (SPEC 2.2) Twin of src/reference/assign.rs, which explains the bounds: the same operations in the
-// same order.
+// Whether a tetrahedron touches a cell (SPEC 2.2). Twin of src/reference/assign.rs, which explains the bounds; the
+// operations and their order are the same.
 #include "shared/centre.glsl"
 
 const uint PLANES = 1u;

@@ -1,12 +1,13 @@
-// Point location in the baseline's binary tree: the owner that the octree finds. Needs grid.glsl, tet.glsl, and nodes, root, ids, boundary, cells,
-// vertices.
+// Point location in the baseline's binary tree, which finds the same owner as the octree. Needs grid.glsl, tet.glsl,
+// and nodes, root, ids, boundary, cells, vertices.
 #include "shared/binary_tree.glsl"
 #include "shared/candidates.glsl"
 #include "shared/owner_search.glsl"
 
-// Boxes are grown by this share of their size, so that cells that hold a point within the tolerance are met too.
+// Boxes are grown by this share of their size, so that tetrahedra that contain a point only within the tolerance are
+// met, too.
 const float GROW = 4e-5;
-// So far off may a point lie that rounding puts beside all cells around it.
+// A point that rounding puts outside of all tetrahedra around it has barycentric coordinates of at least minus this.
 const float ROUNDING = 1e-5;
 
 vec3 sought;
@@ -18,7 +19,7 @@ bool holds(vec3 lo, vec3 hi) {
 }
 
 bool enters(uint reference) {
-    if ((reference & BINARY_LEAF) != 0u) return true; // the candidate's own box decides
+    if ((reference & BINARY_LEAF) != 0u) return true; // the tetrahedron's own box decides
     vec3 lo, hi;
     box_of(reference, lo, hi);
     return holds(lo, hi);
@@ -32,7 +33,8 @@ void look_at(inout Best best, uint t) {
         consider(best, t, tet, weights(tet, sought));
 }
 
-// Goes on with a search for the owner of a point, `x` in normalised coordinates; false: the share of work is done before it has ended.
+// Continues a search for the owner of the point `at`, `x` in normalised coordinates. Returns false if the budget is
+// spent before the search has ended.
 bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
     owner = NONE;
     if (!near_bounds(g, at)) return true;
@@ -52,7 +54,7 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     Best best = s.best;
     s = no_search();
     if (best.owner == NONE) return true;
-    // A cell without boundary faces has neighbours all around: what lies next to it lies in the mesh.
+    // A tetrahedron that is not on the boundary has neighbours on all sides, so what lies next to it lies in the mesh.
     bool surrounded = (boundary.at[best.owner >> 5u] >> (best.owner & 31u) & 1u) == 0u;
     if (best.inside || best.smallest >= -(surrounded ? max(tolerance, ROUNDING) : tolerance)) owner = best.owner;
     return true;

@@ -1,8 +1,8 @@
 // The nodes of the baseline's binary tree and references to them. Needs nodes, ids, cells, vertices.
-const uint BINARY_LEAF = 1u << 31;     // the rest is a place in the sorted primitives, not an internal node
-const uint BINARY_BOUNDARY = 1u << 30; // a boundary primitive is below
+const uint BINARY_LEAF = 1u << 31;     // the rest is a place among the sorted tetrahedra, not an internal node
+const uint BINARY_BOUNDARY = 1u << 30; // a boundary tetrahedron is below
 const uint BINARY_INDEX = BINARY_BOUNDARY - 1u;
-const uint BINARY_DEPTH = 64u; // a code has 30 bits and a place 29: the tree is no deeper
+const uint BINARY_DEPTH = 64u; // codes have 30 bits and places 29, so the tree is no deeper
 
 // Box of a node or leaf in normalised coordinates.
 void box_of(uint reference, out vec3 lo, out vec3 hi) {

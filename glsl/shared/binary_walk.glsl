@@ -1,15 +1,15 @@
-// The primitives of the baseline's binary tree in the order of their places, below the nodes that a predicate lets through. Internal node i splits
-// behind place i, so a walk can be left, and taken up again at any place by passing over the left children of the nodes before it. Needs binary_tree.glsl,
-// root; before including this a kernel defines
+// Visits the tetrahedra of the baseline's binary tree in the order of their places, below the nodes that a predicate
+// accepts. Internal node i splits after place i, so a walk can be paused and resumed at any place, by skipping the left
+// children of the nodes before it. Needs binary_tree.glsl and root. Before including this file, a kernel defines
 //     bool enters(uint reference);  // asked for every node on the way, leaves included
-const uint WALK_DONE = 0xffffffffu;   // no more primitives
-const uint WALK_PAUSED = 0xfffffffeu; // the share of work is done; go on at resume_place
+const uint WALK_DONE = 0xffffffffu;   // no more tetrahedra
+const uint WALK_PAUSED = 0xfffffffeu; // the budget is spent; resume at resume_place
 
 struct BinaryWalk {
-    uint next;  // reference to look at next, or NONE: that of the stack
-    uint place; // nothing before it is wanted
+    uint next;  // reference to visit next; NONE: take it from the stack
+    uint place; // places before this one are skipped
     uint top;
-    uint stack[BINARY_DEPTH]; // internal nodes whose right children wait
+    uint stack[BINARY_DEPTH]; // internal nodes whose right children are still to be visited
 };
 
 BinaryWalk binary_walk_from(uint place) {
@@ -20,10 +20,10 @@ BinaryWalk binary_walk_from(uint place) {
     return w;
 }
 
-// What a walk may do at least, so that it gets on from any place.
+// The budget, raised where needed so that a walk makes progress from any place.
 uint binary_budget(uint work, uint budget) { return max(budget, work + 2u * BINARY_DEPTH); }
 
-// The next place at or behind the one given, WALK_DONE or WALK_PAUSED. `work` counts nodes, up to `budget`.
+// The next place of the walk, WALK_DONE or WALK_PAUSED. `work` counts nodes, up to `budget`.
 uint next_place(inout BinaryWalk w, inout uint work, uint budget) {
     for (; work < budget; ++work) {
         if (w.next == NONE) {
@@ -43,7 +43,7 @@ uint next_place(inout BinaryWalk w, inout uint work, uint budget) {
     return WALK_PAUSED;
 }
 
-// Where a paused walk goes on; NONE if nothing is left.
+// The place where a paused walk resumes; NONE if nothing is left.
 uint resume_place(BinaryWalk w) {
     if (w.next != NONE) return w.place;
     return w.top > 0u ? w.stack[w.top - 1u] + 1u : NONE;

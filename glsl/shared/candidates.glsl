@@ -1,4 +1,4 @@
-// Candidates for the owner of a point. Twin of src/reference/candidates.rs. Needs tet.glsl, and vertices.
+// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl and vertices.
 
 Tet load_tet(uvec4 ids) {
     return make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
@@ -6,14 +6,15 @@ Tet load_tet(uvec4 ids) {
 
 #include "shared/quarters.glsl"
 
-// A point that an owner is sought for.
+// A point whose owner is searched for.
 struct Sought {
     vec3 x;             // in normalised coordinates
-    uvec3 least, most;  // cells of the finest grid around its own, as far as a cell that the tolerance lets own it may be
-    uint quarters;      // of the leaf that it lies in
+    uvec3 least, most;  // range of finest-grid cells that the box of an owner must meet
+    uint quarters;      // quarters of its leaf's cell that contain it, packed as in an entry; 0: not tested
 };
 
-// That point, at a place in the units of the mesh. A point whose barycentric coordinates are at least -t is outside of the cell's box by at most 3 t of it.
+// The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
+// tetrahedron's box by at most 3 t times the size of the box.
 Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = quantize(g, at);
     uint least = 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
@@ -21,14 +22,15 @@ Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     return Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : quarters_around(g, cell));
 }
 
-// Whether a tetrahedron's quantized box is so near that it can own the point. One word per vertex tells, its finest cell.
+// Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
+// cell of the finest grid.
 bool is_near(uvec4 ids, Sought s) {
     uvec3 a = unpack_cell(floatBitsToUint(floats(vertices.at[ids.x]).w)), b = unpack_cell(floatBitsToUint(floats(vertices.at[ids.y]).w));
     uvec3 c = unpack_cell(floatBitsToUint(floats(vertices.at[ids.z]).w)), d = unpack_cell(floatBitsToUint(floats(vertices.at[ids.w]).w));
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 
-// The best of the candidates so far.
+// The best candidate owner so far.
 struct Best {
     uint owner; // NONE: none yet
     bool inside;
@@ -38,8 +40,9 @@ struct Best {
 
 Best no_best() { return Best(NONE, false, false, SMALLEST_FLOAT); }
 
-// Takes candidate t if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the largest
-// smallest barycentric coordinate, then the lowest id. Flat cells never.
+// Takes candidate t if it is better. Tetrahedra that contain the point come first, ordered by id; then those whose box
+// contains it; then those with a larger smallest barycentric coordinate; then those with a lower id. Flat tetrahedra
+// are never taken.
 void consider(inout Best best, uint t, Tet tet, Weights w) {
     if (w.inside) {
         if (!best.inside || t < best.owner) best = Best(t, true, true, 0.0);

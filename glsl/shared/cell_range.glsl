@@ -1,6 +1,7 @@
-// Boxes of cells of the finest grid. Twin of src/reference/leaf_walk.rs. Needs grid.glsl.
+// Ranges of cells of the finest grid. Twin of src/reference/leaf_walk.rs. Needs grid.glsl.
 
-// The cells of the finest grid that the box around `centre` meets; false: it lies outside of the bounds.
+// The cells of the finest grid that the box around `centre` with half extent `reach` meets. Returns false if the box
+// lies outside of the bounds.
 bool reached_cells(Grid g, vec3 centre, vec3 reach, out uvec3 lo, out uvec3 hi) {
     vec3 d = from_corner(g, centre);
     precise vec3 a = d - reach, b = d + reach, size = g.hi.xyz - g.lo.xyz;

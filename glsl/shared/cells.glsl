@@ -1,5 +1,5 @@
-// The quantized box of a tetrahedron at a level (the paper's Eq. 5). The including kernel declares cells, bad, and `quantized`: the vertices, of which the
-// last word is the finest cell.
+// The quantized box of a tetrahedron at a level (the paper's Eq. 5). The including kernel declares cells, bad, and
+// `quantized`: the vertices, whose last word is their cell of the finest grid.
 #include "shared/bad.glsl"
 
 struct CellBox {
@@ -24,7 +24,7 @@ CellBox finest_box(uint t) {
     return box;
 }
 
-// The same at a coarser level.
+// The quantized box at a coarser level.
 CellBox coarser(CellBox finest, uint level) {
     if (finest.size.x == 0u) return finest;
     uint shift = MAX_LEVEL - level;

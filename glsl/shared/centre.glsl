@@ -1,4 +1,5 @@
-// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in src/reference/assign.rs.
+// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
+// src/reference/assign.rs.
 
 vec3 half_cell(Grid g, uint level) {
     precise vec3 cell = g.extent.xyz * two_to(-1 - int(level));

@@ -1,4 +1,4 @@
-// A picture as its kernels read it: what the host says, what is worked out on the device, and the transfer function.
+// A picture as its kernels read it: the host's view, what the device computes from it, and the transfer function.
 
 const uint TABLE = 1024u; // entries of the transfer function
 

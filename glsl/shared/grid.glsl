@@ -1,14 +1,14 @@
-// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs: the same operations in the same order.
+// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs; the operations and their order are the same.
 
 const uint MAX_LEVEL = 10u;
 
 float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
-// x without denormals.
+// x, or 0 if it is denormal.
 float canonical(float x) { return (floatBitsToUint(x) & 0x7f800000u) == 0u ? 0.0 : x; }
 
-// The whole part of x in [0, 2^23), from the bits of a sum: drivers for CPUs convert lane by lane, with tests for what no integer is. Of other x, any word
-// below 2^23.
+// The integer part of x in [0, 2^23), taken from the bits of a sum, since drivers for CPUs convert floats lane by lane,
+// with tests for values that are no integers. For other x, any word below 2^23.
 uint whole_of(float x) {
     precise float sum = floor(x) + 8388608.0;
     return floatBitsToUint(sum) & 0x7fffffu;
@@ -20,29 +20,29 @@ vec3 from_corner(Grid g, vec3 x) {
     return vec3(canonical(d.x), canonical(d.y), canonical(d.z));
 }
 
-// Far outside of the bounds, or not a number: no mesh can be there.
+// Whether x may lie in a mesh: false far outside of the bounds, and for NaN.
 bool near_bounds(Grid g, vec3 x) {
     precise vec3 t = from_corner(g, x) * g.scale;
     return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
-// Cell of the finest grid at so many of its cells from the lower corner, clamped into the grid.
+// The cell of the finest grid at this distance from the lower corner, in cells of that grid, clamped into the grid.
 uvec3 cell_at(vec3 q) {
     vec3 r = clamp(q, vec3(0.0), vec3(1023.0));
     return min(uvec3(whole_of(r.x), whole_of(r.y), whole_of(r.z)), 1023u);
 }
 
-// Cell of the finest grid that a point lies in, clamped into the grid.
+// The cell of the finest grid that contains a point, clamped into the grid.
 uvec3 quantize(Grid g, vec3 x) {
     precise vec3 q = from_corner(g, x) * g.inv.xyz;
     return cell_at(q);
 }
 
-// A finest cell in one word.
+// Packs a cell of the finest grid into one word, and unpacks it.
 uint pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
 uvec3 unpack_cell(uint word) { return uvec3(word, word >> 10, word >> 20) & 1023u; }
 
-// Normalised coordinates: multiples of 2^-42, the largest extent in [2^40, 2^41).
+// Normalised coordinates: multiples of 2^-42, with the largest extent of the mesh in [2^40, 2^41).
 vec3 normalise(Grid g, vec3 x) {
     precise vec3 unit = from_corner(g, x) * g.scale;
     unit = vec3(canonical(unit.x), canonical(unit.y), canonical(unit.z));

@@ -1,4 +1,5 @@
-// Workgroups for so many items, `each` to a group: the arguments of an indirect dispatch, folded as kernel.glsl has it.
+// The arguments of an indirect dispatch over `items` items, `each` per workgroup, folded into two dimensions as in
+// kernel.glsl.
 uvec3 groups_for(uint items, uint each) {
     uint g = items / each + uint(items % each != 0u);
     return g > 65535u ? uvec3(32768u, (g + 32767u) / 32768u, 1u) : uvec3(g, 1u, 1u);

@@ -1,13 +1,14 @@
-// Common ground of every kernel: how arguments arrive, how work is indexed.
+// What every kernel includes: how arguments are passed, and how work is indexed.
 //
-// A kernel states its arguments once:
+// A kernel declares its arguments once:
 //     ARGUMENTS(2)            // number of buffers
 //         uint count;         // scalars
 //     END_ARGUMENTS
 //     BUFFER(0, readonly, uint, keys)
 //     BUFFER(1, writeonly, uint, sorted)
-// and reads keys.at[i]. Compiled plainly, the push constants hold one 64-bit address per buffer, then the scalars. Compiled with
-// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i` and the push constants hold the scalars only. OLBVH_WIDE: see records.glsl.
+// and reads keys.at[i]. By default, the push constants hold one 64-bit address per buffer, then the scalars. With
+// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i`, and the push constants hold only the scalars. OLBVH_WIDE: see
+// records.glsl.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require
 #extension GL_EXT_control_flow_attributes : require
@@ -20,7 +21,7 @@
 #define END_ARGUMENTS };
 #ifdef OLBVH_DESCRIPTORS
 #define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments {
-// The name of the block tells build.rs the alignment.
+// build.rs reads the alignment from the name of the block.
 #define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \
     layout(set = 0, binding = slot, std430) access buffer name##Block##alignment { T at[]; } name;
 #else
@@ -37,20 +38,20 @@
 
 const uint NONE = 0xffffffffu;
 
-#ifndef OLBVH_RAY_TRACING // whose launches have no workgroups
+#ifndef OLBVH_RAY_TRACING // ray tracing launches have no workgroups
 layout(constant_id = 0) const uint WORKGROUP = 64; // invocations per workgroup
 layout(constant_id = 1) const uint ROWS = 4;       // items per invocation
 layout(local_size_x_id = 0) in;
 
-// Workgroups are folded into two dimensions, since 65,535 is the limit of one.
+// Workgroups are folded into two dimensions, since one dimension is limited to 65,535.
 uint group_index() { return gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x; }
 
 // Place in the workgroup; consecutive within a subgroup, whatever the driver's mapping.
 uint local_index() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocationID; }
 
-// First item of this invocation's ROWS consecutive ones.
+// The first of the ROWS consecutive items of this invocation.
 uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
 
-// One item per invocation.
+// The item of this invocation, where each takes one.
 uint item_index() { return group_index() * WORKGROUP + local_index(); }
 #endif

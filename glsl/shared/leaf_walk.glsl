@@ -1,16 +1,17 @@
-// The leaves of a tree among some cells, in Morton order, below the nodes that a predicate lets through, to be left and taken up again at any code.
-// Twin of src/reference/leaf_walk.rs. Needs tree.glsl, node.glsl and quarters.glsl; before including this a kernel defines
-//     uvec3 lo, hi;            // the cells of the finest grid that leaves meet
+// Visits the leaves of a tree that meet a range of cells, in Morton order, below the nodes that a predicate accepts. A
+// walk can be paused and resumed at any code. Twin of src/reference/leaf_walk.rs. Needs tree.glsl, node.glsl and
+// quarters.glsl. Before including this file, a kernel defines
+//     uvec3 lo, hi;            // range of finest-grid cells that leaves must meet
 //     bool enters(Node node);  // asked for every node on the way but the root, leaves included
 //     bool walk_ended;         // set to end the walk
 const uint WALK_DONE = 0xffffffffu;   // no more leaves
-const uint WALK_PAUSED = 0xfffffffeu; // the share of work is done; go on at `code`
+const uint WALK_PAUSED = 0xfffffffeu; // the budget is spent; resume at `code`
 
 struct LeafWalk {
-    uint code;     // of the leaf, or where to look for the next
-    uint last;     // the last of the cells
-    uint depth;    // path[depth] is the deepest node known on the way to it
-    uint path[12]; // one more than levels, so that it is no array of a shared struct
+    uint code;     // Morton code of the leaf, or where the search for the next one starts
+    uint last;     // Morton code of the last cell of the range
+    uint depth;    // path[depth] is the deepest node known on the path to `code`
+    uint path[12]; // one longer than `levels` of BuildStatus, so that the two types stay apart
 };
 
 LeafWalk walk_from(uint level, uint code) {
@@ -22,7 +23,7 @@ LeafWalk walk_from(uint level, uint code) {
     return w;
 }
 
-// Goes to the first code behind the node of level `at` on the way; false if none of the cells is there.
+// Moves on to the first code after the node of level `at` on the path. Returns false if none of the cells lies there.
 bool walk_past(inout LeafWalk w, uint level, uint at) {
     uint shift = 3u * (level - at), here = w.code >> shift, next = here + 1u;
     if (next << shift > w.last) return false;
@@ -31,14 +32,14 @@ bool walk_past(inout LeafWalk w, uint level, uint at) {
     return true;
 }
 
-// The octants of a node's cell that the cells meet, a bit for each digit.
+// The octants of a node's cell that the range of cells meets, one bit per 3-bit Morton digit.
 uint octants_met(uint level, uint code) {
     uvec3 middle = 2u * unmorton(code) + 1u;
     uint shift = MAX_LEVEL - level - 1u;
     return octants_of(uvec3(lessThan(lo >> shift, middle)) + 2u * uvec3(greaterThanEqual(hi >> shift, middle)));
 }
 
-// The next leaf at or behind the code. `work` counts nodes, up to `budget`.
+// The next leaf at or after `code`, WALK_DONE or WALK_PAUSED. `work` counts nodes, up to `budget`.
 uint next_leaf(inout LeafWalk w, uint level, inout uint work, uint budget) {
     for (; work < budget && !walk_ended; ++work) {
         if (w.depth == level) return w.path[level];

@@ -1,9 +1,9 @@
-// What the kernels of the overlap share. Twin of src/reference/overlap.rs. The including kernel declares grid, cells, positions (of the other mesh and
-// its tree), own_cells, own_positions, frame.
+// What the overlap kernels share. Twin of src/reference/overlap.rs. The including kernel declares grid, cells,
+// positions (of the other mesh and its tree), own_cells, own_positions, frame.
 
 vec3 canonical3(vec3 p) { return vec3(canonical(p.x), canonical(p.y), canonical(p.z)); }
 
-// Vertices of a tetrahedron in the units of the meshes, in ascending index.
+// A tetrahedron in the units of the meshes, with its vertices in ascending index.
 struct RawTet {
     vec3 v[4];
     vec3 lo; // box

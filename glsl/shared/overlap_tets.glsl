@@ -1,5 +1,6 @@
-// Tetrahedra of both meshes, and which of them are compared where. Needs overlap.glsl and own_cells, own_positions, cells, positions, frame.
-Grid joint; // lo and scale only
+// Loads tetrahedra of both meshes, and decides in which leaf two of them are compared. Needs overlap.glsl and
+// own_cells, own_positions, cells, positions, frame.
+Grid joint; // of the joint grid, only lo and scale are set
 
 RawTet own_tet(uint t) {
     uvec4 i = words(own_cells.at[t]);
@@ -25,8 +26,8 @@ void to_joint(RawTet t, out vec3 v[4]) {
     for (uint k = 0u; k < 4u; ++k) v[k] = normalise(joint, t.v[k]);
 }
 
-// Whether two primitives are compared in the leaf with this code. With the assignment `Aabb` a pair is compared once: in the cell of the lower corner
-// of the intersection of their boxes.
+// Whether two tetrahedra are compared in the leaf with this code. With the assignment `Aabb` (EACH_ONCE), a pair is
+// compared once: in the cell of the lower corner of the intersection of their boxes.
 bool compared_in(Grid g, uint code, RawTet own, RawTet other) {
     if (!boxes_meet(own.lo, own.hi, other.lo, other.hi)) return false;
     if (EACH_ONCE == 0u) return true;

@@ -1,8 +1,10 @@
-// Which tetrahedron a candidate belongs to. The including kernel declares offsets (the scanned counts, tets + 1).
+// Finds the tetrahedron that a candidate belongs to. The including kernel declares offsets, the tets + 1 scanned
+// counts.
 
-// The last tetrahedron t with offsets[t] <= i, for i below the total; skips those without candidates.
+// The last tetrahedron t with offsets[t] <= i, for i below the total. Tetrahedra without candidates are skipped.
 uint owner_of(uint i, uint tets) {
-    // Where nearly each has one candidate (or share of them), as many steps as the place is off lead nearly there.
+    // Where nearly every tetrahedron has one candidate (or one share of them), moving t by the difference of the
+    // offsets leads almost to the right tetrahedron.
     uint t = min(i, tets - 1u);
     for (uint k = 0u; k < 4u; ++k) {
         uint at = offsets.at[t];
@@ -17,6 +19,3 @@ uint owner_of(uint i, uint tets) {
     }
     return lo;
 }
-
-// The loops that step to the next tetrahedron with candidates test before their body: SwiftShader loses what lanes that leave a do-while early
-// computed in its last pass.

@@ -1,16 +1,18 @@
-// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl, and flags, cells, vertices.
+// Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl,
+// and flags, cells, vertices.
 
 #include "shared/candidates.glsl"
 
-// Of up to 32 entries from `begin` on, those before `end` that are in the quarters of the leaf's cell, a bit each. Most are not, nor are most of those near;
-// each test is made for all of them before the next, so that invocations wait for each other less.
+// Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
+// one bit each. Most entries fail this test, and most of the others fail that of `near_of`. Each test is done for all
+// entries before the next test, so that invocations wait less for each other.
 uint in_quarters(uint begin, uint end, Sought s) {
     uint count = min(32u, end - begin), left = 0u;
     for (uint k = 0u; k < count; ++k) left |= uint((p.at[begin + k] & s.quarters) == s.quarters) << k;
     return left;
 }
 
-// Those that are near.
+// Of the entries in `left`, those whose quantized box is near the point.
 uint near_of(uint begin, uint left, Sought s) {
     uint ids = grid.at[0].ids, near = 0u;
     for (; left != 0u; left &= left - 1u) {
@@ -21,7 +23,7 @@ uint near_of(uint begin, uint left, Sought s) {
 
 uint near_among(uint begin, uint end, Sought s) { return near_of(begin, in_quarters(begin, end, s), s); }
 
-// Looks at entries [begin, end) in order, ends at the first that contains the point.
+// Considers the entries [begin, end) in order, up to the first that contains the point.
 void search(inout Best best, uint begin, uint end, Sought s) {
     for (; begin < end && !best.inside; begin += 32u) {
         for (uint near = near_among(begin, end, s); near != 0u && !best.inside; near &= near - 1u) {
@@ -34,7 +36,7 @@ void search(inout Best best, uint begin, uint end, Sought s) {
 
 bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
-// The owner after the whole list has been searched.
+// The owner, once the whole list has been searched; NONE if there is none.
 uint decide(Best best, uint leaf, float tolerance) {
     if (best.owner == NONE || best.inside) return best.owner;
     return !is_boundary_node(leaf) || best.smallest >= -tolerance ? best.owner : NONE;

@@ -1,24 +1,25 @@
-// Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and neighbours.
+// Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and
+// neighbours.
 
 #include "shared/centre.glsl"
 #include "shared/walk.glsl"
 
-// Whether a leaf is one to walk through: full of mesh, its list left out.
+// Whether a leaf is searched by walking: it is full of mesh and has a seed instead of a list.
 bool walks_in(uint leaf, uvec2 range) { return LISTS != 0u && range.x < range.y && !is_boundary_node(leaf); }
 
-// Where a stride through a leaf with these entries begins.
+// The tetrahedron where a stride through a leaf with these entries starts.
 uint middle_of(uvec2 range) { return listed_tet(range.x + (range.y - range.x) / 2u); }
 
-// The owner of x, the normalised point `at`, in a leaf that is full of mesh, by a whole walk.
+// The owner of the point `at`, x in normalised coordinates, in a leaf that is full of mesh, found by a whole walk.
 Best walked_through(Grid g, uvec2 range, vec3 at, vec3 x) {
-    LeafCell room;
-    room.half_size = half_cell(g, g.level);
-    room.centre = cell_centre(room.half_size, quantize(g, at) >> (MAX_LEVEL - g.level));
-    return walk_from_seed(listed_tet(range.x), room, x);
+    LeafCell cell;
+    cell.half_size = half_cell(g, g.level);
+    cell.centre = cell_centre(cell.half_size, quantize(g, at) >> (MAX_LEVEL - g.level));
+    return walk_from_seed(listed_tet(range.x), cell, x);
 }
 
-// The owner of x in a leaf with these entries: by a stride from the middle of the list; where that fails, by a whole walk if the leaf is full of mesh. None,
-// if its list must be searched.
+// The owner of x in a leaf with these entries, found by a stride from the middle of the list or, if that fails and the
+// leaf is full of mesh, by a whole walk. Without an owner, the list must be searched.
 Best walked(Grid g, uint leaf, uvec2 range, vec3 at, vec3 x) {
     if (LISTS == 0u || range.x >= range.y) return no_best();
     uint t = middle_of(range);

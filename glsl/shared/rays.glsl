@@ -1,4 +1,5 @@
-// Rays of a picture. Needs layout.glsl and tet.glsl. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs.
+// Rays of a picture. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs. Needs
+// layout.glsl and tet.glsl.
 
 // 1 / sqrt(x) of a normal x by correctly rounded operations only.
 float inverse_sqrt(float x) {
@@ -23,7 +24,7 @@ void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction)
     direction = d;
 }
 
-const float LEAST = 1e-20; // of a component of a direction, so that its reciprocal is finite
+const float LEAST = 1e-20; // smaller components of a direction count as this, so that reciprocals are finite
 
 vec3 inverse_of(vec3 direction) {
     vec3 r;
@@ -35,16 +36,18 @@ vec3 inverse_of(vec3 direction) {
     return r;
 }
 
-const float MAX_SAMPLES = 8388608.0; // of a ray: beyond, k + 1/2 is not exact, and the march keeps flags in numbers from bit 30 on
+// Most samples of a ray: beyond, k + 1/2 is not exact, and the march keeps flags in sample numbers from bit 30 on.
+const float MAX_SAMPLES = 8388608.0;
 
-// Where a sample lies.
+// The position of sample k.
 vec3 sample_at(RenderView view, vec3 origin, vec3 direction, uint k) {
     precise float t = (float(k) + 0.5) * view.step_size;
     precise vec3 at = origin + direction * t;
     return at;
 }
 
-// Pixels go to invocations in blocks of 8 × 8, within them along a Z curve: neighbouring rays read neighbouring cells.
+// The pixel of an item; false if it lies outside of the picture. Items take pixels in blocks of 8 × 8, and within a
+// block along a Z curve, since neighbouring rays read neighbouring tetrahedra.
 bool pixel_of(uint item, uvec2 size, out uvec2 pixel) {
     uint across = (size.x + 7u) / 8u;
     uint block = item / 64u, in_block = item % 64u;

@@ -1,5 +1,5 @@
-// Arrays of four words that are read whole: cells, vertices. A driver for processors fetches every component by itself, so that two of 64 bits are half as
-// many fetches (OLBVH_WIDE).
+// Arrays of four-word records that are read whole: cells, vertices. Drivers for processors fetch every component
+// separately, so that two 64-bit components halve the number of fetches (OLBVH_WIDE).
 #ifdef OLBVH_WIDE
 #extension GL_EXT_shader_explicit_arithmetic_types_int64 : require
 #define FLOATS u64vec2

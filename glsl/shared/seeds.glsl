@@ -1,8 +1,8 @@
-// Seeds of unmarked cells (SPEC 2.6). Twin of src/reference/marks.rs, which explains them. Needs marks.glsl, cells.glsl,
-// centre.glsl and candidates.glsl.
+// Seeds of unmarked cells (SPEC 2.6). Twin of src/reference/marks.rs, which explains them. Needs marks.glsl,
+// cells.glsl, centre.glsl and candidates.glsl.
 
-// The cells of a tetrahedron's box whose centre its own box holds, ends included; none where an end lies before its begin. All but the first and the
-// last along an axis do.
+// The candidates of a tetrahedron whose centre its own box contains: from lo to hi, inclusive; none if hi is less than
+// lo. Along each axis, only the first and the last candidate can have their centre outside.
 struct Centres {
     ivec3 lo;
     ivec3 hi;
@@ -17,7 +17,8 @@ Centres centres_of(Tet tet, vec3 h, CellBox box) {
     return c;
 }
 
-// Of n candidates from `at` on: which are marked, and which of the others have their centre in the box of the tetrahedron.
+// Of n candidates from `at` on: which are marked, and which of the others have their centre in the box of the
+// tetrahedron.
 void sift(uint level, CellBox box, uvec3 at, uint n, Centres c, out uint marked, out uint centres) {
     marked = centres = 0u;
     for (uint i = 0u; i < n;) {
@@ -34,5 +35,5 @@ void sift(uint level, CellBox box, uvec3 at, uint n, Centres c, out uint marked,
     }
 }
 
-// A centre that is not clearly in or out.
+// Whether a centre is neither clearly inside nor clearly outside.
 bool in_doubt(Weights own) { return !own.clear && own.in_box && near(own); }

@@ -1,5 +1,5 @@
-// Separating axes of tetrahedra and boxes, closest points (SPEC 3.4, 3.5). Twin of src/reference/separate.rs, which explains the allowance: the same
-// operations in the same order. Needs grid.glsl, tet.glsl.
+// Separating axes of tetrahedra and boxes, and closest points (SPEC 3.4, 3.5). Twin of src/reference/separate.rs, which
+// explains the allowance for rounding; the operations and their order are the same. Needs grid.glsl, tet.glsl.
 const uvec3 SEPARATE_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
 // Edges, and the two vertices that are not on them.
 const uvec4 SEPARATE_EDGES[6] =
@@ -67,8 +67,16 @@ bool face_separates(vec3 a[4], vec3 b[4]) {
     return false;
 }
 
+// Whether a vertex of one is a vertex of the other.
+bool share_vertex(vec3 a[4], vec3 b[4]) {
+    bool met = false;
+    for (uint i = 0u; i < 4u; ++i) met = met || a[i] == b[0] || a[i] == b[1] || a[i] == b[2] || a[i] == b[3];
+    return met;
+}
+
 // Whether two closed tetrahedra touch.
 bool tets_touch(vec3 a[4], vec3 b[4]) {
+    if (share_vertex(a, b)) return true;
     if (face_separates(a, b) || face_separates(b, a)) return false;
     for (uint e = 0u; e < 6u; ++e) {
         uvec4 ea = SEPARATE_EDGES[e];

@@ -1,17 +1,18 @@
-// Candidates are taken in shares of up to 32 of one tetrahedron. Every tetrahedron has one at least; dispatches over the first ones of all need no
-// search, others follow in a second dispatch (LATER), which is empty for most meshes. The including kernel declares offsets, the scanned numbers of
+// Candidates are processed in shares of up to 32 candidates of one tetrahedron. Every tetrahedron has at least one
+// share. A dispatch over the first shares of all tetrahedra needs no search; the other shares follow in a second
+// dispatch (LATER), which is empty for most meshes. The including kernel declares offsets, the scanned numbers of
 // shares (tets + 1). Needs cells.glsl.
 layout(constant_id = 3) const uint LATER = 0;
 
 struct Share {
-    uint index; // among all, in the order of the tetrahedra
+    uint index; // among all shares, in the order of the tetrahedra
     uint t;
     uint first; // its first candidate
 };
 
-// Share number i of those that are not the first of a tetrahedron.
+// Share number i among those that are not the first of their tetrahedron.
 Share later_share(uint i, uint tets) {
-    // The last tetrahedron with so many of them before it at most.
+    // The last tetrahedron with at most i such shares before it.
     uint lo = 0u, hi = tets;
     while (hi - lo > 1u) {
         uint mid = lo + (hi - lo) / 2u;
@@ -21,7 +22,7 @@ Share later_share(uint i, uint tets) {
     return Share(lo + i + 1u, lo, 32u * (i - (offsets.at[lo] - lo) + 1u));
 }
 
-// What invocation i of a dispatch takes, where there are `all` shares; false: nothing.
+// The share of invocation i of a dispatch, where there are `all` shares. Returns false if it has none.
 bool share_of(uint i, uint tets, uint all, out Share share) {
     if (i >= (LATER == 0u ? tets : all - tets)) return false;
     if (LATER == 0u) share = Share(offsets.at[i], i, 0u);
@@ -29,7 +30,7 @@ bool share_of(uint i, uint tets, uint all, out Share share) {
     return share.index < all;
 }
 
-// The candidate `by` places behind one, by at most 32: steps instead of the divisions of `candidate`.
+// The candidate `by` places after `at`, for `by` up to 32, found by steps instead of the divisions of `candidate`.
 uvec3 advance(CellBox box, uvec3 at, uint by) {
     uvec3 end = box.lo + box.size;
     at.x += by;

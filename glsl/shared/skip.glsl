@@ -1,5 +1,5 @@
-// Stretches of a ray where nothing is to be seen. Twin of src/reference/volume/skip.rs. Needs tree.glsl, rays.glsl, a `view` and a `plan`, and behind the
-// boundary flags, from word `visible_at` of the plan on, the marks of visible nodes.
+// Stretches of a ray where nothing is visible. Twin of src/reference/volume/skip.rs. Needs tree.glsl, rays.glsl, a
+// `view` and a `plan`. The marks of visible nodes follow the boundary flags, from word `visible_at` of the plan on.
 #ifdef BINARY_TREE
 const uint SKIP = 0u;
 #else
@@ -8,8 +8,9 @@ layout(constant_id = 5) const uint SKIP = 0;
 
 bool is_visible_node(uint node) { return (flags.at[plan.visible_at + (node >> 5u)] >> (node & 31u) & 1u) != 0u; }
 
-// The sample behind those, from `k` on and before `end`, that lie in the same cell of a level as sample `k`, which is in `finest`.
-// Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a cell lies in it.
+// The sample after those samples from `k` on and before `end` that lie in the same cell of `level` as sample `k`, whose
+// cell of the finest grid is `finest`. Rounding cannot lose a sample: the positions of a ray's samples and their cells
+// are monotone, so every sample between two samples of a cell lies in that cell.
 uint sample_behind(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, uint k, uint end, uvec3 finest, uint level) {
     uint shift = MAX_LEVEL - level;
     uvec3 cell = finest >> shift;
@@ -28,8 +29,8 @@ uint sample_behind(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, 
     return k + 1u;
 }
 
-// The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf.
-// Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples of a node lies in it.
+// The sample after those samples from `k` on and before `end` that lie in the same node as sample `k`: the highest node
+// without anything visible (`hidden`), or else the leaf. Rounding cannot lose a sample, as in `sample_behind`.
 uint stretch_end(Grid g, vec3 origin, vec3 direction, vec3 inverse_direction, uint k, uint end, out bool hidden) {
     uvec3 finest = quantize(g, sample_at(view, origin, direction, k));
     uint code = morton(finest), node = 0u, level = 0u;

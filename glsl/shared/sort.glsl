@@ -1,5 +1,5 @@
-// What the sort's kernels agree on: counts[digit * stride + tile], the stride odd so that tiles of one digit do not all fall
-// into the same cache set.
+// The table that the kernels of the sort share: counts[digit * stride + tile]. The stride is odd, so that the digits of
+// a tile do not all fall into the same cache set.
 layout(constant_id = 2) const uint DIGIT_BITS = 8;
 const uint DIGITS = 1u << DIGIT_BITS;
 

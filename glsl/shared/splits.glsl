@@ -1,7 +1,7 @@
 // Splits between neighbouring codes (the paper's stage 3). The including kernel declares codes.
 
-// The first 3-bit digit, counted from the top, in which code i differs from the next: 1 to level; level + 1 if they are equal;
-// 0 behind the last code, where a node ends on every level.
+// The first 3-bit digit, counted from the top, in which `code` differs from `next`: 1 to `level`, or level + 1 if they
+// are equal; 0 after the last code, where a node ends on every level.
 uint split_level(uint code, uint next, uint level, bool last) {
     if (last) return 0u;
     uint difference = code ^ next;

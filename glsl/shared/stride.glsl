@@ -1,20 +1,23 @@
-// The hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells, vertices and neighbours.
+// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
+// vertices and neighbours.
 
-// The tetrahedron that a stride stands in. Its corners are held in ascending index, so that what is worked out of them does not depend on the way.
+// The tetrahedron that a stride has reached. Its corners are kept in ascending index, so that what is computed from
+// them does not depend on the path.
 struct Stand {
     uint t;
     uvec4 cell; // vertices in the caller's order
-    uvec4 ids;  // and ascending
-    uvec4 beside; // tetrahedra across the faces opposite to `cell`, read together with it: a cache misses both at once
+    uvec4 ids;  // vertices in ascending order
+    // Neighbours across the faces opposite to `cell`, loaded together with it so that their cache misses overlap.
+    uvec4 beside;
     vec4 x, y, z;
     Bounds box;
 };
 
-// How a step changes what is held per corner.
+// How a step changes what is kept per corner.
 struct Exchange {
-    uint fresh;   // the vertex that comes in
-    bvec3 beyond; // whether the corner left behind is that of place 0; at most 1; at most 2
-    bvec3 before; // whether the fresh one comes before each of the corners kept
+    uint fresh;   // the vertex that enters
+    bvec3 beyond; // whether the place of the corner that leaves is 0; at most 1; at most 2
+    bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
 Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
@@ -46,7 +49,7 @@ float of_vertex(Stand s, vec4 ascending, uint id) {
     return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
 }
 
-// Barycentric coordinates of the point that these are the sides of, in the caller's order.
+// Barycentric coordinates of the point that `at` was computed for, in the caller's order.
 vec4 barycentric(Stand s, Sides at) {
     vec4 b = barycentric(at);
     return vec4(of_vertex(s, b, s.cell.x), of_vertex(s, b, s.cell.y), of_vertex(s, b, s.cell.z), of_vertex(s, b, s.cell.w));
@@ -54,7 +57,7 @@ vec4 barycentric(Stand s, Sides at) {
 
 uvec3 kept(uvec4 held, bvec3 beyond) { return mix(held.xyz, held.yzw, beyond); }
 
-// What is held of one kind after a step.
+// Data per corner after a step, with that of the fresh corner.
 uvec4 exchange(uvec4 held, Exchange e, uint fresh) {
     uvec3 k = kept(held, e.beyond);
     return uvec4(e.before.x ? fresh : k.x, e.before.x ? k.x : e.before.y ? fresh : k.y, e.before.y ? k.y : e.before.z ? fresh : k.z,
@@ -67,7 +70,8 @@ vec4 exchange(vec4 held, Exchange e, float fresh) {
 
 uint xor_of(uvec4 ids) { return ids.x ^ ids.y ^ ids.z ^ ids.w; }
 
-// One step through the face that says outside most; false, and nowhere, if none does or there is nothing behind it.
+// Steps through the face with the most negative weight. Returns false if no weight is negative or nothing lies beyond
+// that face; the stand must then not be used.
 bool step_on(inout Stand s, Sides at, out Exchange e) {
     float least = min(min(at.w.x, at.w.y), min(at.w.z, at.w.w));
     e.beyond.x = at.w.x == least;
@@ -79,7 +83,7 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     uint left = e.beyond.x ? s.ids.x : e.beyond.y ? s.ids.y : e.beyond.z ? s.ids.z : s.ids.w;
     s.t = s.cell.x == left ? s.beside.x : s.cell.y == left ? s.beside.y : s.cell.z == left ? s.beside.z : s.beside.w;
     if (s.t == NONE) return false;
-    // Three corners are shared; the fourth takes the place of the one left behind.
+    // Three corners are shared; the fresh one replaces the fourth.
     s.cell = words(cells.at[s.t]);
     s.beside = words(neighbours.at[s.t]);
     e.fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
@@ -98,22 +102,24 @@ bool step_on(inout Stand s, Sides at) {
     return step_on(s, at, e);
 }
 
-// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one; else NONE.
+// The owner of x, where x is near one face of the stand and far from all other faces of the two tetrahedra that share
+// it; else NONE.
 uint owner_at_face(Stand s, vec3 x) {
     Tet tet = tet_of(s);
     Weights here = weights(tet, x);
     uint u = near_one_face(here) ? s.beside[outermost(own_weights(here, tet))] : NONE;
     if (u == NONE) return NONE;
     Weights there = weights(load_tet(words(cells.at[u])), x);
-    // The face weighs the same from either side.
+    // Both sides compute the same magnitude of the weight at their shared face.
     if (!near_one_face(there) || least_of(there.w) != -least_of(here.w)) return NONE;
     return here.inside && (!there.inside || s.t < u) ? s.t : there.inside ? u : NONE;
 }
 
-// The owner of x where a stride ends: in a tetrahedron that holds it clearly, or at its face; else NONE.
+// The owner of x where a stride ends: the stand if it clearly contains x, or the owner at its face; else NONE.
 uint owner_of(Stand s, Sides at, vec3 x) { return at.clear ? s.t : at.near ? owner_at_face(s, x) : NONE; }
 
-// Goes from `t` towards x, and to its owner if that is not far, and if x does not lie near an edge; false, and anywhere, if not.
+// Moves `t` towards x, to its owner if at most `most` steps lead there and x is not near an edge. Otherwise returns
+// false and sets `t` to NONE.
 bool stride_to(inout uint t, vec3 x, uint most) {
     if (t == NONE) return false;
     Stand s = stand_in(t);

@@ -1,4 +1,5 @@
-// The structure that a kernel searches: the octree, or the baseline's binary tree where BINARY_TREE is defined. Its buffers follow the kernel's own.
+// The structure that a kernel searches: the octree, or the baseline's binary tree if BINARY_TREE is defined. Its
+// buffers follow the kernel's own.
 #ifdef BINARY_TREE
 #define STRUCTURE_BUFFERS 4
 #define STRUCTURE(slot)                         \

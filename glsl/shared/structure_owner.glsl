@@ -9,7 +9,8 @@ layout(constant_id = 4) const uint LISTS = 0;
 #include "shared/owner_walk.glsl"
 #include "shared/owner_search.glsl"
 
-// Goes on with a search for the owner of a point, `x` in normalised coordinates; false: the share of work is done before it has ended.
+// Continues a search for the owner of the point `at`, `x` in normalised coordinates. Returns false if the budget is
+// spent before the search has ended.
 bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
     owner = NONE;
     uint leaf = near_bounds(g, at) ? find_leaf(g.level, quantize(g, at)) : NONE;

@@ -1,5 +1,5 @@
-// Orientation, containment, barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of src/reference/tet.rs: the
-// same operations in the same order.
+// Orientation, containment and barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of
+// src/reference/tet.rs; the operations and their order are the same.
 
 vec3 cross_product(vec3 a, vec3 b) {
     precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
@@ -22,7 +22,7 @@ float orient(vec3 a, vec3 b, vec3 c, vec3 p) {
 // A tetrahedron with its vertices in ascending global index.
 struct Tet {
     vec3 v[4];
-    uvec4 rank; // place in v of each vertex as the caller numbered them
+    uvec4 rank; // place in v of each vertex in the caller's order
 };
 
 // A point relative to a tetrahedron.
@@ -30,12 +30,12 @@ struct Weights {
     vec4 w;      // signed volumes opposite to the vertices in ascending index, positive inside
     float sum;
     bool in_box; // inside the closed box of the vertices
-    bool inside; // the closed, not flat cell holds the point
-    bool clear;  // by more than the margin, so that rounding cannot put it into a neighbour as well
-    float margin; // of the cell, see Bounds
+    bool inside; // the closed tetrahedron contains the point, and is not flat
+    bool clear;  // inside by more than the margin, so that rounding cannot put the point into a neighbour as well
+    float margin; // of the tetrahedron, see Bounds
 };
 
-// Ascending places of four different vertex indices.
+// The place of each of four different vertex indices in ascending order.
 uvec4 ranks(uvec4 ids) {
     uint yx = uint(ids.y < ids.x), zx = uint(ids.z < ids.x), wx = uint(ids.w < ids.x);
     uint zy = uint(ids.z < ids.y), wy = uint(ids.w < ids.y), wz = uint(ids.w < ids.z);
@@ -46,7 +46,7 @@ vec3 select_rank(uvec4 rank, uint r, vec3 a, vec3 b, vec3 c, vec3 d) {
     return rank.x == r ? a : rank.y == r ? b : rank.z == r ? c : d;
 }
 
-// From corners in the caller's order.
+// A Tet from corners in the caller's order.
 Tet make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
     Tet t;
     t.rank = ranks(ids);
@@ -56,14 +56,16 @@ Tet make_tet(uvec4 ids, vec3 a, vec3 b, vec3 c, vec3 d) {
 
 float volume(Tet t) { return orient(t.v[0], t.v[1], t.v[2], t.v[3]); }
 
-// The box of a tetrahedron, and its margin: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+// The box of a tetrahedron, and its margin: if a weight is this close to 0, rounding may have put the point on either
+// side of the face.
 struct Bounds {
     vec3 lo;
     vec3 hi;
     float margin;
 };
 
-// Of coordinates, which are not negative and thus in the order of their bits: integers need no care for NaN.
+// Minimum and maximum of coordinates. These are not negative, so their order is that of their bits, and integer
+// operations need no care for NaN.
 vec3 smaller(vec3 a, vec3 b) { return uintBitsToFloat(min(floatBitsToUint(a), floatBitsToUint(b))); }
 vec3 larger(vec3 a, vec3 b) { return uintBitsToFloat(max(floatBitsToUint(a), floatBitsToUint(b))); }
 
@@ -97,10 +99,10 @@ Weights weights(Tet t, vec3 p) {
 
 float least_of(vec4 w) { return min(min(w.x, w.y), min(w.z, w.w)); }
 
-// Whether no face says outside by more than the margin.
+// Whether the point lies outside of no face by more than the margin.
 bool near(Weights r) { return least_of(r.w) >= -r.margin; }
 
-// Whether the point is that near to one face, and inside of all others by more.
+// Whether the point is within the margin of one face, and inside of all others by more than the margin.
 bool near_one_face(Weights r) {
     uvec4 close = uvec4(lessThanEqual(r.w, vec4(r.margin)));
     return near(r) && close.x + close.y + close.z + close.w == 1u;
@@ -109,19 +111,20 @@ bool near_one_face(Weights r) {
 // Weights in the caller's order of vertices, which is that of the faces.
 vec4 own_weights(Weights w, Tet tet) { return vec4(w.w[tet.rank.x], w.w[tet.rank.y], w.w[tet.rank.z], w.w[tet.rank.w]); }
 
-// The face that says outside most.
+// The face with the smallest weight: the one that the point lies farthest outside of.
 uint outermost(vec4 own) {
     uint face = 0u;
     for (uint f = 1u; f < 4u; ++f) face = own[f] < own[face] ? f : face;
     return face;
 }
 
-// What a step of a walk needs: cheaper than `weights`, but neighbours may disagree about their face by rounding.
+// What a step of a walk needs. It is cheaper than `weights`, but by rounding, two neighbours may disagree on which side
+// of their shared face a point lies.
 struct Sides {
-    vec4 w;     // as in Weights, opposite to the vertices in their order here
-    float sum;  // of them
+    vec4 w;     // as in Weights, opposite to the vertices in the order given
+    float sum;  // of the weights
     bool clear; // as in Weights
-    bool near;  // no face says outside by more than the margin
+    bool near;  // outside of no face by more than the margin
 };
 
 Sides sides_of(vec3 v[4], Bounds box, vec3 p) {
@@ -144,21 +147,22 @@ vec4 barycentric(Sides r) {
     return b;
 }
 
-// The same of any point, in the caller's order: what an owner comes with, whatever found it.
+// Barycentric coordinates of any point in the caller's order: those reported with an owner, however it was found.
 vec4 barycentric(Tet t, vec3 p) {
     vec4 b = barycentric(sides_of(t.v, bounds_of(t.v), p));
     return vec4(b[t.rank.x], b[t.rank.y], b[t.rank.z], b[t.rank.w]);
 }
 
-// What has these values at the corners, at barycentric coordinates.
+// The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.
 float weighed(vec4 b, vec4 at_corners) {
-    precise float r = (b.x * at_corners.x + b.y * at_corners.y) + (b.z * at_corners.z + b.w * at_corners.w);
+    precise vec3 beside = at_corners.xyz - at_corners.w;
+    precise float r = ((b.x * beside.x + b.y * beside.y) + b.z * beside.z) + at_corners.w;
     return r;
 }
 
 const float SMALLEST_FLOAT = -3.40282347e38;
 
-// Smallest barycentric coordinate; the smallest float for a flat cell.
+// Smallest barycentric coordinate; SMALLEST_FLOAT for a flat tetrahedron.
 float smallest(Weights r) {
     if (r.sum <= 0.0) return SMALLEST_FLOAT;
     precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * reciprocal(r.sum);

@@ -1,4 +1,5 @@
-// Of 32 candidates from `at` on, given as bits, those that the tetrahedron touches (SPEC 2.2). Needs cells.glsl and assign.glsl.
+// Of 32 candidates from `at` on, those whose bit is set and that the tetrahedron touches (SPEC 2.2). Needs cells.glsl
+// and assign.glsl.
 uint touching(Filter f, CellBox box, uvec3 at, uint bits) {
     uint kept = 0u;
     for (uint bit = 1u; bit != 0u && bit <= bits; bit <<= 1) {

@@ -1,12 +1,13 @@
-// Traversal for predicates with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of src/reference/traverse.rs, which
-// explains the trail. Before including this, a kernel declares what tree.glsl needs and defines
+// Traversal with predicates, using a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of
+// src/reference/traverse.rs, which explains the trail. Before including this file, a kernel declares what tree.glsl
+// needs and defines
 //     bool visit_node(Node node);  // F_N: descend? Also asked for leaves. It may become stricter during a traversal.
-//     bool visit_leaf(Node node);  // a leaf that F_N accepted; returns true to end the traversal
+//     bool visit_leaf(Node node);  // called for a leaf that F_N accepted; returns true to end the traversal
 // and may define
-//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the node's children, which these are, `first` the index of the first
-//     KEEPS(node)                    // whether a node that F_N accepted earlier is to be looked at still
+//     ENTER_NODE(node, mask, first)  // done before F_N is asked about the children of the node; `first` is the first
+//     KEEPS(node)                    // whether a node that F_N accepted earlier is still to be visited
 //     FLIP                           // the children of a node are visited in the order of their digits XOR this
-// STACK is the number of nodes on the short stack; any size gives the same leaves, a small one asks F_N more often.
+// STACK is the number of nodes on the short stack. Any size gives the same leaves; a small one asks F_N more often.
 #ifndef ENTER_NODE
 #define ENTER_NODE(node, mask, first)
 #endif
@@ -16,7 +17,7 @@
 #ifndef FLIP
 #define FLIP 0u
 #endif
-const uint MAX_VISITS = 24000u; // loop limit; a traversal that reaches it says so
+const uint MAX_VISITS = 24000u; // loop limit; a traversal that reaches it returns false
 
 // True if the traversal ended by itself, false at the loop limit.
 bool traverse(uint level) {
@@ -27,12 +28,12 @@ bool traverse(uint level) {
         return true;
     }
     Node stack[STACK];
-    uint top = 0u, held = 0u; // ring: the oldest node is dropped where there is no room
+    uint top = 0u, held = 0u; // ring buffer: if it is full, the oldest node is dropped
     uint trail = 0u, resume = 0u;
     for (uint visits = 0u; visits < MAX_VISITS; ++visits) {
         bool leaves = node.level + 1u == level;
         uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
-        uint accepted = 0u; // bit per child, in their order
+        uint accepted = 0u; // one bit per child, in the order of visits
         ENTER_NODE(node, mask, first);
         for (uint k = 0u; k < 8u; ++k) {
             uint digit = k ^ FLIP;
@@ -47,7 +48,7 @@ bool traverse(uint level) {
             uint shift = 3u * node.level;
             if (node.level >= resume) trail |= (n - 1u) << shift;
             uint left = min(trail >> shift & 7u, n - 1u);
-            // Siblings behind the next node, last first; then the next node itself.
+            // Pushes the siblings after the next node, the last first; then takes the next node itself.
             Node parent = node;
             for (uint k = 0u; k <= left; ++k) {
                 uint highest = uint(findMSB(accepted)), digit = highest ^ FLIP;

@@ -1,32 +1,34 @@
 // Voxels of a stack of layers. Twin of src/slicing.
-const uint SLICE_PENDING = 0xfffffffeu; // centre located in no cell, box not looked at yet
+const uint SLICE_PENDING = 0xfffffffeu; // the centre lies in no tetrahedron, and the box has not been tested yet
 const uint NAN = 0x7fc00000u; // value of an empty voxel
-const uint SLICE_TOUCHED = 0x80000000u; // added to the owner of a voxel that is touched
+const uint SLICE_TOUCHED = 0x80000000u; // added to the owner of a voxel that is only touched
 
-// Place of row number i of the band: in its layer, its layer.
+// Row number i of the band: its number within its layer, and the layer.
 uvec2 voxel_row(SlicePlan plan, uint i) {
     uint y = plan.first + i;
     return uvec2(y % plan.height, plan.layer + y / plan.height);
 }
 
-// The rows of run number i of a band of `rows` rows, the first of them and how many; twin of `Rows::run`.
+// The rows of run number i of a band of `rows` rows: the first of them, and their number. Twin of `Rows::run`.
 uvec2 rows_of_run(uint run, uint rows, uint height, uint i) {
     uint most = min(rows, height), runs = (most + run - 1u) / run, layer = i / runs * most, begin = (i % runs) * run;
     uint end = min(rows, layer + min(most, begin + run));
     return uvec2(layer + begin, end - min(end, layer + begin));
 }
 
-// Where a row begins, and a voxel in it lies.
+// The centre of the first voxel of a row.
 vec3 row_origin(SlicePlan plan, uvec2 row) {
     precise vec3 at = (plan.origin.xyz + float(row.y) * plan.up.xyz) + float(row.x) * plan.down.xyz;
     return at;
 }
 
+// The centre of voxel x of the row that starts at `row`.
 vec3 voxel_centre(SlicePlan plan, vec3 row, uint x) {
     precise vec3 at = row + float(x) * plan.across.xyz;
     return at;
 }
 
+// The centre of voxel number i of the band.
 vec3 voxel_centre(SlicePlan plan, uint i) {
     uint row = i / plan.width;
     return voxel_centre(plan, row_origin(plan, voxel_row(plan, row)), i - row * plan.width);

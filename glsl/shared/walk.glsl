@@ -1,17 +1,17 @@
-// Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it: the same operations in the same order. Needs
-// candidates.glsl, cells and neighbours.
-const uint STAR = 128u;    // tetrahedra of a star
-const uint STEPS = 512u;   // of part 1
-const uint HINTED = 16u;   // of a stride from a hint
-const uint STRIDE = 64u;   // of a stride through a leaf
-const uint LEG = 1024u;    // along one segment
-const uint DETOURS = 8u;   // points to go by
-const uint ARRIVALS = 2u;  // stars that part 1 looks at
+// Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
+// and their order are the same. Needs candidates.glsl, cells and neighbours.
+const uint STAR = 128u;    // most tetrahedra of a star
+const uint STEPS = 512u;   // most steps of part 1
+const uint HINTED = 16u;   // most steps of a stride from a hint
+const uint STRIDE = 64u;   // most steps of a stride through a leaf
+const uint LEG = 1024u;    // most steps along one segment
+const uint DETOURS = 8u;   // points of the cell to walk by, the first its centre
+const uint ARRIVALS = 2u;  // stars that part 1 searches
 const float GAP = -7.62939453125e-6; // -2^-17
 
 #include "shared/stride.glsl"
 
-// Cell of a leaf in normalised coordinates.
+// The cell of a leaf, in normalised coordinates.
 struct LeafCell {
     vec3 centre;
     vec3 half_size;
@@ -27,18 +27,18 @@ bool in_star(uint t) {
     return false;
 }
 
-// Takes into the star what lies beside `t`, one of it.
+// Adds to the star of x the neighbours of its member `t` that x is near, across faces that x is near.
 void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     vec4 own = own_weights(w, tet);
     uvec4 beside = words(neighbours.at[t]);
-    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // each round holds a whole test
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
         if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
         if (near(weights(load_tet(words(cells.at[u])), x))) star[star_size++] = u;
     }
 }
 
-// Looks for the owner in the star of x in `first`.
+// Considers all tetrahedra of the star of x as its owner, starting with `first`.
 void arrive(uint first, vec3 x, inout Best best) {
     star[0] = first;
     star_size = 1u;
@@ -53,7 +53,8 @@ void arrive(uint first, vec3 x, inout Best best) {
 
 bool settled(Best best) { return best.inside || (best.in_box && best.smallest >= GAP); }
 
-// Part 1, from `t`, which step number `s` has reached (and which is to be left first): whether t is near x now. What holds x clearly is the best.
+// Part 1, from `t`, which step number `s` has reached and which is left first with `leave`. Returns whether `t` is now
+// near x. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
 bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best best) {
     for (; s < STEPS; ++s) {
         Tet tet = load_tet(words(cells.at[t]));
@@ -69,7 +70,7 @@ bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best bes
     return false;
 }
 
-// Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
+// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends.
 uint walk_leg(uint t, vec3 a, vec3 b) {
     uint from = NONE;
     for (uint s = 0u; s < LEG; ++s) {
@@ -95,22 +96,22 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
     return t;
 }
 
-// Point number k of the cell, the first its centre.
-vec3 room_point(LeafCell room, uint k) {
+// Point number k of the cell; the first is its centre.
+vec3 cell_point(LeafCell cell, uint k) {
     vec3 p;
     for (uint c = 0u; c < 3u; ++c) {
         precise float part = float((3u * k + c) * 0x9e3779b9u >> 8) * two_to(-23) - 1.0;
         float away = k == 0u ? 0.0 : part;
-        precise float at = room.centre[c] + room.half_size[c] * away;
+        precise float at = cell.centre[c] + cell.half_size[c] * away;
         precise float whole = floor(at * two_to(42)) * two_to(-42);
         p[c] = whole;
     }
     return p;
 }
 
-// Walks to a point x of a cell that is full of mesh, from its seed: towards it, as far as ARRIVALS stars, then by way of DETOURS points. One loop, so that
-// kernels hold each part once.
-Best walk_from_seed(uint seed, LeafCell room, vec3 x) {
+// Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
+// DETOURS points. All of it is one loop, so that a kernel contains each part only once.
+Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;
     [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !settled(best); ++way) {
@@ -121,10 +122,10 @@ Best walk_from_seed(uint seed, LeafCell room, vec3 x) {
             }
         } else {
             uint k = way - ARRIVALS;
-            vec3 by = room_point(room, k);
+            vec3 by = cell_point(cell, k);
             t = seed;
-            // The first point to go by is the centre, where the walk begins.
-            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = walk_leg(t, leg == 0u ? room.centre : by, leg == 0u ? by : x);
+            // The first point is the centre, where the walk starts.
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x);
         }
         arrive(t, x, best);
     }

@@ -1,7 +1,7 @@
 // Scans and reductions over a workgroup, by subgroups of any size.
 shared uint subgroup_totals[128];
 
-// Sum of `v` over the invocations before this one; `total` over all. Called by the whole workgroup.
+// The sum of `v` over the invocations before this one; `total` receives that over all. Called by the whole workgroup.
 uint workgroup_exclusive_add(uint v, out uint total) {
     uint before = subgroupExclusiveAdd(v);
     total = subgroupAdd(v);
@@ -18,13 +18,14 @@ uint workgroup_exclusive_add(uint v, out uint total) {
     return before;
 }
 
-// Sum, smallest, largest of `v` over the workgroup.
+// The sum of `v` over the workgroup.
 uint workgroup_add(uint v) {
     uint total;
     workgroup_exclusive_add(v, total);
     return total;
 }
 
+// The largest `v` of the workgroup.
 uint workgroup_max(uint v) {
     v = subgroupMax(v);
     if (gl_NumSubgroups > 1u) {

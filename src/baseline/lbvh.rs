@@ -1,4 +1,4 @@
-//! LBVH over tetrahedra: Morton codes of box centres, agglomerative bottom-up construction (Apetrei 2014).
+//! An LBVH over tetrahedra: Morton codes of box centres, agglomerative bottom-up construction (Apetrei 2014).
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
@@ -9,9 +9,9 @@ use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::sealed::Sealed;
 use crate::query::{BinaryTree, Built, LocateOutput, Located, Rounds, Structure, StructureView};
 
-/// Bits of a code: ten per axis, and one that puts bad cells last.
+/// Bits of a code: ten per axis, and one that sorts bad tetrahedra last.
 const CODE_BITS: u32 = 31;
-/// Nodes and candidates that a point may look at in one dispatch.
+/// Most nodes and tetrahedra that a point visits in one dispatch.
 const BUDGET: u32 = 16_384;
 
 /// A binary tree over the tetrahedra of a mesh.
@@ -28,11 +28,11 @@ pub struct Lbvh {
 /// The arrays of the tree in host memory; see [`LbvhNode`] for references.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LbvhArrays {
-    /// Reference to the root; all ones: no valid tetrahedra.
+    /// Reference to the root; `u32::MAX` if there are no valid tetrahedra.
     pub root: u32,
-    /// Internal nodes, one less than primitives.
+    /// Internal nodes, one fewer than valid tetrahedra.
     pub nodes: Vec<LbvhNode>,
-    /// Tetrahedron at each place.
+    /// The tetrahedron at each place.
     pub ids: Vec<u32>,
 }
 
@@ -56,7 +56,7 @@ pub struct LbvhScratch {
 }
 
 impl LbvhScratch {
-    /// For a mesh of this many tetrahedra.
+    /// Takes the scratch memory for a mesh of this many tetrahedra.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -66,10 +66,11 @@ impl LbvhScratch {
     }
 }
 
-/// Records the construction of a binary tree over the valid tetrahedra of a mesh: nothing is submitted, waited for, allocated or read back.
+/// Records the construction of a binary tree over the valid tetrahedra of a mesh: nothing is submitted, waited for,
+/// allocated or read back.
 ///
-/// First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders. The last use is a compute write, no barrier stands
-/// behind it.
+/// The first use of `tree` and `scratch` is a transfer or compute write. `mesh` is read by compute shaders. The last
+/// use is a compute write, without a barrier after it.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -88,7 +89,8 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     r.stage("lbvh.sort", |r| cmd_sort_pairs(r, codes, ids, CODE_BITS, Count::host(tets), &sort))?;
     r.barrier("lbvh.sort → lbvh.merge");
     r.stage("lbvh.merge", |r| {
-        // One subgroup where a memory barrier may be one for the workgroup: see the kernel.
+        // One subgroup per workgroup where a memory barrier may act as a control barrier of the workgroup; see the
+        // kernel.
         let alone = matches!(Row::of(r.gpu().report()), Row::Cpu | Row::Apple);
         let workgroup = if alone { r.gpu().subgroup_size() } else { r.gpu().target().each };
         let spec = LbvhMergeSpec { workgroup, ..Default::default() };
@@ -97,9 +99,10 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     })
 }
 
-/// Records point location in a binary tree (`stride` and `hints` of the points are not for it: three floats each), going on behind earlier rounds if
-/// asked. Reads mesh, tree and points in compute shaders; writes `output` and `unfinished`, a word that is not 0 if more rounds are needed, in compute
-/// shaders and transfers. Between the fill of `unfinished`, which comes first, and the reads stands a barrier; there is none after.
+/// Records point location in a binary tree, for points of three floats each; `rounds` may continue earlier rounds.
+/// Reads mesh, tree and points in compute shaders. Writes `output` and `unfinished`, a word that is not 0 if more
+/// rounds are needed, in compute shaders and transfers. The fill of `unfinished` comes first, and a barrier follows it;
+/// there is none at the end.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if the pipeline cannot be made.
@@ -164,7 +167,7 @@ impl Lbvh {
         Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
     }
 
-    /// Bytes of the tree: a node of 32 bytes per split, a word per primitive.
+    /// Bytes of the tree: a node of 32 bytes per split, a word per valid tetrahedron.
     pub fn bytes(&self) -> u64 {
         u64::from(self.valid.saturating_sub(1)) * size_of::<LbvhNode>() as u64 + 4 * u64::from(self.valid)
     }
@@ -174,7 +177,7 @@ impl Lbvh {
         &self.stages
     }
 
-    /// The tree in host memory.
+    /// Reads the tree back to host memory.
     ///
     /// # Errors
     /// A failed transfer.
@@ -188,7 +191,7 @@ impl Lbvh {
         })
     }
 
-    /// Locates points (relative to the mesh's origin): the owners that the octree finds.
+    /// Locates points (relative to the mesh's origin); the owners are those that the octree finds.
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.

@@ -1,5 +1,5 @@
-//! The structures that the paper compares with, built and queried on the same device (SPEC 3.6): the LBVH with the same answers, and the device's
-//! own ray tracing with what it does not lose.
+//! The structures that the paper compares with, built and queried on the same device (SPEC 3.6): an LBVH, which gives
+//! the same answers, and the device's ray tracing, which may lose some points.
 
 mod lbvh;
 mod overlap;

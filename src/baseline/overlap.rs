@@ -1,4 +1,5 @@
-//! Overlap with LBVHs: every primitive of either mesh descends the other's tree to the narrow phase.
+//! Overlap with LBVHs: every tetrahedron of either mesh descends the other mesh's tree, and leaves lead to the narrow
+//! phase.
 
 use super::Lbvh;
 use crate::build::DeviceMesh;
@@ -12,10 +13,10 @@ use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{joint_grid, node_frame};
 use std::mem::offset_of;
 
-/// Nodes and candidates that a primitive may look at in one dispatch.
+/// Most nodes and tetrahedra that a search visits in one dispatch.
 const BUDGET: u32 = 4096;
 
-/// The primitives of one mesh against the tree of the other.
+/// The search for the tetrahedra of one mesh in the tree of the other.
 struct Direction<'a> {
     own: &'a DeviceMesh,
     other: &'a DeviceMesh,
@@ -54,8 +55,8 @@ impl Direction<'_> {
 }
 
 impl Lbvh {
-    /// The primitives of this tree's mesh and of another's that intersect the other mesh; points of both lie in one space. `report` is told how many
-    /// primitives are done.
+    /// Finds the tetrahedra of this tree's mesh and of another's that intersect the other mesh; the points of both are
+    /// in one coordinate system. `report` receives the number of tetrahedra done, and of all.
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.

@@ -1,8 +1,10 @@
-//! Point location by ray tracing hardware (or the driver's own tracing), where the device has it: an acceleration structure over the faces of a mesh,
-//! each with the tetrahedra on either side, and a short ray per point (Wald et al. 2019), traced by ray queries or by a ray-tracing pipeline.
+//! Point location by ray tracing hardware (or the driver's ray tracing), on devices that support it: an acceleration
+//! structure over the faces of a mesh, with the tetrahedra on either side of each, and a short ray per point (Wald et
+//! al. 2019), traced by ray queries or a ray-tracing pipeline.
 //!
-//! It is **not watertight**: the device's intersections are rounded, so a ray may slip past an edge, or meet a face that is not the first. Every
-//! answer is verified and does hold its point; a point whose ray went wrong is lost. Points on faces get any of their cells.
+//! It is **not watertight**: the device's intersections are rounded, so a ray may slip past an edge, or hit a face that
+//! is not the first. Every answer is verified to contain its point; a point whose ray went wrong is lost. A point on a
+//! face gets any of the tetrahedra at that face.
 
 use crate::build::{DeviceMesh, KeptMesh, MeshInput};
 use crate::error::Result;
@@ -12,23 +14,23 @@ use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput};
 use crate::reference::grid::two_to;
 
-/// From normalised coordinates to those of the scene, [0, 2): safe for whatever the device multiplies.
+/// Factor from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
 const SCALE: f32 = two_to(-40);
 
-/// How rays are traced.
+/// The way in which rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum RayMethod {
-    /// From a compute shader, `VK_KHR_ray_query`.
+    /// Ray queries in a compute shader, `VK_KHR_ray_query`.
     Query,
-    /// By a pipeline of its own, `VK_KHR_ray_tracing_pipeline`.
+    /// A ray-tracing pipeline, `VK_KHR_ray_tracing_pipeline`.
     Pipeline,
 }
 
 impl RayMethod {
-    /// Both.
+    /// Both methods.
     pub const ALL: [Self; 2] = [Self::Query, Self::Pipeline];
 
-    /// Whether the device has it.
+    /// Whether the device supports the method.
     pub fn of(self, gpu: &Gpu) -> bool {
         let ways = gpu.report().requirements.ray_tracing;
         if self == Self::Query { ways.queries } else { ways.pipelines }
@@ -39,7 +41,7 @@ impl RayMethod {
 #[derive(Debug)]
 pub struct Rays {
     gpu: Gpu,
-    /// None: ray queries.
+    /// `None`: ray queries.
     pipeline: Option<Box<RayPipeline>>,
     mesh: KeptMesh,
     structure: AccelerationStructure,
@@ -51,10 +53,11 @@ pub struct Rays {
 }
 
 impl Rays {
-    /// Lists the faces and builds the structure over them. `None` where the device cannot trace rays that way.
+    /// Lists the faces and builds the structure over them. `None` if the device does not support the method.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`], [`crate::Error::TooLarge`] for more faces than the device's structures hold, or a failed Vulkan call.
+    /// [`crate::Error::Memory`], [`crate::Error::TooLarge`] for more faces than the device's structures hold, or a
+    /// failed Vulkan call.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod) -> Result<Option<Self>> {
         mesh.check_device(gpu)?;
         if !method.of(gpu) {
@@ -117,12 +120,14 @@ impl Rays {
         &self.stages
     }
 
-    /// Records point location, without hints: a tetrahedron that holds the point, or all ones if the point is outside or lost. Reads mesh and points
-    /// in compute shaders, writes `output` in compute shaders, with no barrier before or after; with a ray-tracing pipeline there is one before, from
-    /// compute shaders and transfers, and one after, to these and the host.
+    /// Records point location, without hints. The result is a tetrahedron that contains the point, or `u32::MAX` if the
+    /// point is outside or lost. Reads mesh and points in compute shaders, and writes `output` in compute shaders,
+    /// without a barrier before or after. A ray-tracing pipeline adds a barrier before, from compute shaders and
+    /// transfers, and one after, to these and the host.
     ///
     /// # Errors
-    /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a ray-tracing pipeline launches rays.
+    /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a
+    /// ray-tracing pipeline can launch rays.
     pub fn cmd_locate(&self, r: &mut Recorder<'_>, mesh: &DeviceMesh, input: &PointInput, output: &LocateOutput) -> Result<()> {
         let (grid, cells, vertices) = (mesh.arrays().grid, mesh.input().cells, mesh.arrays().vertices);
         let (sides, longest, scene) = (self.sides.all(), self.longest, self.structure.address());
@@ -141,7 +146,8 @@ impl Rays {
         })
     }
 
-    /// Locates points (relative to the mesh's origin): a tetrahedron that holds each, or all ones if it is outside or lost.
+    /// Locates points (relative to the mesh's origin). The result is a tetrahedron that contains each point, or
+    /// `u32::MAX` if it is outside or lost.
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.

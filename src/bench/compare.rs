@@ -1,4 +1,5 @@
-//! Two files of results: the ratio of every measurement that both have, and whether it is more than the measurements' own spread.
+//! Comparison of two result files: the ratio of every measurement that both have, and whether it exceeds the spread of
+//! the measurements.
 
 use super::measure::Spread;
 use super::stored::{StoredCopy, StoredFigure, StoredMesh, StoredStructure, leaves, read};
@@ -9,20 +10,20 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// Repetitions from which on smallest and largest say how much a time varies.
+/// Minimum number of repetitions for smallest and largest times to show how much a time varies.
 const REPETITIONS: u32 = 3;
 
-/// How the second time relates to the first.
+/// How the second times relate to the first.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// All of the second are shorter than all of the first.
+    /// All second times are shorter than all first times.
     Faster,
-    /// All of the second are longer than all of the first.
+    /// All second times are longer than all first times.
     Slower,
-    /// The two overlap: the difference may be noise.
+    /// The ranges of times overlap, so the difference may be noise.
     WithinSpread,
-    /// Either was repeated too seldom to tell.
+    /// One of the two has too few repetitions for a verdict.
     Unknown,
 }
 
@@ -36,7 +37,7 @@ impl Verdict {
         }
     }
 
-    /// As tables say it.
+    /// The verdict as tables show it.
     pub fn name(self) -> &'static str {
         match self {
             Self::Faster => "FASTER",
@@ -50,45 +51,46 @@ impl Verdict {
 /// A measurement that both files have.
 #[derive(Clone, Debug, Serialize)]
 pub struct Compared {
-    /// The mesh.
+    /// Name of the mesh.
     pub mesh: String,
-    /// The structure.
+    /// Name of the structure.
     pub structure: String,
     /// What was measured.
     pub measurement: String,
-    /// Milliseconds in the first and in the second file: on the device, or on the host where either has no other.
+    /// Milliseconds in the first and in the second file: on the device, or on the host if one of the files has no
+    /// device times.
     pub ms: [Spread; 2],
-    /// Second median by first: below 1 the second is faster.
+    /// Second median divided by the first; if below 1, the second is faster.
     pub ratio: f64,
     /// Smallest and largest ratio that the spreads allow.
     pub ratio_range: [f64; 2],
-    /// What that means.
+    /// How the times relate.
     pub verdict: Verdict,
 }
 
-/// All about two files.
+/// The comparison of two files.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// The files.
     pub files: [PathBuf; 2],
-    /// What both say of device, settings and program alike.
+    /// Facts about device, settings and program that are equal in both files.
     pub same: BTreeMap<String, Value>,
-    /// What they say differently.
+    /// Facts that differ.
     pub different: BTreeMap<String, [Value; 2]>,
-    /// Ratios.
+    /// The measurements that both files have.
     pub compared: Vec<Compared>,
-    /// Bytes of structures that differ: mesh, structure, bytes.
+    /// Structures whose memory differs: mesh, structure, bytes.
     pub memory: Vec<(String, String, [u64; 2])>,
-    /// What only the first, only the second file has.
+    /// What only the first file has, and what only the second has.
     pub only: [Vec<String>; 2],
-    /// What both have but cannot be compared, and why.
+    /// Measurements that both files have but that cannot be compared, and why.
     pub incomparable: Vec<(String, String)>,
 }
 
 /// Compares the results of two runs.
 ///
 /// # Errors
-/// [`crate::Error::Io`] and [`crate::Error::File`] if a file cannot be read, or is no such file.
+/// [`crate::Error::Io`] and [`crate::Error::File`] if a file cannot be read or is not a result file.
 pub fn compare(files: [&Path; 2]) -> Result<Comparison> {
     let stored = [read(files[0])?, read(files[1])?];
     let facts = stored.each_ref().map(|s| {
@@ -138,7 +140,7 @@ pub fn compare(files: [&Path; 2]) -> Result<Comparison> {
     Ok(comparison)
 }
 
-/// Those of two lists that have the same key; what only one has goes to `only`.
+/// Pairs the elements of two lists that have the same key; those that only one list has go to `only`.
 fn matched<'a, T>(
     a: &'a [T],
     b: &'a [T],
@@ -171,9 +173,9 @@ impl Comparison {
         }
     }
 
-    /// Why two measurements of one name are not of the same work.
+    /// Why two measurements with the same name are not of the same work; `None` if they are.
     fn hindrance(&self, a: &StoredFigure, b: &StoredFigure) -> Option<String> {
-        // Intervals and overlaps count nothing, but a picture of another size is other work.
+        // Intervals and overlaps count no items, but a picture of another size is other work.
         let picture = self.different.get("settings.picture").filter(|_| a.quantity == "intervals" || a.quantity == "march");
         if let Some([x, y]) = picture {
             return Some(format!("pictures of {x}² and {y}² pixels"));
@@ -182,7 +184,7 @@ impl Comparison {
         (a.items != b.items).then(|| format!("{} items in A, {} in B", items(a.items), items(b.items)))
     }
 
-    /// Geometric mean of the ratios of each kind of measurement, and how many are what.
+    /// Geometric mean of the ratios of each kind of measurement, and the number of each verdict.
     fn summary(&self) -> Table {
         let header = ["", "compared", "B/A, geometric mean", "faster", "slower", "within spread"];
         let mut names: Vec<&str> = Vec::new();
@@ -250,14 +252,14 @@ impl Comparison {
         )
     }
 
-    /// Aligned, for a terminal.
+    /// Formats the comparison as aligned text for a terminal.
     pub fn text(&self) -> String {
         let mut text = self.heading();
         self.tables().iter().for_each(|table| table.text(&mut text));
         text
     }
 
-    /// As Markdown.
+    /// Formats the comparison as Markdown.
     pub fn markdown(&self) -> String {
         let mut text = format!("# Comparison\n\n{}", self.heading().replace('\n', "  \n"));
         self.tables().iter().for_each(|table| table.markdown(&mut text));
@@ -267,7 +269,7 @@ impl Comparison {
 
 impl Compared {
     fn new(mesh: &str, structure: &str, a: &StoredFigure, b: &StoredFigure) -> Self {
-        // Both by the same clock.
+        // Both times must be from the same clock.
         let ms = match (a.device_ms, b.device_ms) {
             (Some(a), Some(b)) => [a, b],
             _ => [a.wall_ms, b.wall_ms],

@@ -1,4 +1,4 @@
-//! How fast the device copies: the limit that the stages of a construction are compared with.
+//! Measurement of how fast the device copies, which limits the stages of a construction.
 
 use super::measure::Spread;
 use crate::error::{Error, Result};
@@ -7,31 +7,31 @@ use crate::primitives::cmd_copy;
 use serde::Serialize;
 use std::time::Instant;
 
-/// Words of a copy: far more than caches hold.
+/// Number of words of a copy: far more than caches hold.
 const WORDS: u32 = 1 << 24;
-/// Repetitions of each way.
+/// Number of repetitions of each way of copying.
 const REPETITIONS: u32 = 9;
 
-/// What copying takes, by the copy command and by a kernel.
+/// Times of copying, by the copy command and by a kernel.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct CopyRate {
-    /// Bytes read and bytes written, together.
+    /// Bytes read plus bytes written.
     pub bytes: u64,
-    /// Repetitions.
+    /// Number of repetitions.
     pub repetitions: u32,
     /// Milliseconds of `vkCmdCopyBuffer`.
     pub command_ms: Spread,
     /// Milliseconds of a kernel that copies 16 bytes at a time.
     pub kernel_ms: Spread,
-    /// Gigabytes (10^9) per second, read and written, of the faster one's median.
+    /// Gigabytes (10^9 bytes) per second, read plus written, from the faster way's median.
     pub gb_per_s: f64,
 }
 
 impl CopyRate {
-    /// Measures it; the copies are compared with the original first.
+    /// Measures the rate; the copies are first compared with the original.
     ///
     /// # Errors
-    /// [`Error::Memory`], or [`Error::Mismatch`] if a copy is not like the original.
+    /// [`Error::Memory`] if there is not enough memory, or [`Error::Mismatch`] if a copy differs from the original.
     pub fn measure(gpu: &Gpu) -> Result<Self> {
         let data: Vec<u32> = (0..WORDS).map(|i| i.wrapping_mul(2_654_435_761)).collect();
         let from = gpu.upload("olbvh.bench.original", &data)?;

@@ -1,4 +1,4 @@
-//! Repetitions and what they took.
+//! Repetitions of a measurement and their times.
 
 use crate::error::Result;
 use crate::gpu::StageTime;
@@ -6,12 +6,12 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Instant;
 
-/// How often, or how long, one measurement is repeated: until either is used up, once at least.
+/// How often and how long one measurement is repeated: until either limit is reached, but at least once.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Budget {
-    /// Most repetitions.
+    /// Maximum number of repetitions.
     pub repetitions: u32,
-    /// Seconds after which no further one begins.
+    /// Time in seconds after which no further repetition starts.
     pub seconds: f64,
 }
 
@@ -20,14 +20,14 @@ pub struct Budget {
 pub struct Spread {
     /// Smallest.
     pub min: f64,
-    /// Median; of an even number the mean of the middle two.
+    /// Median; for an even number of times the mean of the middle two.
     pub median: f64,
     /// Largest.
     pub max: f64,
 }
 
 impl Spread {
-    /// Of at least one time.
+    /// The spread of some times; `None` if there are none.
     pub(crate) fn of(mut times: Vec<f64>) -> Option<Self> {
         times.sort_by(f64::total_cmp);
         let middle = times.len() / 2;
@@ -37,21 +37,21 @@ impl Spread {
     }
 }
 
-/// What a measurement took.
+/// Times of a measurement.
 #[derive(Clone, Debug, Serialize)]
 pub struct Timing {
-    /// Repetitions.
+    /// Number of repetitions.
     pub repetitions: u32,
-    /// Between timestamps on the device; `None` where its queue has none.
+    /// Time between timestamps on the device; `None` if its queue has no timestamps.
     pub device_ms: Option<Spread>,
-    /// Of the whole call on the host, transfers included.
+    /// Time of the whole call on the host, transfers included.
     pub wall_ms: Spread,
-    /// Medians of the stages on the device.
+    /// Medians of the stages on the device, in milliseconds.
     pub stages_ms: BTreeMap<String, f64>,
 }
 
 impl Timing {
-    /// The median: of the device, or else on the host.
+    /// The median in milliseconds: on the device if known, otherwise on the host.
     pub fn milliseconds(&self) -> f64 {
         self.device_ms.unwrap_or(self.wall_ms).median
     }
@@ -69,7 +69,7 @@ impl Runs {
         self.walls.is_empty()
     }
 
-    /// Of one stage, or of all together.
+    /// The times of one stage, or of all stages together.
     pub(super) fn timing(&self, stage: Option<&str>) -> Timing {
         let chosen = |s: &&StageTime| stage.is_none_or(|name| s.name == name);
         let sums = self.stages.iter().map(|run| StageTime::sum(run.iter().filter(chosen)));
@@ -91,7 +91,8 @@ impl Runs {
     }
 }
 
-/// Repeats `once`, which gives its stages, within a budget. What it does has been done before, so that nothing is done for the first time.
+/// Repeats `once`, which returns the times of its stages, within a budget. The caller has run the same work before, so
+/// that no repetition includes the costs of a first run.
 pub(super) fn repeat(budget: &Budget, mut once: impl FnMut() -> Result<Vec<StageTime>>) -> Result<Runs> {
     let (start, mut runs) = (Instant::now(), Runs::default());
     while runs.is_empty() || (runs.walls.len() < budget.repetitions as usize && start.elapsed().as_secs_f64() < budget.seconds) {

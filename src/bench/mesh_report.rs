@@ -1,4 +1,4 @@
-//! Every figure of one mesh: its cells, and all structures over it.
+//! All figures of one mesh: its tetrahedra, and all structures over it.
 
 use super::quantity::Quantity;
 use super::structure::Kind;
@@ -8,12 +8,12 @@ use crate::gpu::StageTime;
 use glam::DVec3;
 use serde::Serialize;
 
-/// Shape of the cells, as the paper's Table 1.
+/// Shape of the tetrahedra, as in the paper's Table 1.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Quality {
-    /// Largest volume over smallest.
+    /// Largest volume divided by the smallest.
     pub volume_ratio: f64,
-    /// Inradius over circumradius: smallest, median, largest; 1/3 is regular.
+    /// Inradius divided by circumradius: smallest, median, largest; 1/3 is a regular tetrahedron.
     pub aspect: [f64; 3],
 }
 
@@ -27,7 +27,7 @@ impl Quality {
     }
 }
 
-/// Inradius over circumradius.
+/// Inradius of a tetrahedron divided by its circumradius.
 fn aspect(p: [[f64; 3]; 4]) -> f64 {
     let v = p.map(DVec3::from_array);
     let [a, b, c] = [v[1] - v[0], v[2] - v[0], v[3] - v[0]];
@@ -38,20 +38,20 @@ fn aspect(p: [[f64; 3]; 4]) -> f64 {
     if around > 0.0 { 2.0 * six_volumes * six_volumes / (double_area * around) } else { 0.0 }
 }
 
-/// All structures over a mesh.
+/// The report about a mesh and all structures over it.
 #[derive(Clone, Debug, Serialize)]
 pub struct MeshReport {
-    /// File or name.
+    /// Name of the mesh or its file.
     pub name: String,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u32,
-    /// Points.
+    /// Number of points.
     pub points: u32,
-    /// Boundary tetrahedra.
+    /// Number of boundary tetrahedra.
     pub boundary: u32,
-    /// Shape of the cells.
+    /// Shape of the tetrahedra.
     pub quality: Quality,
-    /// Milliseconds for bounds, neighbours and boundary, once per mesh, whatever the structure.
+    /// Milliseconds for bounds, neighbours and boundary, which are computed once per mesh for all structures.
     pub topology_ms: f64,
     /// The structures.
     pub structures: Vec<StructureReport>,
@@ -79,12 +79,12 @@ impl MeshReport {
         self.skipped.push((kind.to_string(), why.into()));
     }
 
-    /// The LBVH over this mesh.
+    /// The report of the LBVH over this mesh.
     pub fn lbvh(&self) -> Option<&StructureReport> {
         self.structures.iter().find(|s| s.kind == "lbvh")
     }
 
-    /// Relates every measurement to that of the LBVH.
+    /// Sets the ratio of every measurement to that of the LBVH.
     pub(super) fn set_ratios(&mut self) {
         let baseline: Vec<(Quantity, f64)> =
             self.lbvh().map_or(Vec::new(), |lbvh| lbvh.figures.iter().map(|f| (f.quantity, f.timing.milliseconds())).collect());

@@ -1,16 +1,16 @@
-//! The paper's measurements on one device in one run: the octree for α = 0, 1, 2 and every assignment, against the LBVH and the device's own ray
-//! tracing. Every answer is verified before anything is timed.
+//! The paper's measurements on one device in one run: the octree for α = 0, 1, 2 and every assignment, compared with
+//! the LBVH and with the device's hardware ray tracing. Every answer is verified before anything is timed.
 //!
 //! ```text
-//! subject           a mesh on the device, and the questions that all structures are asked
-//! structure         one structure: built, asked
-//! verify            its answers against those of the first structure, and of the reference
+//! subject           a mesh on the device, and the queries that all structures answer
+//! structure         one structure: built and queried
+//! verify            comparison of its answers with those of the first structure and of the reference implementation
 //! measure           repetitions within a budget
 //! structure_report  the figures of one structure, by quantity
-//! mesh_report       those of all structures over a mesh, and the ratios to the LBVH
-//! report            every figure of a run     → report_tables (text, Markdown), report_plots (SVG)
+//! mesh_report       the figures of all structures over a mesh, and their ratios to the LBVH
+//! report            all figures of a run     → report_tables (text, Markdown), report_plots (SVG)
 //!
-//! table, plot       what all tables and all plots have
+//! table, plot       what all tables and all plots share
 //! copy              how fast the device copies     traffic    what each stage must move at least, to compare with that
 //! scaling           time per item over the size of the mesh     → report_tables, scaling_plots
 //! compare           two files of reports: ratios, and which of them are more than noise
@@ -58,10 +58,11 @@ use structure::{Built, Structure};
 use subject::Subject;
 use verify::{Answers, check, check_tree};
 
-/// Measures the structures of a report's suite over a mesh; `progress` is told what is being done.
+/// Measures the structures of a report's suite over a mesh; `progress` receives what is being done.
 ///
 /// # Errors
-/// [`crate::Error::Mismatch`] if two structures give different answers, [`crate::Error::Memory`] and the like if the device cannot hold the mesh.
+/// [`crate::Error::Mismatch`] if two structures give different answers, [`crate::Error::Memory`] or another error if
+/// the device cannot hold the mesh.
 pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn(&str)) -> Result<MeshReport> {
     let settings = &whole.settings;
     progress(&format!("{name}: {} tetrahedra", mesh.tets.len()));
@@ -76,7 +77,7 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn
                 report.skip(kind, "the device traces no rays that way", progress);
                 continue;
             }
-            // Too large for the device or for 32 bits, which others may not be.
+            // This structure is too large for the device or for 32-bit offsets; others may not be.
             Err(error @ (Error::Memory { .. } | Error::TooLarge(_))) => {
                 report.skip(kind, &error.to_string(), progress);
                 continue;

@@ -1,4 +1,4 @@
-//! What all plots have: their size, a colour for every structure, and the title, device and legend around a chart.
+//! What all plots share: their size, a colour for every structure, and the title, device and legend around a chart.
 
 use super::report::Report;
 use super::structure_report::StructureReport;
@@ -6,12 +6,13 @@ use std::fmt::Write as _;
 
 pub(super) const WIDTH: f64 = 1080.0;
 pub(super) const HEIGHT: f64 = 440.0;
-/// Left, top, right, bottom.
+/// Margins: left, top, right, bottom.
 pub(super) const MARGINS: [f64; 4] = [64.0, 44.0, 16.0, 116.0];
 pub(super) const GRID: &str = "#e3e3e8";
 pub(super) const INK: &str = "#22252b";
 
-/// The colour of a structure: a hue per α, lighter for stronger assignments, darkest for lists at the boundary; grey and violet for the baselines.
+/// The colour of a structure: one hue per α, lighter for stronger assignments, darkest for lists at the boundary only;
+/// grey and violet for the baselines.
 pub(super) fn color(s: &StructureReport) -> &'static str {
     let octrees = [
         ["#2d65ad", "#6a9ad3", "#acc9ea", "#123663"],
@@ -30,7 +31,7 @@ pub(super) fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
 
-/// The picture around a chart: title, device, legend.
+/// Adds title, device and legend to a chart.
 pub(super) fn frame(report: &Report, title: &str, chart: &str) -> String {
     let mut svg = format!(
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" font-family=\"sans-serif\" font-size=\"12\" fill=\"{INK}\">\n\

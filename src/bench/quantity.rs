@@ -1,8 +1,8 @@
-//! What is measured.
+//! The quantities that are measured.
 
 use serde::Serialize;
 
-/// What is measured.
+/// A quantity that is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Quantity {
@@ -20,7 +20,7 @@ pub enum Quantity {
     LocateRandom,
     /// Location of points along a Z curve.
     LocateCoherent,
-    /// Location of the samples of a picture, each by itself.
+    /// Location of the samples of a picture, each independently.
     LocateSamples,
     /// Location of points in no order by the paper's traversal.
     TraverseRandom,
@@ -29,7 +29,7 @@ pub enum Quantity {
 }
 
 impl Quantity {
-    /// All, in the paper's order.
+    /// All quantities, in the paper's order.
     pub const ALL: [Self; 10] = [
         Self::Build,
         Self::Intervals,
@@ -43,7 +43,7 @@ impl Quantity {
         Self::TraverseCoherent,
     ];
 
-    /// The same points, located by the paper's traversal.
+    /// The quantity for the same points, located by the paper's traversal; `None` if there is none.
     pub(super) fn traversed(self) -> Option<Self> {
         match self {
             Self::LocateRandom => Some(Self::TraverseRandom),
@@ -52,7 +52,7 @@ impl Quantity {
         }
     }
 
-    /// Title of a table, with the paper's.
+    /// Title of a table, with the figure or table of the paper.
     pub fn title(self) -> &'static str {
         match self {
             Self::Build => "Construction (Fig. 6)",
@@ -68,7 +68,7 @@ impl Quantity {
         }
     }
 
-    /// Name of a file.
+    /// Name of a file, without extension.
     pub fn stem(self) -> &'static str {
         match self {
             Self::Build => "fig06_construction",
@@ -84,7 +84,7 @@ impl Quantity {
         }
     }
 
-    /// Whether it is told in items per second, not in milliseconds.
+    /// Whether it is reported in items per second instead of milliseconds.
     pub fn is_rate(self) -> bool {
         !matches!(self, Self::Build | Self::Intervals | Self::Slice | Self::Overlap)
     }

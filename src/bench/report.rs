@@ -1,4 +1,4 @@
-//! A whole run: where it ran, and every figure.
+//! The report of a whole run: the device and all figures.
 
 use super::copy::CopyRate;
 use super::mesh_report::MeshReport;
@@ -9,16 +9,16 @@ use crate::gpu::Gpu;
 use crate::kernels::Target;
 use serde::Serialize;
 
-/// Where it ran.
+/// The device of a run.
 #[derive(Clone, Debug, Serialize)]
 pub struct DeviceFacts {
-    /// Name.
+    /// Name of the device.
     pub name: String,
     /// Driver and its version.
     pub driver: String,
     /// Highest API version.
     pub api: String,
-    /// discrete, integrated, virtual, cpu, other.
+    /// Kind of device: discrete, integrated, virtual, cpu, other.
     pub kind: &'static str,
     /// Subgroup size.
     pub subgroup: u32,
@@ -26,15 +26,15 @@ pub struct DeviceFacts {
     pub ray_query: bool,
     /// Whether it has ray-tracing pipelines.
     pub ray_pipeline: bool,
-    /// Name of the shapes of the kernels.
+    /// Name of the target of the kernels.
     pub target: String,
-    /// The shapes themselves.
+    /// The target itself.
     pub tunables: Target,
-    /// How kernels get their buffers.
+    /// How kernels receive their buffers.
     pub binding: String,
 }
 
-/// A whole run.
+/// The report of a whole run.
 #[derive(Clone, Debug, Serialize)]
 pub struct Report {
     /// Version of this crate.
@@ -43,20 +43,20 @@ pub struct Report {
     pub commit: Option<String>,
     /// The suite.
     pub suite: Suite,
-    /// Sizes of the questions.
+    /// Sizes of the queries.
     pub settings: Settings,
     /// The device.
     pub device: DeviceFacts,
-    /// How fast it copies.
+    /// How fast the device copies.
     pub copy: CopyRate,
-    /// Time per item over the size of the mesh; of the suite `scaling` only.
+    /// Time per item over the size of the mesh; only for the suite `scaling`.
     pub scaling: Vec<Scale>,
     /// The meshes.
     pub meshes: Vec<MeshReport>,
 }
 
 impl Report {
-    /// A report without meshes; measures how fast the device copies.
+    /// Makes a report without meshes, and measures how fast the device copies.
     ///
     /// # Errors
     /// As [`CopyRate::measure`].

@@ -1,4 +1,4 @@
-//! A report as bar charts, one SVG file per figure of the paper.
+//! Formatting of a report as bar charts, one SVG file per figure of the paper.
 
 use super::plot::{GRID, HEIGHT, INK, MARGINS, WIDTH, color, escaped, frame};
 use super::quantity::Quantity;
@@ -8,7 +8,7 @@ use super::structure_report::{Figure, StructureReport};
 use super::table::number;
 use std::fmt::Write as _;
 
-/// Name of a file and its content, of everything that was measured.
+/// Plots of everything that was measured: names and contents of files.
 pub fn plots(report: &Report) -> Vec<(String, String)> {
     let figure = |q: Quantity| {
         let unit = if q.is_rate() { "million per second, more is better" } else { "milliseconds, less is better" };
@@ -21,7 +21,7 @@ pub fn plots(report: &Report) -> Vec<(String, String)> {
     bars.chain(scaling_plots::plots(report)).collect()
 }
 
-/// Bars on a logarithmic scale, a group per mesh; `None` if there are none.
+/// Draws bars on a logarithmic scale, one group per mesh; `None` if there are none.
 fn chart(report: &Report, value: &dyn Fn(&StructureReport) -> Option<f64>) -> Option<String> {
     let positive = |s: &StructureReport| value(s).filter(|v| v.is_finite() && *v > 0.0);
     let values = || report.meshes.iter().flat_map(|m| m.structures.iter().filter_map(positive));
@@ -30,7 +30,7 @@ fn chart(report: &Report, value: &dyn Fn(&StructureReport) -> Option<f64>) -> Op
     if most == 0.0 {
         return None;
     }
-    // From a whole decade, so that the smallest bar has some height.
+    // The scale starts at a whole decade, so that the smallest bar has some height.
     let (low, high) = ((least * 0.7).log10().floor(), (most * 1.6).log10());
     let [left, top, right, bottom] = MARGINS;
     let (wide, high_px) = (WIDTH - left - right, HEIGHT - top - bottom);
@@ -85,7 +85,7 @@ fn chart(report: &Report, value: &dyn Fn(&StructureReport) -> Option<f64>) -> Op
                 );
             }
         }
-        // The mesh of the paper that it stands for, if any; many labels stand in two lines.
+        // The label is the mesh of the paper that this one stands for, if any; many labels are placed in two lines.
         let (label, _) = mesh.name.rsplit_once(' ').unwrap_or((&mesh.name, ""));
         let line = if report.meshes.len() > 8 { 13.0 * (g % 2) as f64 } else { 0.0 };
         let (x, y) = (left + group * (g as f64 + 0.5), HEIGHT - bottom + 16.0 + line);

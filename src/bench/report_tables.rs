@@ -1,4 +1,4 @@
-//! A report as tables, for a terminal and as Markdown.
+//! Formatting of a report as tables, for a terminal and as Markdown.
 
 use super::mesh_report::MeshReport;
 use super::quantity::Quantity;
@@ -7,7 +7,7 @@ use super::scaling::{QUANTITIES, unit};
 use super::structure_report::{Figure, StageFigure, StructureReport};
 use super::table::{Table, mebibytes, number, text_of};
 
-/// One row per structure, one column per mesh; `None` if no structure has anything to show.
+/// A table with one row per structure and one column per mesh; `None` if no structure has a value.
 fn by_structure(report: &Report, title: &str, cell: impl Fn(&MeshReport, &StructureReport) -> Option<String>) -> Option<Table> {
     let mut names: Vec<&str> = Vec::new();
     for s in report.meshes.iter().flat_map(|m| &m.structures) {
@@ -47,7 +47,7 @@ fn figures(report: &Report, quantity: Quantity) -> Option<Table> {
     })
 }
 
-/// A table per measurement: sizes down, structures across.
+/// A table per measurement, with one row per size and one column per structure.
 fn scaling(report: &Report) -> Vec<Table> {
     let mut names: Vec<&str> = Vec::new();
     for scale in &report.scaling {
@@ -69,7 +69,7 @@ fn scaling(report: &Report) -> Vec<Table> {
     if report.scaling.is_empty() { Vec::new() } else { QUANTITIES.map(table).into() }
 }
 
-/// The tables that everybody wants.
+/// The main tables.
 fn main_tables(report: &Report) -> Vec<Table> {
     let total = by_structure(report, "Memory (Table 2), MiB (part of the LBVH's)", |m, s| {
         let part = m.lbvh().map_or(String::new(), |l| format!(" ({:.0} %)", 100.0 * s.memory.total as f64 / l.memory.total as f64));
@@ -89,12 +89,12 @@ fn main_tables(report: &Report) -> Vec<Table> {
     tables
 }
 
-/// Whether it is a tree of the main tables: at α = 0 the paper's, and the one by default.
+/// Whether a structure is a tree of the main tables: at α = 0 the paper's tree and the default one.
 fn is_main(s: &StructureReport) -> bool {
     s.alpha == Some(0) && (s.assign == Some("aabb") || s.lists == Some("boundary"))
 }
 
-/// The stages of the constructions chosen, against the copy rate; `None` where stages are not timed.
+/// The stages of the chosen constructions, compared with the copy rate; `None` if stages are not timed.
 fn stages(mesh: &MeshReport, which: &str, chosen: impl Fn(&StructureReport) -> bool) -> Option<Table> {
     let header = ["", "stage", "ms", "MiB at least", "GB/s", "of copy rate"];
     let of = |s: &StructureReport| {
@@ -110,7 +110,7 @@ fn stages(mesh: &MeshReport, which: &str, chosen: impl Fn(&StructureReport) -> b
     (!rows.is_empty()).then(|| Table { title, header: text_of(&header), rows })
 }
 
-/// What is in the main tables, taken apart.
+/// Tables that break down the numbers of the main tables.
 fn detail_tables(report: &Report) -> Vec<Table> {
     let listed = |items: &mut dyn Iterator<Item = String>| items.collect::<Vec<_>>().join(", ");
     let stages = report.meshes.iter().map(|m| {
@@ -186,14 +186,14 @@ fn notes(report: &Report) -> String {
     skipped.fold(String::new(), |text, line| text + "\n" + &line)
 }
 
-/// The main tables for a terminal.
+/// Formats the main tables for a terminal.
 pub fn text(report: &Report) -> String {
     let mut text = heading(report);
     main_tables(report).iter().for_each(|table| table.text(&mut text));
     text + &notes(report)
 }
 
-/// All tables as Markdown.
+/// Formats all tables as Markdown.
 pub fn markdown(report: &Report) -> String {
     let mut text = format!("# Measurements\n\n{}", heading(report).replace('\n', "  \n"));
     main_tables(report).iter().chain(&detail_tables(report)).for_each(|table| table.markdown(&mut text));

@@ -1,13 +1,13 @@
-//! Time per item over the size of the mesh: what a larger problem costs beyond its size.
+//! Time per item as a function of the size of the mesh, which shows what a larger problem costs beyond its size.
 
 use super::mesh_report::MeshReport;
 use super::quantity::Quantity;
 use super::structure_report::StructureReport;
 use serde::Serialize;
 
-/// The size that others are related to.
+/// The number of tetrahedra that other sizes are related to.
 const REFERENCE_TETS: f64 = 200_000.0;
-/// What is told by size.
+/// The quantities that are reported by size.
 pub(super) const QUANTITIES: [Quantity; 3] = [Quantity::Build, Quantity::LocateRandom, Quantity::LocateCoherent];
 
 /// One measurement at one size.
@@ -19,15 +19,15 @@ pub struct Scale {
     pub quantity: Quantity,
     /// The mesh.
     pub mesh: String,
-    /// Its tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u32,
     /// Nanoseconds per tetrahedron built over, or per point located.
     pub ns_per_item: f64,
-    /// That by the one of the mesh nearest to 200,000 tetrahedra.
+    /// `ns_per_item` divided by that of the mesh whose size is nearest to 200,000 tetrahedra.
     pub ratio: f64,
 }
 
-/// Every measurement by the size of its mesh.
+/// All measurements, by the size of their mesh.
 pub(super) fn scales(meshes: &[MeshReport]) -> Vec<Scale> {
     let distance = |tets: u32| (f64::from(tets.max(1)) / REFERENCE_TETS).ln().abs();
     let reference = meshes.iter().min_by(|a, b| distance(a.tets).total_cmp(&distance(b.tets)));
@@ -48,7 +48,7 @@ pub(super) fn scales(meshes: &[MeshReport]) -> Vec<Scale> {
     scales
 }
 
-/// Of time per item.
+/// Unit of the time per item.
 pub(super) fn unit(quantity: Quantity) -> &'static str {
     if quantity == Quantity::Build { "ns per tetrahedron" } else { "ns per point" }
 }

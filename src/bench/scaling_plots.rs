@@ -1,4 +1,4 @@
-//! Time per item over the size of the mesh as line charts, one SVG file per measurement.
+//! Formatting of the time per item over the size of the mesh as line charts, one SVG file per measurement.
 
 use super::plot::{GRID, color, escaped, frame};
 use super::quantity::Quantity;
@@ -12,7 +12,8 @@ const RIGHT: f64 = 1040.0;
 const TOP: f64 = 56.0;
 const BOTTOM: f64 = 324.0;
 
-/// Name of a file and its content, a plot per measurement: both axes logarithmic, a line per structure.
+/// One plot per measurement, as name and content of a file: both axes are logarithmic, and there is one line per
+/// structure.
 pub(super) fn plots(report: &Report) -> Vec<(String, String)> {
     let plot = |quantity: Quantity| {
         let scales: Vec<&Scale> = report.scaling.iter().filter(|s| s.quantity == quantity && s.ns_per_item > 0.0).collect();

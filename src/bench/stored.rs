@@ -1,4 +1,4 @@
-//! Files of results, as far as comparing them needs it.
+//! Result files, as far as their comparison needs them.
 
 use super::measure::Spread;
 use crate::error::{Error, Result};
@@ -8,12 +8,12 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// What is read of a file; results of other versions may have more, or less.
+/// The part of a file that is read; results of other versions may contain more or less.
 #[derive(Deserialize)]
 pub(super) struct Stored {
     pub meshes: Vec<StoredMesh>,
     pub copy: Option<StoredCopy>,
-    /// Follows from the figures.
+    /// Ignored, because it follows from the figures.
     #[serde(rename = "scaling")]
     _scaling: Option<IgnoredAny>,
     #[serde(flatten)]
@@ -57,7 +57,7 @@ pub(super) struct StoredFigure {
     pub items: Option<u64>,
 }
 
-/// Reads a file of results.
+/// Reads a result file.
 pub(super) fn read(path: &Path) -> Result<Stored> {
     let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
     serde_json::from_str(&text).map_err(|e| Error::File {
@@ -67,7 +67,7 @@ pub(super) fn read(path: &Path) -> Result<Stored> {
     })
 }
 
-/// Every leaf of a JSON object by its path, `device.name`; lists are leaves.
+/// Collects every leaf of a JSON object under its path, for example `device.name`; lists are leaves.
 pub(super) fn leaves(prefix: &str, value: &Value, out: &mut BTreeMap<String, Value>) {
     if let Value::Object(members) = value {
         for (name, member) in members {

@@ -1,4 +1,4 @@
-//! One structure over one mesh, whichever it is.
+//! One structure of any kind over one mesh.
 
 use super::quantity::Quantity;
 use crate::baseline::{Lbvh, RayMethod, Rays};
@@ -8,26 +8,26 @@ use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::query::{self, LocateOptions, Located, OverlapInput, Overlapped, Path};
 
-/// Which structure.
+/// A kind of structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Kind {
     /// The octree.
     Octree {
         /// The paper's α.
         alpha: u8,
-        /// How primitives are assigned to leaves.
+        /// How tetrahedra are assigned to leaves.
         assign: Assign,
-        /// Which leaves list all of theirs: in the paper every one.
+        /// Which leaves list all of their tetrahedra; in the paper every one does.
         lists: Lists,
     },
     /// The binary tree of the paper's comparison.
     Lbvh,
-    /// The device's acceleration structure over faces.
+    /// The device's ray-tracing acceleration structure over the faces.
     Rays(RayMethod),
 }
 
 impl Kind {
-    /// Every structure, in the order of the tables; the first one's answers are those that the others must give.
+    /// Every kind, in the order of the tables; the answers of the first one are those that the others must give.
     pub fn all() -> Vec<Self> {
         let [aabb, planes, exact] = Assign::EVERY.map(|assign| (assign, Lists::All));
         let choices = [aabb, planes, exact, (Assign::default(), Lists::Boundary)];
@@ -35,7 +35,7 @@ impl Kind {
         octrees.chain([Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
     }
 
-    /// Whether it can tell the overlap of two meshes.
+    /// Whether the structure can find the overlap of two meshes.
     pub(super) fn overlaps(self) -> bool {
         !matches!(self, Self::Rays(_))
     }
@@ -68,7 +68,7 @@ pub(super) struct Built<'a> {
 }
 
 impl Structure {
-    /// Builds it; `None` where the device lacks what it takes.
+    /// Builds a structure; `None` if the device lacks a required feature.
     pub(super) fn build(gpu: &Gpu, mesh: &DeviceMesh, kind: Kind) -> Result<Option<Self>> {
         Ok(match kind {
             Kind::Octree { alpha, assign, lists } => {
@@ -80,13 +80,13 @@ impl Structure {
         })
     }
 
-    /// Whether points are located by the paper's own traversal, too, which cuts longer lists.
+    /// Whether points are also located by the paper's own traversal, which cuts off lists longer than 32,000 entries.
     pub(super) fn traverses(&self, kind: Kind) -> bool {
         let paper = matches!(kind, Kind::Octree { assign: Assign::Aabb, lists: Lists::All, .. });
         paper && matches!(self, Self::Octree(tree) if tree.status().longest_leaf <= 32_000)
     }
 
-    /// Device time of the construction.
+    /// Device times of the stages of the construction.
     pub(super) fn stages(&self) -> &[StageTime] {
         match self {
             Self::Octree(tree) => tree.stages(),
@@ -95,7 +95,7 @@ impl Structure {
         }
     }
 
-    /// As pictures and slices take it; `None` for rays, which only locate.
+    /// The structure in the form that pictures and slices take; `None` for rays, which can only locate.
     pub(super) fn built(&self) -> Option<&dyn query::Built> {
         match self {
             Self::Octree(tree) => Some(tree),
@@ -104,8 +104,8 @@ impl Structure {
         }
     }
 
-    /// Locates points in the way that suits those of `quantity`: samples of rays each by itself, as the paper does; others, where leaves within the mesh
-    /// have no lists, as [`Path::suited`] says.
+    /// Locates points in the way that suits those of `quantity`: samples of rays each independently, as the paper does;
+    /// others, where leaves within the mesh have no lists, as [`Path::suited`] chooses.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
@@ -124,7 +124,7 @@ impl Structure {
     }
 }
 
-/// Which primitives of two meshes intersect the other; `None` where the structures cannot tell.
+/// The tetrahedra of two meshes that intersect the other mesh; `None` if the structures cannot find them.
 pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> {
     let silent = &|_, _| {};
     match (a.structure, b.structure) {

@@ -1,4 +1,4 @@
-//! Every figure of one structure over a mesh.
+//! All figures of one structure over a mesh.
 
 use super::copy::CopyRate;
 use super::measure::Timing;
@@ -18,11 +18,12 @@ pub struct Figure {
     /// Repetitions and times.
     #[serde(flatten)]
     pub timing: Timing,
-    /// Tetrahedra built over, points located, samples found in the mesh, voxels; `None` where nothing is counted.
+    /// Number of items: tetrahedra built over, points located, samples found in the mesh, or voxels; `None` if nothing
+    /// is counted.
     pub items: Option<u64>,
-    /// Items per second of the median.
+    /// Items per second, from the median time.
     pub per_second: Option<f64>,
-    /// How many times as fast as the LBVH, by the medians.
+    /// Ratio of the median time of the LBVH to this one.
     pub speedup: Option<f64>,
 }
 
@@ -32,37 +33,37 @@ impl Figure {
         Self { quantity, timing, items, per_second, speedup: None }
     }
 
-    /// What tables and plots show: millions per second, or milliseconds.
+    /// The number that tables and plots show: millions per second, or milliseconds.
     pub fn shown(&self) -> f64 {
         if self.quantity.is_rate() { self.per_second.unwrap_or(0.0) * 1e-6 } else { self.timing.milliseconds() }
     }
 }
 
-/// Bytes of a structure.
+/// Memory of a structure in bytes.
 #[derive(Clone, Debug, Serialize)]
 pub struct MemoryFigures {
-    /// All of it.
+    /// Total.
     pub total: u64,
-    /// By array.
+    /// Bytes of each array.
     pub arrays: Vec<(&'static str, u64)>,
-    /// As the paper's Table 2 counts an octree: boxes, but no PO.
+    /// For an octree, bytes as the paper's Table 2 counts them: with boxes, without PO.
     pub paper: Option<u64>,
-    /// Of an acceleration structure before compaction.
+    /// For an acceleration structure, bytes before compaction.
     pub before_compaction: Option<u64>,
     /// Scratch memory of the construction, where it is known.
     pub scratch: Option<u64>,
 }
 
-/// Points that a structure did not find though a cell holds them.
+/// Points that a structure did not find although a tetrahedron contains them.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Lost {
-    /// So many.
+    /// Number of lost points.
     pub points: u64,
-    /// Of so many.
+    /// Number of points that lie in the mesh.
     pub of: u64,
 }
 
-/// A structure over a mesh.
+/// The report about one structure over a mesh.
 #[derive(Clone, Debug, Serialize)]
 pub struct StructureReport {
     /// Its name in tables.
@@ -71,43 +72,43 @@ pub struct StructureReport {
     pub kind: &'static str,
     /// The paper's α.
     pub alpha: Option<u8>,
-    /// How primitives are assigned to leaves.
+    /// How tetrahedra are assigned to leaves.
     pub assign: Option<&'static str>,
-    /// Which leaves list all of their primitives.
+    /// Which leaves list all of their tetrahedra.
     pub lists: Option<&'static str>,
     /// Level of the leaves.
     pub level: Option<u32>,
-    /// Entries of all leaves.
+    /// Number of entries.
     pub entries: Option<u32>,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: Option<u32>,
-    /// Bytes.
+    /// Memory of the structure.
     pub memory: MemoryFigures,
     /// Points that rays lost.
     pub lost: Option<Lost>,
     /// Measurements.
     pub figures: Vec<Figure>,
-    /// Stages of the construction against the device's copy rate; of octrees only.
+    /// Stages of the construction, compared with the device's copy rate; for octrees only.
     pub stages: Vec<StageFigure>,
 }
 
-/// A stage of a construction, and how far it is from what the device can move.
+/// A stage of a construction, compared with what the device can move.
 #[derive(Clone, Debug, Serialize)]
 pub struct StageFigure {
-    /// Its name.
+    /// Name of the stage.
     pub stage: String,
-    /// Milliseconds on the device, median; those of `mesh.` once, as it was uploaded.
+    /// Median of the milliseconds on the device; for stages of `mesh.`, the single time of the upload.
     pub ms: f64,
-    /// Bytes that it must read and write at least.
+    /// Bytes that the stage must read and write at least.
     pub bytes: u64,
-    /// Gigabytes (10^9) per second that these bytes are.
+    /// Gigabytes (10^9 bytes) per second that this amounts to.
     pub gb_per_s: f64,
-    /// Part of the device's copy rate.
+    /// This rate as a fraction of the device's copy rate.
     pub of_copy_rate: f64,
 }
 
 impl StructureReport {
-    /// Relates the stages of an octree's construction to the copy rate, where stages are timed.
+    /// Compares the stages of an octree's construction with the copy rate, if stages are timed.
     pub(super) fn set_stages(&mut self, subject: &Subject<'_>, structure: &Structure, copy: &CopyRate) {
         let Structure::Octree(tree) = structure else { return };
         let build = self.figure(Quantity::Build).map(|f| f.timing.stages_ms.clone()).unwrap_or_default();

@@ -1,4 +1,4 @@
-//! A mesh on the device and the questions that all structures over it are asked.
+//! A mesh on the device, and the queries that all structures over it answer.
 
 use super::quantity::Quantity;
 use super::structure::Structure;
@@ -13,19 +13,19 @@ use crate::reference::grid::morton;
 use crate::render::{Bounds, Plan, RenderSettings};
 use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
 
-/// Voxels are so thick, as part of the largest extent: one cell of the paper's *Jets*.
+/// Thickness of voxels as a fraction of the largest extent: one cell of the paper's mesh *Jets*.
 const THICKNESS: f64 = 1.0 / 127.0;
-/// So far along each axis, as part of the extent, the mesh is moved for the overlap with itself.
+/// Distance by which the mesh is moved along each axis for the overlap with itself, as a fraction of the extent.
 const MOVED: f32 = 0.137;
 
-/// A mesh and its questions.
+/// A mesh and its queries.
 pub(super) struct Subject<'a> {
     pub gpu: &'a Gpu,
     pub mesh: &'a Mesh,
     pub device: DeviceMesh,
-    /// The same mesh, moved, where the overlap is asked for.
+    /// The same mesh, moved, if the overlap is measured.
     pub moved: Option<DeviceMesh>,
-    /// Points to locate, and as what.
+    /// Points to locate, and the quantity that they measure.
     pub points: Vec<(Quantity, Vec<[f32; 3]>)>,
     field: Field,
     plan: Option<Plan>,
@@ -52,7 +52,7 @@ impl<'a> Subject<'a> {
         let of_points = mesh.fields.iter().find(|f| f.on == On::Points).cloned();
         let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
         let field = of_points.unwrap_or_else(along_x);
-        // Every sample is taken: nothing is opaque, and no ray ends early.
+        // Every sample is taken, because nothing is opaque and no ray ends early.
         let picture = RenderSettings { size: [settings.picture; 2], shading: false, termination: 1.0, ..RenderSettings::default() };
         let plan = (settings.picture > 0).then(|| Plan::new(&picture, &bounds, mesh.origin, field.range())).transpose()?;
         let thickness = extent.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
@@ -64,20 +64,20 @@ impl<'a> Subject<'a> {
         Ok(Self { gpu, mesh, device, moved, points, field, plan, voxels })
     }
 
-    /// Centre of a voxel of the slice, by its number.
+    /// Centre of a voxel of the slice, given by its index.
     pub(super) fn centre(&self, voxel: usize) -> [f32; 3] {
         let Some(voxels) = &self.voxels else { return [f32::NAN; 3] };
         let (row, at) = (voxels.size[0].max(1), voxel as u32);
         voxels.centre([at % row, at / row, 0])
     }
 
-    /// Draws the field; `None` where the structure cannot.
+    /// Draws the field; `None` if the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
         let (Some(built), Some(plan)) = (structure.built(), &self.plan) else { return Ok(None) };
         query::render(&self.device, built, plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
     }
 
-    /// Slices the mesh through its middle; `None` where the structure cannot.
+    /// Slices the mesh through its middle; `None` if the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
         let (Some(built), Some(voxels)) = (structure.built(), &self.voxels) else { return Ok(None) };
         let field = Some((self.field.values.as_slice(), On::Points));
@@ -85,13 +85,14 @@ impl<'a> Subject<'a> {
     }
 }
 
-/// The samples of a part of a picture's rays that lie in the bounds, in blocks of 8 × 8 rays spread over the picture, front to back in each.
+/// Samples within the bounds of some of a picture's rays, in blocks of 8 × 8 rays that are spread over the picture;
+/// front to back within each block.
 fn samples(plan: &Plan, bounds: &Bounds, most: usize) -> Vec<[f32; 3]> {
     let across = plan.size[0].div_ceil(8);
     let blocks = across * plan.size[1].div_ceil(8);
     let steps = (2.0 * bounds.diagonal() / f64::from(plan.step)) as u32;
     let in_bounds = |p: &[f32; 3]| (0..3).all(|c| bounds.lo[c] <= p[c] && p[c] <= bounds.hi[c]);
-    // In an order that soon has visited all of the picture.
+    // The order of the blocks covers the whole picture early.
     let mut order: Vec<u32> = (0..blocks).collect();
     order.sort_by_key(|b| b.wrapping_mul(2_654_435_761));
     let block = |b: u32| {
@@ -116,10 +117,10 @@ pub(super) fn corners(mesh: &Mesh) -> impl Iterator<Item = [[f64; 3]; 4]> {
     valid.map(|(_, ids)| ids.map(|id| mesh.points[id as usize].map(f64::from)))
 }
 
-/// Points spread evenly over the volume of a mesh, always the same ones.
+/// Points distributed uniformly over the volume of a mesh, always the same ones.
 fn random_points(mesh: &Mesh, count: u32) -> Vec<[f32; 3]> {
     let mut state = 0u64;
-    // SplitMix64, 53 bits.
+    // SplitMix64, of which 53 bits are used.
     let mut next = || {
         state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let mut z = (state ^ (state >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

@@ -1,4 +1,4 @@
-//! What is measured: which meshes, how large the questions are, how long.
+//! What is measured: which meshes, how large the queries, for how long.
 
 use super::measure::Budget;
 use super::structure::Kind;
@@ -9,12 +9,13 @@ use serde::Serialize;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Suite {
-    /// Two small meshes, small questions: within a minute on two cores.
+    /// Two small meshes and small queries: takes less than a minute on two cores.
     #[default]
     Quick,
-    /// The paper's sizes: *Jets* and *Bar* exactly, procedural meshes of the same size and kind for the others.
+    /// The paper's sizes: the meshes *Jets* and *Bar* exactly, procedural meshes of similar size and kind for the
+    /// others.
     Paper,
-    /// The same, and Kuhn grids from a thousand to 12.3 million tetrahedra.
+    /// The meshes of [`Self::Paper`], and Kuhn grids from a thousand to 12.3 million tetrahedra.
     Full,
     /// Construction and location only, over Kuhn grids from a thousand to 12.3 million tetrahedra.
     Scaling,
@@ -32,7 +33,8 @@ impl Suite {
         if self == Self::Scaling { all.into_iter().filter(plain).collect() } else { all }
     }
 
-    /// Its meshes as [`crate::formats::load`] takes them, with the mesh of the paper that each stands for.
+    /// The meshes of the suite, in the form that [`crate::formats::load`] takes, each preceded by the mesh of the paper
+    /// that it stands for.
     pub fn meshes(self) -> Vec<(&'static str, &'static str)> {
         let paper = [
             ("Bar", "kuhn:32,32,80"),
@@ -59,25 +61,26 @@ impl Suite {
 
 named!(Suite, "suite", [Quick = "quick", Paper = "paper", Full = "full", Scaling = "scaling"]);
 
-/// Sizes of the questions, the same for every structure.
+/// Sizes of the queries, which are the same for every structure.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Settings {
-    /// Points to locate.
+    /// Number of points to locate.
     pub points: u32,
-    /// Width and height of the picture; 0: none is drawn, and none of its samples are located.
+    /// Width and height of the picture in pixels; 0: no picture is drawn, and none of its samples are located.
     pub picture: u32,
-    /// Voxels of a row of the slice; 0: none.
+    /// Voxels per row of the slice; 0: no slice.
     pub slice: u32,
-    /// Whether the overlap with the moved mesh is asked for.
+    /// Whether the overlap with the moved mesh is measured.
     pub overlap: bool,
-    /// Trees over meshes up to this size are compared with the reference, array by array.
+    /// Trees over meshes of up to this many tetrahedra are compared with the reference implementation, array by array.
     pub reference_tets: usize,
-    /// Per measurement.
+    /// Budget of each measurement.
     pub budget: Budget,
 }
 
 impl Settings {
-    /// Those of a suite; the paper's pictures have 1024² pixels, its slices 999² voxels, its medians 50 repetitions.
+    /// The settings of a suite. In the paper, pictures have 1024² pixels, slices 999² voxels, and medians 50
+    /// repetitions.
     pub fn of(suite: Suite) -> Self {
         if suite == Suite::Quick {
             let budget = Budget { repetitions: 50, seconds: 0.05 };

@@ -1,4 +1,4 @@
-//! Tables, for a terminal and as Markdown, and the numbers in them.
+//! Formatting of tables, for a terminal and as Markdown, and of the numbers in them.
 
 use std::fmt::Write as _;
 
@@ -10,11 +10,11 @@ pub(super) struct Table {
 }
 
 impl Table {
-    /// With columns for a terminal.
+    /// Appends the table with aligned columns, for a terminal.
     pub fn text(&self, out: &mut String) {
         let Self { title, header, rows } = self;
         let width = |c: usize| rows.iter().chain([header]).filter_map(|r| r.get(c)).map(|cell| cell.chars().count()).max().unwrap_or(0);
-        // More is not a width to `write!`.
+        // `write!` accepts no larger width.
         let widths: Vec<usize> = (0..header.len()).map(|c| width(c).min(usize::from(u16::MAX))).collect();
         let _ = writeln!(out, "\n{title}");
         for row in std::iter::once(header).chain(rows) {
@@ -26,7 +26,7 @@ impl Table {
         }
     }
 
-    /// As a section of Markdown.
+    /// Appends the table as a section of Markdown.
     pub fn markdown(&self, out: &mut String) {
         let Self { title, header, rows } = self;
         let _ = writeln!(out, "\n## {title}\n\n| {} |\n|---|{}", header.join(" | "), "---:|".repeat(header.len() - 1));
@@ -36,7 +36,7 @@ impl Table {
     }
 }
 
-/// A number with three significant digits, at least.
+/// Formats a number with at least two, usually three, significant digits.
 pub(super) fn number(x: f64) -> String {
     match x.abs() {
         a if !a.is_finite() => "–".into(),

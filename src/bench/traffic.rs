@@ -1,28 +1,32 @@
-//! The bytes that each stage of a construction must read and write at least, from the sizes of what it builds.
+//! The minimum number of bytes that each stage of a construction must read and write, derived from the sizes of what it
+//! builds.
 //!
-//! Every array that a dispatch uses is counted once for it, as if caches were perfect and no access were wasted: gathered vertices count once, and
-//! what one dispatch writes and the next one reads counts twice. So a stage at 100 % of the copy rate could not be faster without other passes, and
-//! what is missing to 100 % is arithmetic, scattered access, idle lanes, or barriers.
+//! Every array that a dispatch uses is counted once for it, as if caches were perfect and no access were wasted:
+//! gathered vertices count once, and data that one dispatch writes and the next one reads count twice. A stage at 100 %
+//! of the copy rate could therefore not be faster without other passes; what is missing to 100 % is due to arithmetic,
+//! scattered access, idle lanes, or barriers.
 //!
-//! With t tetrahedra, p points, n entries, N nodes, I of them internal, L leaves, l levels, s shares of candidates (at least one per tetrahedron, and one per
-//! 32 candidates), bytes are:
+//! With t tetrahedra, p points, n entries, N nodes (I of them internal), L leaves, l levels, and s shares of candidates
+//! (one per 32 candidates, and at least one per tetrahedron), the bytes are:
 //!
 //! | stage | reads and writes |
 //! |---|---|
 //! | `mesh.clear` | the table of faces 20 t, mates 16 t |
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
-//! | `mesh.boundary` | cells 16 t, vertices 16 p, faces 16 t and mates 16 t to and fro, neighbours 16 t to and fro |
+//! | `mesh.boundary` | cells 16 t, vertices 16 p; faces, mates and neighbours, each 16 t written and read |
 //! | `build.depth` | cells 16 t, points 12 p |
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan |
-//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; with marks 8^l / 8 bytes three times |
+//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
-//! | `build.sort` | per pass keys 4 n, pairs 8 n to and fro, the table of digits twice and its scan; after an odd number of passes a copy, 16 n |
+//! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after odd passes 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
-//! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; with quarters also codes 4 n, P 8 n, cells 16 t, vertices 16 p |
+//! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; quarters, if any: 12 n, cells 16 t, vertices 16 p |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
-//! A scan reads its values twice and writes them once: 12 bytes per value.
+//! A scan reads its values twice and writes them once: 12 bytes per value. "Digits" is the table of digit counts of the
+//! sort; an odd number of passes is followed by a copy of the pairs. Marks are used with boundary lists. Quarters read
+//! the codes (4 n) and read and write P (8 n).
 
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
 use crate::kernels::Target;
@@ -31,7 +35,7 @@ use crate::options::Lists;
 /// Bytes that a scan moves per value.
 const SCAN: u64 = 12;
 
-/// Least bytes of each stage of a tree's construction, in order, and of stage 0 before it.
+/// Minimum number of bytes of each stage of a tree's construction, in order, preceded by those of stage 0.
 pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&'static str, u64)> {
     let (input, status, options) = (mesh.input(), tree.status(), tree.options());
     let (t, p, n) = (u64::from(input.tets), u64::from(input.points), u64::from(status.entries));

@@ -1,4 +1,4 @@
-//! The answers of a structure, and whether they are right.
+//! The answers of a structure, and their verification.
 
 use super::structure::{Built, Kind, Structure, overlap};
 use super::structure_report::Lost;
@@ -12,23 +12,23 @@ use crate::reference::locate::{Locator, place};
 use crate::reference::tet::{Tet, Weights};
 use crate::slicing::INSIDE;
 
-/// Pictures may differ by this much per channel, and in one pixel of 1000 by more (SPEC 3.3).
+/// Allowed difference of pictures per channel; one pixel in 1000 may differ by more (SPEC 3.3).
 const COLOR: f32 = 2.0 / 255.0;
 
-/// What a structure answers; `None`: it cannot.
+/// The answers of a structure; `None`: the structure cannot answer the query.
 pub(super) struct Answers {
-    /// Of every set of points.
+    /// Owners of the points of every set.
     pub owners: Vec<Vec<u32>>,
-    /// Samples in the mesh; colours.
+    /// Number of samples in the mesh, and colours.
     pub picture: Option<(u64, Vec<[f32; 4]>)>,
     /// Kind and owner of every voxel.
     pub voxels: Option<(Vec<u8>, Vec<u32>)>,
-    /// Primitives that intersect the other mesh, of either.
+    /// Tetrahedra that intersect the other mesh, for each of the two meshes.
     pub overlap: Option<[Vec<u32>; 2]>,
 }
 
 impl Answers {
-    /// Asks everything once. `moved`: the same kind of structure over the moved mesh.
+    /// Answers every query once. `moved` is the same kind of structure over the moved mesh.
     pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: Option<&Structure>) -> Result<Self> {
         let owners = subject.points.iter().map(|(of, points)| structure.locate(&subject.device, points, *of).map(|found| found.owners));
         let owners = owners.collect::<Result<_>>()?;
@@ -50,29 +50,31 @@ impl Answers {
     }
 }
 
-/// Where the point lies in a cell; `None` for no cell, or far from all.
+/// Where a point lies in a tetrahedron; `None` for no tetrahedron, or for a point far from all.
 fn weights(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> Option<Weights> {
     let grid = subject.device.grid();
     let &ids = subject.mesh.tets.get(tet as usize)?;
     let corners = ids.map(|id| grid.normalise(subject.mesh.points[id as usize]));
-    // The order of the ids is all that matters.
+    // Only the order of the ids matters.
     let order = ids.map(|id| ids.iter().filter(|&&other| other < id).count() as u32);
     let mut by_order = [[0.0; 3]; 4];
     order.iter().zip(corners).for_each(|(&o, corner)| by_order[o as usize] = corner);
     place(grid, point).map(|(_, x)| Tet::new(order, &by_order).weights(x))
 }
 
-/// Whether the closed cell holds the point, by the exact test.
+/// Whether the closed tetrahedron contains the point, by the exact test.
 fn holds(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
     weights(subject, tet, point).is_some_and(|w| w.inside)
 }
 
-/// Whether a point outside of the cell is so near that a structure may take it in or leave it out; no cell leaves it out.
+/// Whether a point outside of a tetrahedron is so near to it that a structure may accept or reject it; `u32::MAX` means
+/// that it was rejected.
 fn near(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
     tet == u32::MAX || weights(subject, tet, point).is_some_and(|w| !w.inside && w.smallest() >= -TOLERANCE)
 }
 
-/// Compares with the answers of the first structure. Rays may lose points, and name any cell that holds a point.
+/// Compares answers with those of the first structure. Rays may lose points, and may name any tetrahedron that contains
+/// a point.
 pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers: &Answers) -> Result<Option<Lost>> {
     let wrong = |what: String| Err(Error::Mismatch(format!("{kind}: {what}")));
     let mut lost = Lost { points: 0, of: 0 };
@@ -84,9 +86,9 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
             let outside = [expected, found].iter().all(|&tet| near(subject, tet, point));
             match kind {
                 Kind::Rays(_) if found == u32::MAX => lost.points += u64::from(holding[0]),
-                // Where cells overlap, walks may end in another one.
+                // Where tetrahedra overlap, walks may end in another one.
                 Kind::Rays(_) | Kind::Octree { lists: Lists::Boundary, .. } if holding[1] => {}
-                // Outside by less than the tolerance, a point may be found from one leaf and not from another.
+                // A point that lies outside by less than the tolerance may be found from one leaf and not from another.
                 Kind::Octree { .. } | Kind::Lbvh if outside => {}
                 _ => return wrong(format!("point {point:?} lies in cell {expected}, not {found}")),
             }
@@ -115,7 +117,7 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
     Ok(matches!(kind, Kind::Rays(_)).then_some(lost))
 }
 
-/// Compares a tree and the owners found with it with the reference.
+/// Compares a tree, and the owners found with it, with the reference implementation.
 pub(super) fn check_tree(subject: &Subject<'_>, topology: &Topology, tree: &Tree, answers: &Answers) -> Result<()> {
     let options = tree.options();
     let host = tree.download()?;

@@ -1,4 +1,4 @@
-//! How a mesh is cut: boxes of cells, and the tetrahedra that each takes.
+//! Cutting a mesh into blocks: boxes of octree cells, and the tetrahedra of each.
 
 use crate::build::{
     BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, MAX_ENTRIES, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, Tree,
@@ -19,14 +19,15 @@ use std::borrow::Cow;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Entries of `Aabb` per tetrahedron; a body that fills its bounds has 8 at α = 0, and 32 on the level after that.
+/// A level with at most this many `Aabb` entries per tetrahedron counts as cheap. A body that fills its bounds has 8 at
+/// α = 0, and 32 on the next level.
 const CHEAP: u64 = 16;
 
-/// A mesh to be cut.
+/// A mesh to be cut into blocks.
 pub(super) struct Source<'a> {
     pub(super) mesh: &'a Mesh,
     pub(super) grid: Grid,
-    /// With the level of all trees.
+    /// Build options, with the level of all trees.
     pub(super) options: BuildOptions,
     pub(super) level: u32,
     topology: Topology,
@@ -41,7 +42,7 @@ impl Marks {
         let words: Vec<AtomicU32> = (0..mesh.points.len().div_ceil(32)).map(|_| AtomicU32::new(0)).collect();
         let mark = |v: u32| {
             let (word, bit) = (&words[v as usize / 32], 1 << (v % 32));
-            // Most are marked already.
+            // Most bits are already set.
             if word.load(Relaxed) & bit == 0 {
                 word.fetch_or(bit, Relaxed);
             }
@@ -60,14 +61,15 @@ impl Marks {
 }
 
 impl<'a> Source<'a> {
-    /// Chooses the level, for trees with these options within so many bytes of memory.
+    /// Chooses the level for trees with these options within `memory` bytes.
     pub(super) fn new(mesh: &'a Mesh, options: &BuildOptions, memory: u64) -> Result<Self> {
         let topology = Topology::bare(mesh)?;
         let grid = topology.grid;
         let cell = mesh.points.par_iter().map(|&p| grid.quantize(p).map(|q| q as u16)).collect();
         let vertices = Vertices { cell, normalised: Vec::new() };
         let sizes = measure(mesh, &topology, &vertices);
-        // Long lists cannot be told before there is a tree; but where leaves as fine as this have so few entries, either they are long or it costs little.
+        // Whether lists are long is not known before there is a tree. But where leaves this fine have so few entries,
+        // either coarser leaves had long lists, or the finer level costs little.
         let cheap = |level: &u32| options.fineness != Fineness::Alpha && sizes.entries[*level as usize] <= CHEAP * sizes.entries[0];
         let wanted = sizes.level(options)?.max((0..=MAX_LEVEL).rev().find(cheap).unwrap_or(0));
         let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
@@ -81,12 +83,12 @@ impl<'a> Source<'a> {
         (0..3).map(|c| f64::from(self.grid.hi[c]) - f64::from(self.grid.lo[c])).fold(0.0, f64::max)
     }
 
-    /// The cell of a point on the trees' level.
+    /// The octree cell of a point on the trees' level.
     pub(super) fn cell(&self, p: [f32; 3]) -> [u32; 3] {
         self.grid.quantize(p).map(|q| q >> (MAX_LEVEL - self.level))
     }
 
-    /// The whole mesh but its bad cells.
+    /// The whole mesh without its bad tetrahedra, as one block.
     pub(super) fn whole(&self) -> Block {
         let cells = CellRange { lo: [0; 3], hi: [(1 << self.level) - 1; 3] };
         let tets: Vec<u32> = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.topology.is_valid(t)).collect();
@@ -97,18 +99,18 @@ impl<'a> Source<'a> {
         self.vertices.cells(self.mesh.tets[tet as usize], self.level)
     }
 
-    /// What `cells` take of these tetrahedra.
+    /// Makes the block of `cells` from the tetrahedra `among`.
     fn block(&self, cells: CellRange, among: &[u32]) -> Block {
         let core: Vec<u32> = among.par_iter().copied().filter(|&t| cells.common(&self.cells_of(t)).is_some()).collect();
         let marks = Marks::of(self.mesh, &core);
-        // Whoever shares a face has three of its corners; the core has four.
+        // A tetrahedron that shares a face with the core has at least three of its points; the core itself has four.
         let beside = |t: &u32| self.mesh.tets[*t as usize].into_iter().filter(|&v| marks.holds(v)).count() >= 3;
         let tets: Vec<u32> = among.par_iter().copied().filter(beside).collect();
         let points = marks.count() + (tets.len() - core.len()) as u32;
         self.sized(cells, tets, points)
     }
 
-    /// A block of these tetrahedra, which have so many points at most.
+    /// A block of these tetrahedra, which have at most `points` points.
     fn sized(&self, cells: CellRange, tets: Vec<u32>, points: u32) -> Block {
         let extent =
             tets.par_iter().fold(Extent::default, |sum, &t| sum.with(cells, self.cells_of(t))).reduce(Extent::default, Extent::and);
@@ -117,14 +119,15 @@ impl<'a> Source<'a> {
             points,
             tets: tets.len(),
             candidates,
-            // Lists are long outside of the own cells, where the boundary of the block is, and where the surface of the mesh is.
+            // The candidates of tetrahedra that reach beyond the block's own cells are all counted as entries, since
+            // the block's boundary is there; of the others, only those near the surface of the mesh.
             entries: if self.options.lists == Lists::All { candidates } else { crossing + (candidates - crossing) / SURFACE },
             leaves: reach.map_or(0, |reach| u64::from(reach.count())),
         };
         Block { cells, span, tets: Rc::new(tets), size }
     }
 
-    /// The tetrahedra across the faces of each, as [`crate::reference::boundary::Topology`] has them.
+    /// The neighbours across the faces of each tetrahedron, as in [`crate::reference::boundary::Topology`].
     pub(super) fn neighbours(&self) -> Vec<[u32; 4]> {
         neighbours(self.mesh, &self.topology.valid)
     }
@@ -134,8 +137,9 @@ impl<'a> Source<'a> {
         self.topology.is_valid(tet)
     }
 
-    /// Two blocks for one that is to become so many in the end: with half of its tetrahedra, or as near to that as makes whole pieces; `None` if that does
-    /// not make it smaller. They are cut behind a cell of the finest grid on an axis that `may` allows.
+    /// Cuts a block, which is finally to become `pieces` blocks, in two: with half of its tetrahedra each, or as near
+    /// to that as whole numbers of pieces allow. `None` unless both are smaller than the block. The cut lies after a
+    /// cell of the finest grid on an axis, both of which `may` must allow.
     pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: &dyn Fn(usize, u32) -> bool) -> Option<[Block; 2]> {
         let span = block.span?;
         let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
@@ -165,37 +169,37 @@ impl<'a> Source<'a> {
     }
 }
 
-/// A box of cells and its tetrahedra.
+/// A box of octree cells and its tetrahedra.
 pub(super) struct Block {
-    /// Its own cells; blocks have none in common.
+    /// The block's own cells; blocks have no cells in common.
     pub(super) cells: CellRange,
-    /// Those of them that the core meets.
+    /// The part of `cells` that the core meets.
     span: Option<CellRange>,
-    /// Core and neighbours, ascending.
+    /// The core and its neighbours, ascending.
     pub(super) tets: Rc<Vec<u32>>,
-    /// What they amount to.
+    /// The quantities that its memory depends on.
     size: Size,
 }
 
-/// One in so many entries of a tree with all lists is taken to be left with lists where the surface is; Jets has one in 11 at α = 0, smaller meshes have
-/// more. What turns out larger is cut again.
+/// Estimate: of the entries with `Lists::All`, one in this many remains with `Lists::Boundary`. *Jets* has one in 11 at
+/// α = 0, smaller meshes have more. A block that turns out to be larger is cut again.
 const SURFACE: u64 = 8;
 
-/// Where the tetrahedra of a block are.
+/// The cells that the tetrahedra of a block meet.
 #[derive(Clone, Copy, Default)]
 struct Extent {
-    /// The cells of the block that they meet.
+    /// The bounding box of the block's own cells that they meet.
     span: Option<CellRange>,
-    /// All cells that they meet.
+    /// The bounding box of all cells that they meet.
     reach: Option<CellRange>,
-    /// How many those are, taken one by one.
+    /// The number of cells that they meet, summed over the tetrahedra.
     candidates: u64,
-    /// The same for tetrahedra that leave the block.
+    /// The part of that sum for tetrahedra that also meet other cells than the block's own.
     crossing: u64,
 }
 
 impl Extent {
-    /// With a tetrahedron of these cells.
+    /// Adds a tetrahedron that meets the cells `own`.
     fn with(self, block: CellRange, own: CellRange) -> Self {
         let (span, candidates) = (block.common(&own), u64::from(own.count()));
         let crossing = if span == Some(own) { 0 } else { candidates };
@@ -217,17 +221,17 @@ impl Extent {
     }
 }
 
-/// What the memory of a mesh and its tree depends on.
+/// The quantities that the memory of a mesh and its tree depends on.
 #[derive(Clone, Copy, Default)]
 struct Size {
-    /// At most.
+    /// Upper bound of the number of points.
     points: u32,
     tets: usize,
     /// Cells in the quantized boxes of all tetrahedra.
     candidates: u64,
-    /// About.
+    /// Estimated number of entries.
     entries: u64,
-    /// At most.
+    /// Upper bound of the number of leaves.
     leaves: u64,
 }
 
@@ -235,24 +239,24 @@ struct Size {
 pub(super) struct Placed {
     pub(super) mesh: DeviceMesh,
     pub(super) tree: Tree,
-    /// Which points and tetrahedra of the whole mesh a block has.
+    /// For a block, the ids of its points and tetrahedra in the whole mesh.
     ids: Option<[Rc<Vec<u32>>; 2]>,
 }
 
 impl Placed {
-    /// The whole mesh.
+    /// Uploads the whole mesh and builds its tree.
     pub(super) fn whole(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let tree = Tree::build(gpu, &device, options)?;
         Ok(Self { mesh: device, tree, ids: None })
     }
 
-    /// The tetrahedron of the whole mesh that is number `tet` here; "none" stays.
+    /// The id in the whole mesh of tetrahedron `tet` of this block; `NONE` stays `NONE`.
     pub(super) fn tet(&self, tet: u32) -> u32 {
         self.ids.as_ref().and_then(|[_, tets]| tets.get(tet as usize).copied()).unwrap_or(tet)
     }
 
-    /// The values of a field that lie here.
+    /// The part of a field's values that belongs to this block.
     pub(super) fn values<'v, T: Copy + Send + Sync>(&self, values: &'v [T], on: On) -> Cow<'v, [T]> {
         let Some([points, tets]) = &self.ids else { return Cow::Borrowed(values) };
         let ids = if on == On::Points { points } else { tets };
@@ -261,12 +265,12 @@ impl Placed {
 }
 
 impl Block {
-    /// About the most bytes that a tree takes while it is built.
+    /// Estimate of the most bytes in use while the block's tree is built.
     pub(super) fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
         self.size.bytes(gpu, options)
     }
 
-    /// The corners of its cells in the units of the mesh, where there is anything in them.
+    /// The corners of its cells in the units of the mesh; `None` if they contain nothing.
     pub(super) fn bounds(&self, source: &Source<'_>) -> Option<[[f64; 3]; 2]> {
         let span = self.span?;
         let [lo, hi] = [source.grid.lo, source.grid.hi].map(|p| p.map(f64::from));
@@ -274,7 +278,7 @@ impl Block {
         Some([[0, 1, 2].map(|c| at(c, span.lo[c])), [0, 1, 2].map(|c| at(c, span.hi[c] + 1))])
     }
 
-    /// A mesh of its own, and which points it has.
+    /// Extracts the block as a mesh, and the ids of its points.
     fn part(&self, mesh: &Mesh) -> (Mesh, Vec<u32>) {
         let marks = Marks::of(mesh, &self.tets);
         let points: Vec<u32> = (0..mesh.points.len() as u32).into_par_iter().filter(|&v| marks.holds(v)).collect();
@@ -288,7 +292,7 @@ impl Block {
         (Mesh::new(points.par_iter().map(|&v| mesh.points[v as usize]).collect(), tets), points)
     }
 
-    /// Brings it to the device and builds its tree.
+    /// Uploads the block and builds its tree.
     pub(super) fn place(&self, gpu: &Gpu, source: &Source<'_>) -> Result<Placed> {
         let (part, points) = self.part(source.mesh);
         let mesh = DeviceMesh::upload_in(gpu, &part, BadCells::Skip, Some(&source.grid))?;
@@ -297,21 +301,22 @@ impl Block {
     }
 }
 
-/// What a whole mesh takes at least, if its tree had no entries.
+/// Estimate of the least bytes that a whole mesh takes, as if its tree had no entries.
 pub(super) fn least_bytes(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Result<u64> {
     let points = u32::try_from(mesh.points.len()).unwrap_or(u32::MAX);
     Size { points, tets: mesh.tets.len(), ..Size::default() }.bytes(gpu, &BuildOptions { level: Some(0), ..*options })
 }
 
 impl Size {
-    /// About the most bytes that mesh and tree take while the tree is built; all there are if it cannot be numbered.
+    /// Estimate of the most bytes in use while the tree is built, the mesh included; `u64::MAX` if 32 bits cannot
+    /// number the mesh or the tree.
     fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
         let Self { points, tets, candidates, entries, leaves } = *self;
         if tets > MAX_TETS as usize || candidates > u64::from(u32::MAX) || entries > u64::from(MAX_ENTRIES) {
             return Ok(u64::MAX);
         }
         let (tets, candidates, entries, level) = (tets as u32, candidates as u32, entries as u32, options.level.unwrap_or(0));
-        // Each level has an eighth of the nodes of the next, or a few more.
+        // Each level has about an eighth of the nodes of the next.
         let nodes = leaves.min(u64::from(entries)) as u32 / 7 * 8 + 64;
         let capacity = Capacity { candidates, entries, nodes, level };
         let kept = 12 * u64::from(points) + 16 * u64::from(tets) + Arena::measure(|a| MeshArrays::carve(a, points, tets))?;
@@ -332,7 +337,7 @@ mod tests {
     use crate::mesh::kuhn_jittered;
     use crate::reference::boundary::{NONE, topology};
 
-    /// Without those around it, the core would have boundary where it is cut.
+    /// Without its neighbours, a core would have boundary tetrahedra at the cuts.
     #[test]
     fn a_core_has_the_neighbours_and_the_boundary_of_the_whole() {
         let mesh = kuhn_jittered([9, 8, 7], 0.2, 3).unwrap();

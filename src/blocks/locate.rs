@@ -1,4 +1,4 @@
-//! Points located in blocks.
+//! Point location in blocks.
 
 use super::cut::{Placed, Source, least_bytes};
 use super::{InBlocks, check_field, pieces, refusal, smaller};
@@ -10,9 +10,9 @@ use crate::query::{self, LocateOptions, Located};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{CHUNK, place};
 
-/// Bytes of device memory per point while points are located, and a reserve.
+/// Bytes of device memory per point during point location, with a reserve.
 const PER_POINT: u64 = 128;
-/// Fewer points at once are not worth a tree.
+/// Locating fewer points at a time is not worth a tree.
 const FEW: usize = 4096;
 
 /// Points of a mesh that may not fit the device.
@@ -20,18 +20,20 @@ const FEW: usize = 4096;
 pub struct Points<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
-    /// How its trees are built.
+    /// Options of its trees.
     pub options: BuildOptions,
-    /// Relative to the mesh's origin.
+    /// The points, relative to the mesh's origin.
     pub points: &'a [[f32; 3]],
-    /// How they are located.
+    /// Options of the location.
     pub how: LocateOptions,
 }
 
-/// The owner of each point, as [`query::locate`] finds them, within `memory` bytes of device memory. `report` is told how many points are done.
+/// Finds the owner of each point, as [`query::locate`] does, within `memory` bytes of device memory. `report` receives
+/// the number of points done, and of all.
 ///
 /// # Errors
-/// As [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+/// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
+/// too small for the smallest blocks.
 pub fn locate(
     gpu: &Gpu,
     memory: u64,
@@ -60,10 +62,11 @@ pub fn locate(
     Ok(took.with(all))
 }
 
-/// Every tetrahedron that contains each point, as [`query::locate_all`] finds them; of [`Points::how`] the tolerance counts.
+/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does; of [`Points::how`] only the
+/// tolerance is used.
 ///
 /// # Errors
-/// As [`locate`].
+/// Those of [`locate`].
 pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
     let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
@@ -76,10 +79,11 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u6
     Ok(took.with(all))
 }
 
-/// What is done with some points, their numbers before them, that lie in a block or the whole. It may be done again with fewer.
+/// The work on some points (their numbers, then their coordinates) that lie in a block or the whole mesh. It may be
+/// repeated with a part of the points.
 type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
 
-/// Asks the whole mesh, if it fits, or block after block.
+/// Queries the whole mesh, if it fits, or one block after another.
 fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), ask: Ask<'_>) -> Result<InBlocks> {
     let Points { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
@@ -93,7 +97,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
         }
     }
     let source = Source::new(mesh, options, memory)?;
-    // The others lie so far outside that they have no cell.
+    // The other points lie so far outside that they have no cell.
     let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
     let mut waiting = vec![(source.whole(), near)];
     while let Some((block, ids)) = waiting.pop() {
@@ -131,7 +135,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// As many points at once as what memory is left will take.
+    /// Queries the points in chunks that fit the memory that is left.
     fn ask(&mut self, placed: &Placed, ids: &[u32]) -> Result<()> {
         let input = placed.mesh.input();
         let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));

@@ -1,22 +1,31 @@
-//! Meshes that do not fit the device's memory, in blocks: built, asked and dropped one after the other, each within the bytes that may be used.
+//! Meshes that do not fit the device's memory, processed in blocks: these are built, queried and dropped one after
+//! another, each within a given number of bytes.
 //!
-//! Blocks divide the cells of the tree's level, a box of them each, cut in two by numbers of tetrahedra. A block has its *core*, every
-//! tetrahedron that meets its cells, and around it the tetrahedra that share a face with the core. So every leaf over the block's own cells lists what it
-//! lists in the tree over the whole mesh, and has the same boundary flag: neighbours of the core are all there. The ids of points and tetrahedra keep their
-//! order, the grid is that of the whole mesh, and the level is the whole tree's ([`crate::options::BuildOptions::level`]). Hence each point is asked of one block,
-//! and **answers are those of the whole tree**, tolerance and gaps between cells included.
+//! Each block is a box of octree cells on the tree's level; a box is cut in two by numbers of tetrahedra. A block
+//! contains its *core*, which is every tetrahedron whose quantized box meets these cells, and the tetrahedra that share
+//! a face with the core. A leaf in the block's own cells therefore has the same list as in the tree over the whole
+//! mesh, and the same boundary flag, since all neighbours of the core are present. The ids of points and tetrahedra
+//! keep their order, the grid is that of the whole mesh, and the level is that of the whole tree
+//! ([`crate::options::BuildOptions::level`]). Hence each point is located in one block, and **answers equal those of
+//! the whole tree**, including the tolerance and gaps between tetrahedra.
 //!
-//! - A voxel has its centre in one block, and its box may reach into several: each names the closest primitive that it lists in its own cells.
-//! - A sample of a ray lies in one block, and those of a block follow each other. Blocks are drawn front to back.
-//! - Two meshes overlap where their blocks do.
+//! - A voxel's centre lies in one block, but its box may reach into several: each block reports the closest tetrahedron
+//!   that it lists in its own cells.
+//! - A sample of a ray lies in one block, and the samples of a block are consecutive. Blocks are rendered front to
+//!   back.
+//! - Two meshes overlap where their blocks overlap.
 //!
-//! - A mesh that fits is not cut. Whether a block fits is estimated first; what turns out larger is given up and cut again.
-//! - The limit is kept by [`Gpu::with_memory`], which counts every buffer, transfers included.
-//! - The mesh itself lies in host memory as a whole, and beside it 6 bytes per point and 4 per tetrahedron; for a picture normals (12 bytes per point), rays
-//!   (48 bytes), and before it is drawn neighbours (16 bytes per tetrahedron, about three times that while they are matched).
-//! - The level may be coarser than asked for where the bits of its cells would take more than an eighth of the memory, and finer where lists may be long
-//!   ([`crate::options::BuildOptions::fineness`]): a plate would be one cell, which cannot be cut. In cells that overlap each other
-//!   [`crate::options::Lists::Boundary`] may name another of those that contain a point, as always.
+//! Memory and limits:
+//! - A mesh that fits is not cut. Whether a block fits is first estimated; a block that turns out to be larger is
+//!   abandoned and cut again.
+//! - The limit is enforced by [`Gpu::with_memory`], which counts every buffer, transfer buffers included.
+//! - The mesh itself is in host memory as a whole, with an additional 6 bytes per point and 4 per tetrahedron.
+//!   Rendering adds normals (12 bytes per point), rays (48 bytes each), and at the start neighbours (16 bytes per
+//!   tetrahedron, and about three times that while they are matched).
+//! - The level may be coarser than requested, if one bit for each of its cells would take more than an eighth of the
+//!   memory, and finer where lists may be long ([`crate::options::BuildOptions::fineness`]): a plate would be a single
+//!   cell, which cannot be cut. Where tetrahedra overlap, [`crate::options::Lists::Boundary`] may report another of
+//!   those that contain a point, as it may without blocks.
 
 mod cut;
 mod locate;
@@ -35,21 +44,21 @@ use crate::mesh::{Mesh, On};
 use cut::{Block, Source};
 use std::time::Instant;
 
-/// An answer, and what it took.
+/// An answer, and its cost.
 #[derive(Clone, Debug, Default)]
 pub struct InBlocks<T = ()> {
-    /// The same as of the whole mesh.
+    /// The answer, equal to that of the whole mesh.
     pub answer: T,
-    /// Trees that were built for it; 1 per mesh where it fitted as a whole.
+    /// Number of trees built for it; 1 per mesh if that fitted as a whole.
     pub trees: u32,
-    /// The most bytes of device memory in use at once.
+    /// The most bytes of device memory in use simultaneously.
     pub peak: u64,
-    /// Seconds for the trees, transfers included.
+    /// Seconds spent on building trees, transfers included.
     pub build_seconds: f64,
 }
 
 impl<T> InBlocks<T> {
-    /// The answer, and the rest.
+    /// Splits off the answer.
     pub fn into_parts(self) -> (T, InBlocks) {
         let Self { answer, trees, peak, build_seconds } = self;
         (answer, InBlocks { answer: (), trees, peak, build_seconds })
@@ -57,13 +66,13 @@ impl<T> InBlocks<T> {
 }
 
 impl InBlocks {
-    /// With an answer.
+    /// Adds an answer.
     #[must_use]
     pub fn with<T>(self, answer: T) -> InBlocks<T> {
         InBlocks { answer, trees: self.trees, peak: self.peak, build_seconds: self.build_seconds }
     }
 
-    /// Builds a tree and says what it took.
+    /// Builds a tree and adds its cost.
     fn build<T>(&mut self, build: impl FnOnce() -> Result<T>) -> Result<T> {
         let start = Instant::now();
         let built = build()?;
@@ -73,26 +82,26 @@ impl InBlocks {
     }
 }
 
-/// Tetrahedra of a block that is not cut again.
+/// A block of this many tetrahedra or fewer is not cut again.
 const LEAST: usize = 1024;
 
-/// How many blocks to make of one that takes `need` bytes where there are `memory`: as few as will do, each with a tenth to spare, since what lies where blocks
-/// are cut is in both. At least two, so that no block is left as it is.
+/// The number of blocks to make of one that takes `need` bytes where there are `memory`: as few as will do, each with a
+/// tenth to spare, since tetrahedra at a cut are in both blocks. At least two, so that every block is cut.
 fn pieces(need: u64, memory: u64) -> usize {
     (u128::from(need) * 11).div_ceil(u128::from(memory.max(1)) * 10).clamp(2, 64) as usize
 }
 
-/// The parts of a block that is worth being cut, which is to become so many.
+/// Cuts a block in two, if it is large enough, as a step towards `pieces` blocks.
 fn smaller(source: &Source<'_>, block: &Block, pieces: usize) -> Option<[Block; 2]> {
     if block.tets.len() > LEAST { source.cut_in_two(block, pieces, &|_, _| true) } else { None }
 }
 
-/// Refuses a field that is not the mesh's.
+/// Rejects a field whose length does not match the mesh.
 fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
     field.map_or(Ok(()), |(values, on)| on.check(values, [mesh.points.len(), mesh.tets.len()]))
 }
 
-/// Why there is no answer: a block of `tets` tetrahedra takes about `bytes`, or more than there are, and is not cut again.
+/// The error for a block of `tets` tetrahedra that takes about `bytes` (or more than there are) and is not cut again.
 fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
     let why = why.map_or_else(String::new, |e| format!(" ({e})"));
     let limit = gpu.memory_limit();

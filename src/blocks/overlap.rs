@@ -1,5 +1,6 @@
-//! Overlap of two meshes in blocks: pairs of blocks whose cells meet, the larger cut where a pair does not fit. What intersects lies in the cells of such a
-//! pair, so the answer is the union of theirs.
+//! Overlap of two meshes in blocks: all pairs of blocks whose cells meet are searched, and the larger block of a pair
+//! that does not fit is cut. Intersecting tetrahedra share a point, which lies in the cells of such a pair, so the
+//! result is the union of the pairs' results.
 
 use super::cut::{Block, Placed, Source, least_bytes};
 use super::{InBlocks, refusal, smaller};
@@ -11,12 +12,13 @@ use crate::query::{self, OverlapInput, Overlapped};
 use std::cell::OnceCell;
 use std::rc::Rc;
 
-/// Bytes per tetrahedron of both meshes that the search takes: [`query::OverlapMemory`], [`query::PairMemory`].
+/// Bytes per tetrahedron of both meshes that the search takes ([`query::OverlapMemory`], [`query::PairMemory`]).
 const PER_TET: u64 = 28;
-/// How far apart blocks may be, as a part of the extent of both meshes, that pairs which count as touching lie in: they are nearer than 1e-6 of the diagonal.
+/// The largest distance, relative to the sum of the meshes' extents, between blocks that are searched: pairs of
+/// tetrahedra count as touching if nearer than 1e-6 of the diagonal.
 const APART: f64 = 4e-6;
 
-/// A block, and its halves once they are asked for.
+/// A block, and its halves once they are needed.
 struct Node {
     block: Block,
     halves: OnceCell<Option<[Rc<Node>; 2]>>,
@@ -36,22 +38,24 @@ impl Node {
     }
 }
 
-/// Two meshes, which may not fit the device, and what is asked of them.
+/// Two meshes, which may not fit the device, and what to find.
 #[derive(Clone, Copy, Debug)]
 pub struct Meshes<'a> {
-    /// A and B, whose points lie in one space.
+    /// A and B, with points in one coordinate system.
     pub meshes: [&'a Mesh; 2],
-    /// How their trees are built.
+    /// Options of their trees.
     pub options: BuildOptions,
-    /// Whether all pairs are found.
+    /// Whether to find all pairs.
     pub pairs: bool,
 }
 
-/// Overlap of A and B, as [`query::overlap`] finds it, within `memory` bytes of device memory. Pairs nearer to touching than
-/// 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The effort is the sum over all pairs of blocks.
+/// Computes the overlap of A and B, as [`query::overlap`] does, within `memory` bytes of device memory. Pairs that are
+/// nearer to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported
+/// effort is the sum over all pairs of blocks.
 ///
 /// # Errors
-/// As [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+/// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
+/// memory is too small for the smallest blocks.
 pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Overlapped>> {
     let Meshes { meshes, ref options, pairs } = *asked;
     let gpu = &gpu.with_memory(memory);
@@ -121,14 +125,14 @@ fn input_of(placed: &Placed) -> OverlapInput<'_> {
     OverlapInput { mesh: &placed.mesh, tree: &placed.tree }
 }
 
-/// Whether the cells of two blocks are near enough for anything in them to touch.
+/// Whether the cells of two blocks are near enough for their contents to touch.
 fn meet(sources: &[Source<'_>; 2], nodes: &[Rc<Node>; 2], apart: f64) -> bool {
     let bounds = [0, 1].map(|i| nodes[i].block.bounds(&sources[i]));
     let [Some([a_lo, a_hi]), Some([b_lo, b_hi])] = bounds else { return false };
     (0..3).all(|c| a_lo[c] <= b_hi[c] + apart && b_lo[c] <= a_hi[c] + apart)
 }
 
-/// The overlap of two blocks in ids of the whole meshes. What is in device memory already stays there.
+/// The overlap of two blocks, in ids of the whole meshes. A block that is already in device memory is reused.
 fn visit(
     gpu: &Gpu,
     sources: &[Source<'_>; 2],

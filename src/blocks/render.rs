@@ -1,5 +1,6 @@
-//! Pictures in blocks, from the front to the back: of the two sides of a cut, the one that rays come from is drawn first, so each ray meets its blocks in
-//! order, and goes on in one where it stood after the last. A sample is taken by the block that has its cell. Between blocks, rays are in host memory.
+//! Rendering in blocks, front to back: of the two sides of a cut, the one that rays come from is rendered first, so
+//! each ray meets its blocks in order and continues in each from its state after the previous one. A sample is taken by
+//! the block that has its cell. Between blocks, rays are in host memory.
 
 use super::cut::{Block, Placed, Source, least_bytes};
 use super::{InBlocks, LEAST, check_field, pieces, refusal};
@@ -13,35 +14,36 @@ use crate::reference::ranges::visible;
 use crate::render::{Plan, Prepared, RenderSettings};
 use rayon::prelude::*;
 
-/// A field of a mesh that may not fit the device.
+/// The field of a mesh that may not fit the device, and how to render it.
 #[derive(Clone, Copy, Debug)]
 pub struct View<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
-    /// How its trees are built.
+    /// Options of its trees.
     pub options: BuildOptions,
-    /// What is drawn.
+    /// The field that is rendered.
     pub field: &'a Field,
-    /// How it is drawn.
+    /// Settings of the picture.
     pub settings: &'a RenderSettings,
 }
 
-/// A picture, and what it shows.
+/// A picture, and how it was made.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// Its colours.
+    /// The colours.
     pub drawn: Drawn,
-    /// What they are made by.
+    /// The plan that it was rendered with.
     pub plan: Plan,
     /// The field's values at the ends of the transfer function.
     pub range: [f32; 2],
 }
 
-/// Draws a picture as [`query::render`] does, within `memory` bytes of device memory. `report` is told how much of how much is done.
+/// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the amount of
+/// work done, and of all.
 ///
 /// # Errors
-/// As [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory is too little for the
-/// smallest of blocks.
+/// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
+/// sizes if the memory is too small for the smallest blocks.
 pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Picture>> {
     let View { mesh, ref options, field, settings } = *asked;
     check_field(mesh, Some((&field.values, field.on)))?;
@@ -55,7 +57,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
         }
     }
     let source = Source::new(mesh, options, memory)?;
-    // Light and opacity of a volume depend on what is on the surface, those of surfaces inside do not.
+    // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
     let prepared = Prepared::new(settings, mesh, &(&source.grid).into(), &neighbours, |t| source.is_valid(t as u32), field)?;
     drop(neighbours);
@@ -90,7 +92,7 @@ fn render_whole(placed: &Placed, asked: &View<'_>, report: &dyn Fn(u64, u64)) ->
     Ok(Picture { drawn, plan, range })
 }
 
-/// A picture that is drawn in blocks.
+/// The state of rendering a picture in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
     memory: u64,
@@ -102,7 +104,8 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Draws a block, or cuts it: the nearer part, then the farther one. One without anything to see is passed over.
+    /// Renders a block, or cuts it and returns the nearer part and the farther one. A block with nothing to see is
+    /// skipped.
     fn visit(&mut self, block: &Block, rays: &mut Rays) -> Result<Option<[Block; 2]>> {
         let met = if self.shows(block) { self.rows_met(block, rays) } else { Vec::new() };
         if !met.contains(&true) {
@@ -125,7 +128,7 @@ impl Job<'_> {
         Ok(Some(if order(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
     }
 
-    /// Draws what a block has of the picture. What is done if this fails is not done again by its parts.
+    /// Renders a block's part of the picture. Work that was done before a failure is not repeated by the block's parts.
     fn draw(&mut self, block: &Block, met: &[bool], rays: &mut Rays) -> Result<()> {
         let (Field { values, on, .. }, Prepared { plan, normals, .. }) = (self.field, self.prepared);
         let placed = self.took.build(|| block.place(self.gpu, self.source))?;
@@ -144,7 +147,8 @@ impl Job<'_> {
         Ok(())
     }
 
-    /// Whether a block has values that are drawn. A surface may lie between the samples of two blocks, so that neither can be left out.
+    /// Whether a block contains values that are drawn. An iso-surface may lie between the samples of two blocks, so
+    /// with iso-surfaces no block can be left out.
     fn shows(&self, block: &Block) -> bool {
         let Plan { iso, drawn, .. } = &self.prepared.plan;
         let Field { values, on, .. } = self.field;
@@ -157,12 +161,12 @@ impl Job<'_> {
         !iso.is_empty() || visible(&[block.tets.par_iter().map(range).reduce(|| NO_RANGE, union)], drawn) != [0]
     }
 
-    /// The rows of the picture with rays that may meet a block and are not opaque yet.
+    /// For each row of the picture, whether it has rays that may meet the block and are not yet opaque.
     fn rows_met(&self, block: &Block, rays: &Rays) -> Vec<bool> {
         let plan = &self.prepared.plan;
         let [width, height] = plan.size;
         let Some([lo, hi]) = block.bounds(self.source) else { return vec![false; height as usize] };
-        // More than rounding takes samples out of their cells.
+        // More than the distance by which rounding can move samples out of their cells.
         let more = self.source.extent() / 1024.0;
         let meets = |x: u32, y: u32| {
             let (origin, direction) = plan.rays.ray(x, y);
@@ -183,17 +187,18 @@ impl Job<'_> {
     }
 }
 
-/// Of no values.
+/// The range of no values.
 const NO_RANGE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 fn union(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Whether the cells up to `last` on an axis come before those behind it on all rays that meet both; `None` if on some they do, and on some they do not.
+/// Whether the cells up to `last` on an axis come before the cells after it on all rays that meet both; `None` if the
+/// order differs between rays.
 fn low_first(plan: &Plan, grid: &Grid, axis: usize, last: u32) -> Option<bool> {
     let [width, height] = plan.size;
-    // Cells are monotone along a ray, so where it begins and its direction tell what it can meet.
+    // Cells are monotone along a ray, so its origin and direction determine which side it can meet first.
     let goes = |x: u32, y: u32| {
         let (origin, direction) = plan.rays.ray(x, y);
         let low = grid.quantize(origin)[axis] <= last;

@@ -1,6 +1,7 @@
-//! Slices in blocks. The centre of a voxel is looked for in the block that has its cell; where it lies in no tetrahedron, every block that the voxel's box
-//! reaches into names the closest of those that touch it in its own cells, and the closest of all counts. As many layers as host memory is given for share the
-//! trees, since a tree takes longer than a layer.
+//! Slicing in blocks. The centre of a voxel is located in the block that has its cell. If it lies in no tetrahedron,
+//! every block that the voxel's box reaches into reports the closest tetrahedron that touches the box in the block's
+//! own cells, and the closest of all is taken. The trees are shared by as many layers as host memory is provided for,
+//! since a tree takes longer than a layer.
 
 use super::cut::{Block, Placed, Source, least_bytes};
 use super::{InBlocks, check_field, pieces, refusal, smaller};
@@ -16,7 +17,7 @@ use rayon::prelude::*;
 use std::cell::Cell;
 use std::rc::Rc;
 
-/// Voxels that share the trees of a mesh in blocks, 9 bytes of host memory each.
+/// Voxels that share the trees of a mesh in blocks; each takes 9 bytes of host memory.
 const BATCH: u64 = 1 << 24;
 
 /// A stack of layers through a mesh that may not fit the device.
@@ -24,21 +25,22 @@ const BATCH: u64 = 1 << 24;
 pub struct Stack<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
-    /// How its trees are built.
+    /// Options of its trees.
     pub options: BuildOptions,
-    /// A field.
+    /// The field to interpolate.
     pub field: Option<&'a Field>,
     /// The voxels.
     pub voxels: &'a VoxelGrid,
-    /// What a touched voxel gets.
+    /// The value that a touched voxel gets.
     pub extrapolate: Extrapolate,
 }
 
-/// Slices a mesh as [`query::slice`] does, within `memory` bytes of device memory. Hands the voxels to `sink` band by band, in order; `report` is told how
-/// many are done.
+/// Slices a mesh as [`query::slice`] does, within `memory` bytes of device memory. Passes the voxels to `sink` band by
+/// band, in order. `report` receives the number of voxels done, and of all.
 ///
 /// # Errors
-/// As [`query::slice`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too little for the smallest of blocks.
+/// Those of [`query::slice`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too
+/// small for the smallest blocks.
 pub fn slice(
     gpu: &Gpu,
     memory: u64,
@@ -79,29 +81,30 @@ pub fn slice(
     Ok(took.with(tally.get()))
 }
 
-/// A stack that is sliced in blocks.
+/// The state of slicing a stack in blocks.
 struct Job<'a> {
     gpu: &'a Gpu,
     memory: u64,
     asked: &'a Stack<'a>,
     source: &'a Source<'a>,
-    /// What the mesh is cut into so far; the last one may be in device memory.
+    /// The blocks that the mesh is cut into so far; the last one may be in device memory.
     blocks: Vec<Block>,
     placed: Option<(Rc<Vec<u32>>, Placed)>,
     took: InBlocks,
-    /// Voxels, also where only some of the blocks have been asked.
+    /// Voxels done, counted in part while only some of the blocks have been queried.
     done: f64,
     report: &'a dyn Fn(u64, u64),
 }
 
 impl Job<'_> {
-    /// Slices these rows by all blocks that they meet. A block that does not fit after all is cut, and its parts are asked again, which changes nothing.
+    /// Slices these rows with all blocks that they meet. If a block does not fit after all, it is cut and its parts are
+    /// queried, which may repeat work but does not change the result.
     fn batch(&mut self, rows: Rows) -> Result<Band> {
         let voxels = self.asked.voxels;
         let n = rows.count as usize * voxels.size[0] as usize;
         let mut all = Band { rows, values: vec![f32::NAN; n], kinds: vec![EMPTY; n], owners: vec![u32::MAX; n] };
         let (begun, end) = (self.done, self.done + n as f64);
-        // From the last one on: it may be there already.
+        // Starts from the last block, which may already be in device memory.
         let blocks = std::mem::take(&mut self.blocks);
         let share = n as f64 / blocks.len() as f64;
         let mut waiting: Vec<(Block, f64)> = blocks.into_iter().map(|block| (block, share)).collect();
@@ -135,7 +138,7 @@ impl Job<'_> {
         Ok(all)
     }
 
-    /// Asks a block.
+    /// Queries a block.
     fn visit(&mut self, block: &Block, all: &mut Band) -> Result<(), Option<Error>> {
         let Stack { field, voxels, extrapolate, .. } = *self.asked;
         let (grid, level) = (&self.source.grid, self.source.level);
@@ -164,7 +167,7 @@ impl Job<'_> {
     }
 }
 
-/// Adds what a block says of some voxels, from number `at` on.
+/// Merges a block's result for some voxels, starting at number `at`, into that of all blocks.
 fn merge(source: &Source<'_>, voxels: &VoxelGrid, all: &mut Band, at: usize, band: &Band) {
     let (width, height) = (voxels.size[0] as usize, voxels.size[1]);
     let to = at..at + band.kinds.len();
@@ -185,7 +188,7 @@ fn merge(source: &Source<'_>, voxels: &VoxelGrid, all: &mut Band, at: usize, ban
     });
 }
 
-/// Whether tetrahedron `t` is closer to a voxel's centre than `other`, as the kernel compares them.
+/// Whether tetrahedron `t` is closer to a voxel's centre than `other`, compared as the kernel does.
 fn is_closer(source: &Source<'_>, centre: [f32; 3], t: u32, other: u32) -> bool {
     let Source { mesh, grid, .. } = source;
     let centre = grid.normalise(centre);

@@ -1,4 +1,4 @@
-//! Stage 2, candidates: how many there are, which are entries, and coarser levels until those fit.
+//! Stage 2, candidates: counts them, decides which are entries, and goes to coarser levels until the entries fit.
 
 use super::mesh::{MeshArrays, MeshInput, MeshView};
 use super::plan::{CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, TreeMemory, filtered};
@@ -8,7 +8,8 @@ use crate::kernels::{Count as CountCells, CountSpec, Filter, FilterSpec, Fit, Fi
 use crate::options::BuildOptions;
 use crate::primitives::{Count, cmd_exclusive_scan};
 
-/// Stage 2, first part: how many candidates every tetrahedron has (or shares of them, where they are filtered), and where they begin.
+/// Stage 2, first part: the number of candidates of every tetrahedron (or of shares of them, where they are filtered),
+/// and the offset of its first.
 pub(crate) fn cmd_count(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -19,7 +20,7 @@ pub(crate) fn cmd_count(
     r.stage("build.count", |r| count_candidates(r, mesh, grid, options, scratch, Over::all(scratch)))
 }
 
-/// Stage 2 of all but the paper's lists: which candidates are entries; their number goes to `filter.entries`.
+/// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`.
 pub(crate) fn cmd_filter(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -36,7 +37,7 @@ pub(crate) fn cmd_filter(
     })
 }
 
-/// Stage 2, where entries may be more than there is room for: coarser levels, until they fit.
+/// Stage 2, where entries may exceed the capacity: counts and filters coarser levels until the entries fit.
 pub(crate) fn cmd_fit(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -66,13 +67,13 @@ pub(crate) fn cmd_fit(
     })
 }
 
-/// What is counted and filtered: all tetrahedra, or as many as the device says.
+/// What is counted and filtered: all tetrahedra, or as many as a word in device memory says.
 #[derive(Clone, Copy)]
 struct Over {
-    /// Word for the number of shares.
+    /// The word that receives the number of shares.
     total: BufferRef,
     coarser: Option<CoarserScratch>,
-    /// What a finer level has marked.
+    /// The marks that a finer level left and that must be cleared.
     marks: Option<BufferRef>,
 }
 
@@ -81,7 +82,8 @@ impl Over {
         Self { total: scratch.total, coarser: None, marks: None }
     }
 
-    /// Of the dispatch over so many items, one of the three that [`Fit`] plans.
+    /// The workgroups of a dispatch over `items` items; `slot` is its place among the three dispatches that [`Fit`]
+    /// plans.
     fn groups(&self, slot: u64, items: u32, workgroup: u32) -> Groups {
         self.coarser.map_or(Groups::Count(items.div_ceil(workgroup)), |coarser| Groups::Indirect(coarser.groups.part(12 * slot, 12)))
     }

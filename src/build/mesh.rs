@@ -1,4 +1,5 @@
-//! Stage 0: a mesh on the device — bad cells, bounds and grid, normalised vertices, neighbours and boundary bits (SPEC 2.1, 2.3).
+//! Stage 0: a mesh on the device. Finds bad tetrahedra, bounds and grid, normalised vertices, neighbours and boundary
+//! bits (SPEC 2.1, 2.3).
 
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
@@ -12,15 +13,15 @@ use crate::primitives::{Arena, cmd_fill};
 use crate::reference::boundary::{fault_of, set_bits};
 use std::sync::Arc;
 
-/// Most tetrahedra of one mesh: faces are numbered in 31 bits.
+/// Most tetrahedra of one mesh: a face number must fit 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
-/// Most workgroups of kernels that end in a sum over all cells.
+/// Most workgroups of a kernel that ends with a sum over all tetrahedra.
 const SUMMING_GROUPS: u32 = 256;
 
-/// A mesh as it lies in device memory, the caller's or ours.
+/// A mesh in device memory, owned by the caller or by this crate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshInput {
-    /// 32-bit floats; point i begins at float `i * stride`.
+    /// 32-bit floats; point i starts at float `i * stride`.
     pub positions: BufferRef,
     /// Floats from one point to the next, at least 3.
     pub stride: u32,
@@ -32,20 +33,20 @@ pub struct MeshInput {
     pub tets: u32,
 }
 
-/// What stage 0 makes of a mesh: parts of one range of memory, kept as long as trees and queries use the mesh.
+/// The results of stage 0 for a mesh: parts of one range of memory, needed as long as trees and queries use the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshArrays {
     /// Counters: [`MeshStatus`].
     pub status: BufferRef,
     /// [`Grid`] at the finest level.
     pub grid: BufferRef,
-    /// One bit per tetrahedron: left out.
+    /// One bit per tetrahedron: bad, and left out of every tree.
     pub bad: BufferRef,
-    /// One bit per tetrahedron: boundary primitive.
+    /// One bit per tetrahedron: boundary tetrahedron.
     pub boundary: BufferRef,
-    /// 16 bytes per point: normalised coordinates and the finest cell.
+    /// 16 bytes per point: normalised coordinates and the cell of the finest grid.
     pub vertices: BufferRef,
-    /// 16 bytes per tetrahedron: the neighbour across the face opposite to each vertex, or all ones.
+    /// 16 bytes per tetrahedron: the neighbour across the face opposite to each vertex, or `u32::MAX`.
     pub neighbours: BufferRef,
 }
 
@@ -67,12 +68,12 @@ impl MeshArrays {
     }
 }
 
-/// A mesh as recorded functions take it.
+/// A mesh as recording functions take it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshView {
     /// Points and cells.
     pub input: MeshInput,
-    /// What stage 0 made of them.
+    /// The results of stage 0.
     pub arrays: MeshArrays,
 }
 
@@ -84,8 +85,9 @@ pub struct MeshScratch {
 }
 
 impl MeshScratch {
-    /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a face; beyond 429 million of them,
-    /// if most do: an index is a signed word to shaders.
+    /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a
+    /// face. Beyond 429 million tetrahedra this holds only if most faces are shared, since the table is limited to 2^31
+    /// words: an index is a signed word to shaders.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.
@@ -95,12 +97,23 @@ impl MeshScratch {
     }
 }
 
-/// How many tetrahedra, one after the other, a workgroup of a kernel that sums over all cells takes; at least one.
+/// How many consecutive tetrahedra one workgroup of a kernel that sums over all tetrahedra takes; at least one
+/// workgroup's worth.
 pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
     tets.div_ceil(SUMMING_GROUPS).max(1).next_multiple_of(workgroup)
 }
 
-/// Refuses points that overlap, and those beyond what shaders can number: an index is a signed word to them.
+/// Rejects more tetrahedra than one mesh may have.
+pub(crate) fn check_tets(tets: u32) -> Result<()> {
+    if tets > MAX_TETS {
+        return Err(Error::TooLarge(format!(
+            "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks, see `blocks`"
+        )));
+    }
+    Ok(())
+}
+
+/// Rejects points that overlap, and more floats than shaders can number: an index is a signed word to them.
 pub(crate) fn check_points(what: &str, count: u32, stride: u32) -> Result<()> {
     if stride < 3 {
         return Err(Error::Invalid(format!("{what} {stride} floats apart; a point has three")));
@@ -111,16 +124,18 @@ pub(crate) fn check_points(what: &str, count: u32, stride: u32) -> Result<()> {
     Ok(())
 }
 
-/// Records stage 0. Reads `input` in compute shaders; writes `arrays` and `scratch` in transfers and compute shaders. The caller makes
-/// `input` visible before and ends with a barrier after.
+/// Records stage 0. Reads `input` in compute shaders; writes `arrays` and `scratch` with transfers and compute shaders.
+/// The caller makes `input` visible to compute shaders before, and records a barrier after.
 ///
 /// # Errors
-/// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra or 2^31 floats of positions; [`Error::Invalid`] for a stride below 3.
+/// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra or 2^31 floats of positions; [`Error::Invalid`] for a
+/// stride below 3.
 pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
     cmd_prepare(r, input, arrays, scratch, None)
 }
 
-/// As [`cmd_prepare_mesh`]; where there is a [`Grid`] already, over bounds that hold the mesh, with that one.
+/// Implements [`cmd_prepare_mesh`]. If `given` is a [`Grid`] over bounds that contain the mesh, that grid is used
+/// instead of a new one.
 fn cmd_prepare(
     r: &mut Recorder<'_>,
     input: &MeshInput,
@@ -129,11 +144,7 @@ fn cmd_prepare(
     given: Option<BufferRef>,
 ) -> Result<()> {
     let MeshInput { positions, stride, points, cells, tets } = *input;
-    if tets > MAX_TETS {
-        return Err(Error::TooLarge(format!(
-            "{tets} tetrahedra; one mesh holds {MAX_TETS} at most; more are taken in blocks, see `blocks`"
-        )));
-    }
+    check_tets(tets)?;
     check_points("positions", points, stride)?;
     let MeshArrays { status, grid, bad, boundary, vertices, neighbours } = *arrays;
     let workgroup = r.gpu().target().each;
@@ -183,14 +194,15 @@ fn cmd_prepare(
 /// What to do with bad cells (SPEC 2.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BadCells {
-    /// Leave them out, count them.
+    /// Leave them out and count them.
     #[default]
     Skip,
-    /// An error that names the first few.
+    /// Return an error that names the first few.
     Reject,
 }
 
-/// Where a mesh lies, and a share of its memory: while this is kept no other mesh gets that place, so that whose view is equal is the same mesh.
+/// The location of a mesh, and a share in the ownership of its memory. While this exists, no other mesh can occupy that
+/// location, so an equal view means the same mesh.
 #[derive(Clone, Debug)]
 pub(crate) struct KeptMesh {
     pub view: MeshView,
@@ -204,7 +216,8 @@ struct MeshMemory {
     arrays: Buffer,
 }
 
-/// A mesh in device memory of our own, prepared for trees and queries. What is built over it keeps that memory, too.
+/// A mesh in device memory owned by this crate, prepared for trees and queries. A tree built over it keeps that memory
+/// alive, too.
 #[derive(Debug)]
 pub struct DeviceMesh {
     gpu: Gpu,
@@ -215,7 +228,8 @@ pub struct DeviceMesh {
 }
 
 impl DeviceMesh {
-    /// Uploads a mesh and prepares it; one whose cells are in no order is faster as [`Mesh::along_curve`] gives it.
+    /// Uploads a mesh and prepares it. If the tetrahedra are in no spatial order, [`Mesh::along_curve`] gives an order
+    /// that is faster.
     ///
     /// # Errors
     /// [`Error::Memory`], [`Error::TooLarge`], or [`Error::BadCells`] if the policy rejects them.
@@ -223,11 +237,12 @@ impl DeviceMesh {
         Self::upload_in(gpu, mesh, policy, None)
     }
 
-    /// The same; with a grid, that one at the finest level instead of the grid over the mesh's bounds, which lie within it. Parts of one mesh in one grid have
-    /// the same cells and the same normalised points.
+    /// Uploads a mesh as [`DeviceMesh::upload`] does, optionally into a given grid at the finest level, whose bounds
+    /// must contain the mesh. Parts of a mesh that are uploaded into the same grid have the same octree cells and
+    /// normalised points.
     ///
     /// # Errors
-    /// As [`DeviceMesh::upload`].
+    /// Those of [`DeviceMesh::upload`].
     pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
         let number = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra; 32 bits number 2^32")));
         let (points, tets) = (number(mesh.points.len())?, number(mesh.tets.len())?);
@@ -260,7 +275,7 @@ impl DeviceMesh {
         Ok(made)
     }
 
-    /// The tetrahedra that were left out, ascending.
+    /// The bad tetrahedra, which were left out, in ascending order.
     ///
     /// # Errors
     /// A failed transfer.
@@ -268,7 +283,7 @@ impl DeviceMesh {
         Ok(set_bits(self.download(self.arrays().bad, u64::from(self.input().tets).div_ceil(32))?))
     }
 
-    /// Boundary bits, one per tetrahedron.
+    /// One bit per tetrahedron: boundary tetrahedron.
     ///
     /// # Errors
     /// A failed transfer.
@@ -276,7 +291,7 @@ impl DeviceMesh {
         self.download(self.arrays().boundary, u64::from(self.input().tets).div_ceil(32))
     }
 
-    /// The neighbours of every tetrahedron, four each.
+    /// The four neighbours of every tetrahedron.
     ///
     /// # Errors
     /// A failed transfer.
@@ -284,7 +299,8 @@ impl DeviceMesh {
         self.gpu.download(&self.kept.memory.arrays, self.arrays().neighbours.part(0, 16 * u64::from(self.input().tets)))
     }
 
-    /// Normalised coordinates of every point, x, y, z; the bits of the last word are its finest cell, 10 bits per axis from the lowest.
+    /// Normalised coordinates x, y, z of every point; the bits of the last word are its cell of the finest grid, 10
+    /// bits per axis, x lowest.
     ///
     /// # Errors
     /// A failed transfer.
@@ -296,27 +312,27 @@ impl DeviceMesh {
         self.gpu.download(&self.kept.memory.arrays, array.part(0, 4 * words))
     }
 
-    /// The device it lies on.
+    /// The device that the mesh lies on.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// Number of points and of tetrahedra.
+    /// Numbers of points and tetrahedra.
     pub(crate) fn sizes(&self) -> [usize; 2] {
         [self.input().points as usize, self.input().tets as usize]
     }
 
-    /// Both of the following, as what is recorded takes them.
+    /// [`DeviceMesh::input`] and [`DeviceMesh::arrays`] together, as recording functions take them.
     pub fn view(&self) -> MeshView {
         self.kept.view
     }
 
-    /// What is built over the mesh keeps this.
+    /// A share in the ownership of the mesh's memory, for trees over it.
     pub(crate) fn kept(&self) -> KeptMesh {
         self.kept.clone()
     }
 
-    /// Refuses what was built over another mesh. The view is one of a [`KeptMesh`].
+    /// Rejects a tree that was built over another mesh. The view is that of a [`KeptMesh`].
     pub(crate) fn check(&self, built_over: &MeshView) -> Result<()> {
         if *built_over == self.view() {
             Ok(())
@@ -325,27 +341,27 @@ impl DeviceMesh {
         }
     }
 
-    /// Refuses another device than the mesh's.
+    /// Rejects a device other than the mesh's.
     pub(crate) fn check_device(&self, gpu: &Gpu) -> Result<()> {
         if self.gpu.is_same_device(gpu) { Ok(()) } else { Err(Error::Invalid("the mesh lies on another device".into())) }
     }
 
-    /// Where points and cells lie.
+    /// The points and tetrahedra in device memory.
     pub fn input(&self) -> &MeshInput {
         &self.kept.view.input
     }
 
-    /// Where stage 0 left its arrays.
+    /// The results of stage 0 in device memory.
     pub fn arrays(&self) -> &MeshArrays {
         &self.kept.view.arrays
     }
 
-    /// The grid over the bounds, at the finest level.
+    /// The grid over the bounds (or the given one), at the finest level.
     pub fn grid(&self) -> &Grid {
         &self.grid
     }
 
-    /// Counts of bad, boundary, flat and negative cells.
+    /// Counts of bad, boundary, flat and negative tetrahedra.
     pub fn status(&self) -> &MeshStatus {
         &self.status
     }
@@ -355,7 +371,7 @@ impl DeviceMesh {
         &self.stages
     }
 
-    /// Bytes of the neighbour table, counted apart from the tree.
+    /// Bytes of the neighbour table, which the sizes of a tree do not include.
     pub fn neighbour_bytes(&self) -> u64 {
         16 * u64::from(self.input().tets)
     }

@@ -1,16 +1,20 @@
 //! Construction of the tree on the device (the paper's §3.2), as a pipeline of recorded stages.
 //!
 //! ```text
-//! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits   (once per mesh)
-//! 1 depth    estimate per tetrahedron → level l                                                            Eq. 11–12
-//! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds · fit] · emit (code, primitive) · stable radix sort    Eq. 1–6
-//! 3 splits   count node ends per level · scan · emit PO and CO in place                                    Eq. 7–10
-//! 4 leaves   boundary flags, quarters of entries, octants, boxes                                           Alg. 1
-//!   levels   flags, masks, boxes of the parents, level by level, a barrier between levels                  Alg. 2
-//! 5 ranges   smallest and largest value of a field per node: cells · down · up                             (once per field and time step)
+//! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits
+//!            (once per mesh)
+//! 1 depth    estimate per tetrahedron → level l                                                      Eq. 11–12
+//! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds · fit]               Eq. 1–6
+//!            · emit (code, tetrahedron) · stable radix sort
+//! 3 splits   count node ends per level · scan · emit PO and CO in place                              Eq. 7–10
+//! 4 leaves   boundary flags, quarters of entries, octants, boxes                                     Alg. 1
+//!   levels   flags, masks, boxes of the parents, level by level, with a barrier between levels       Alg. 2
+//! 5 ranges   smallest and largest value of a field per node: cells · down · up
+//!            (once per field and time step)
 //! ```
-//! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole pipeline within given capacities;
-//! [`Tree::build`] records the same stages in three or four submissions, and reads counts back between them to allocate exactly.
+//! Counts stay on the device: every dispatch whose size depends on one is indirect. [`cmd_build`] records the whole
+//! pipeline within given capacities. [`Tree::build`] records the same stages in three or four submissions and reads
+//! counts back between them, to allocate exactly what is needed.
 
 mod candidates;
 mod mesh;
@@ -44,12 +48,14 @@ pub struct BuildScratch {
 }
 
 impl BuildScratch {
-    /// For a mesh of `tets` tetrahedra, bad ones included, within `capacity` and that of `options`: with as many entries as tetrahedra or more there is
-    /// a tree whatever the mesh.
+    /// Takes the scratch memory for a mesh of `tets` tetrahedra, bad ones included, within `capacity` and the capacity
+    /// of `options`. If that is at least `tets` candidates, there is a tree for every mesh.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] for a capacity of fewer entries than tetrahedra, [`Error::Invalid`] if the arena is too small.
+    /// [`Error::TooLarge`] for a capacity of fewer entries than tetrahedra or for sizes that shaders cannot number,
+    /// [`Error::Invalid`] if the arena is too small or the level too deep.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
+        capacity.check(options)?;
         let room = options.capacity.unwrap_or(u32::MAX).min(capacity.candidates);
         if room < tets {
             let level = capacity.level;
@@ -66,12 +72,14 @@ impl BuildScratch {
     }
 }
 
-/// Records a whole build within the capacity of `tree`: nothing is submitted, waited for, allocated or read back. Where the heuristic's level would need
-/// more entries, a coarser one is built, down to the root alone, which has no more entries than there are tetrahedra; `tree.status` says what was, and that
-/// nothing was where a budget or [`Capacity::entries`] is too small for the root.
+/// Records a whole build within the capacity of `tree`: nothing is submitted, waited for, allocated or read back. Where
+/// the heuristic's level would need more entries, a coarser tree is built, down to the root alone, which has no more
+/// entries than there are tetrahedra. `tree.status` reports the level that was built, or, where a budget or
+/// [`Capacity::entries`] is too small for the root, that nothing was.
 ///
-/// `scratch` is carved for that capacity and these options. First use of `tree` and `scratch`: transfer and compute writes. `mesh` is read by compute shaders and transfers. The last use is a compute
-/// write, behind it stands a barrier to compute, transfer and indirect reads.
+/// `scratch` must be carved for that capacity and these options. The first use of `tree` and `scratch` is a transfer or
+/// compute write. `mesh` is read by compute shaders and transfers. The last use is a compute write, followed by a
+/// barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for α outside 0…10.

@@ -1,23 +1,27 @@
-//! Memory of a build: what the tree keeps, and what is scratch.
+//! Memory of a build: the arrays of the tree, and scratch memory.
 
+use super::mesh::check_tets;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
+use crate::reference::grid::MAX_LEVEL;
 
 /// Most entries of a tree: an index is a signed word to shaders.
 pub(crate) const MAX_ENTRIES: u32 = i32::MAX.cast_unsigned();
 
-/// Sizes that bound a build. A recorded one wants room for as many candidates as there are tetrahedra: [`super::BuildScratch::carve`] refuses less.
+/// Sizes that bound a build. A recorded build needs room for at least as many candidates as there are tetrahedra:
+/// [`super::BuildScratch::carve`] refuses less.
 #[derive(Clone, Copy, Debug)]
 pub struct Capacity {
-    /// Cells in the quantized boxes of all tetrahedra, the entries of `Aabb`. They take scratch memory only, 12 bytes for every 32 where they are
-    /// filtered.
+    /// Cells in the quantized boxes of all tetrahedra, which are the entries of `Aabb`. They take scratch memory only:
+    /// where they are filtered, 12 bytes for every 32 candidates.
     pub candidates: u32,
-    /// Entries of the assignment and the lists chosen. Where there is room for fewer than for candidates, a recorded build filters, counts, and filters the
-    /// next coarser level until they fit, which for each level down to the root's takes up to 17 dispatches, empty ones where they fit at once. One entry per
-    /// tetrahedron is enough for a tree, whatever the mesh.
+    /// Entries of the chosen assignment and lists. Where there is room for fewer entries than candidates, a recorded
+    /// build filters and counts, then goes to the next coarser level until the entries fit. This records up to 17
+    /// dispatches for each level down to the root's, which are empty once they fit. One entry per tetrahedron is enough
+    /// for a tree over any mesh.
     pub entries: u32,
     /// Nodes.
     pub nodes: u32,
@@ -28,17 +32,17 @@ pub struct Capacity {
 impl Capacity {
     /// Bounds for at most `entries` entries down to `level`: `n_n ≤ 1 + Σ min(n_m, 8^k)` (SPEC 2.4).
     pub fn for_entries(entries: u32, level: u32) -> Self {
-        let nodes = (1..=level).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
+        let nodes = (1..=level.min(MAX_LEVEL)).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
     }
 
-    /// WorkgroupLimits for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with lists where the boundary is; the trees of
-    /// others get coarser.
+    /// Room for [`usual_capacity`] candidates and 8 entries per tetrahedron, which is enough for most meshes with
+    /// `Lists::Boundary`; trees over other meshes get coarser.
     pub fn usual(tets: u32, level: u32) -> Self {
         Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).min(MAX_ENTRIES), level) }
     }
 
-    /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, so that whatever is built lies within them.
+    /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, whatever tree is built.
     ///
     /// # Errors
     /// [`crate::Error::TooLarge`] if not even a tree without entries fits.
@@ -50,36 +54,52 @@ impl Capacity {
         let (mut fits, mut beyond) = (0, MAX_ENTRIES + 1);
         while fits + 1 < beyond {
             let middle = fits + (beyond - fits) / 2;
-            if size(middle)? <= bytes { fits = middle } else { beyond = middle }
+            if size(middle).is_ok_and(|needed| needed <= bytes) { fits = middle } else { beyond = middle }
         }
         Ok(Self::for_entries(fits, level))
+    }
+
+    /// Rejects sizes that shaders cannot number.
+    pub(crate) fn check(&self, options: &BuildOptions) -> Result<()> {
+        if self.level > MAX_LEVEL {
+            return Err(Error::Invalid(format!("level {} is beyond {MAX_LEVEL}", self.level)));
+        }
+        let words = u64::from(self.entries).max(if options.boxes { 6 * u64::from(self.nodes) } else { 0 });
+        if words > u64::from(MAX_ENTRIES) {
+            let (entries, nodes) = (self.entries, self.nodes);
+            return Err(Error::TooLarge(format!(
+                "{entries} entries and {nodes} nodes; shaders number {MAX_ENTRIES} words of an array at most: a larger α makes fewer"
+            )));
+        }
+        Ok(())
     }
 }
 
 /// The arrays of a tree in device memory (SPEC 2.5), parts of one range.
 #[derive(Clone, Copy, Debug)]
 pub struct TreeMemory {
-    /// Which cells list a primitive.
+    /// The assignment of tetrahedra to grid cells.
     pub assign: Assign,
-    /// What there is room for.
+    /// The sizes that the arrays have room for.
     pub capacity: Capacity,
-    /// Which primitives a leaf lists.
+    /// The tetrahedra that a leaf lists.
     pub lists: Lists,
-    /// [`BuildStatus`]: what was built.
+    /// [`BuildStatus`]: the sizes of the tree that was built.
     pub status: BufferRef,
     /// [`Grid`] with the level of the leaves.
     pub grid: BufferRef,
-    /// Primitive ids by Morton code; where leaves within the mesh have no lists, quarters above them ([`crate::reference::quarters`]).
+    /// Tetrahedron ids in the order of the leaves' Morton codes; with `Lists::Boundary` and few enough tetrahedra, the
+    /// bits above an id are the quarters of its entry ([`crate::reference::quarters`]).
     pub p: BufferRef,
-    /// Ends of the leaves in `p`.
+    /// Offsets of the leaves' entries in `p` ([`crate::tree::TreeArrays::po`]).
     pub po: BufferRef,
-    /// Last children of the internal nodes.
+    /// Children of the internal nodes ([`crate::tree::TreeArrays::co`]).
     pub co: BufferRef,
     /// Boundary flags, one bit per node.
     pub flags: BufferRef,
     /// Masks of children, and of the octants of leaves, one byte per node.
     pub masks: BufferRef,
-    /// Boxes, 24 bytes per node, where they are stored.
+    /// Boxes, 24 bytes per node, if they are stored.
     pub boxes: Option<BufferRef>,
 }
 
@@ -92,23 +112,40 @@ impl TreeMemory {
         Ok((arena.take(size_of::<BuildStatus>() as u64)?, arena.take(size_of::<Grid>() as u64)?))
     }
 
-    /// Takes all arrays.
+    /// Takes all arrays from an arena.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`crate::Error::Invalid`] if the arena is too small or the level too deep, [`crate::Error::TooLarge`] if shaders
+    /// cannot number the entries or boxes.
     pub fn carve(arena: &mut Arena, capacity: &Capacity, options: &BuildOptions) -> Result<Self> {
-        let (status, grid) = Self::carve_head(arena)?;
+        let head = Self::carve_head(arena)?;
+        let p = arena.words(u64::from(capacity.entries))?;
         let nodes = u64::from(capacity.nodes);
-        // Leaves are not internal: what is left of the nodes bounds CO.
+        // At least one node is a leaf, so CO covers at most `nodes - 1` internal nodes.
         let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
+        let leaves = nodes.min(u64::from(capacity.entries.max(1)));
+        Self::carve_nodes(arena, head, p, [nodes, internal, leaves], capacity, options)
+    }
+
+    /// Takes the arrays for this many nodes, internal nodes and leaves; status, grid and entries are given.
+    pub(crate) fn carve_nodes(
+        arena: &mut Arena,
+        (status, grid): (BufferRef, BufferRef),
+        p: BufferRef,
+        [nodes, internal, leaves]: [u64; 3],
+        capacity: &Capacity,
+        options: &BuildOptions,
+    ) -> Result<Self> {
+        capacity.check(options)?;
+        let BuildOptions { assign, lists, .. } = *options;
         Ok(Self {
-            assign: options.assign,
+            assign,
             capacity: *capacity,
-            lists: options.lists,
+            lists,
             status,
             grid,
-            p: arena.words(u64::from(capacity.entries))?,
-            po: arena.words(nodes.min(u64::from(capacity.entries.max(1))) + 1)?,
+            p,
+            po: arena.words(leaves + 1)?,
             co: arena.words(internal + 1)?,
             flags: arena.words(nodes.div_ceil(32))?,
             masks: arena.words(nodes.div_ceil(4))?,
@@ -127,11 +164,13 @@ pub struct CountScratch {
 }
 
 impl CountScratch {
-    /// For a mesh of this many tetrahedra.
+    /// Takes the scratch memory for a mesh of `tets` tetrahedra.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`crate::Error::Invalid`] if the arena is too small, [`crate::Error::TooLarge`] for more tetrahedra than one
+    /// mesh may have.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, tets: u32) -> Result<Self> {
+        check_tets(tets)?;
         Ok(Self {
             offsets: arena.words(u64::from(tets) + 1)?,
             total: arena.words(1)?,
@@ -141,32 +180,33 @@ impl CountScratch {
     }
 }
 
-/// Candidates of one tetrahedron that the filter tests at once.
+/// Most candidates of a share; the filter tests the candidates of one tetrahedron in shares.
 pub(crate) const SHARE: u32 = 32;
 
-/// Whether candidates have to be tested before they are entries; only the paper's lists take them all.
+/// Whether candidates have to be tested before they become entries; only the paper's lists take all of them.
 pub(crate) fn filtered(options: &BuildOptions) -> bool {
     options.assign != Assign::Aabb || options.lists != Lists::All
 }
 
-/// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron, and for `Lists::Boundary` another one, and one bit per cell
-/// of the level of the leaves.
+/// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron; for `Lists::Boundary` a
+/// third one, and one bit per cell of the leaves' level.
 #[derive(Clone, Copy, Debug)]
 pub struct FilterScratch {
-    /// Most shares.
+    /// Capacity in shares.
     pub(crate) most: u32,
     pub(crate) hits: BufferRef,
     pub(crate) counts: BufferRef,
     pub(crate) entries: BufferRef,
     pub(crate) arguments: BufferRef,
     pub(crate) seeds: Option<SeedScratch>,
-    /// Where entries may be too many.
+    /// Present where the entries may exceed the capacity.
     pub(crate) coarser: Option<CoarserScratch>,
     pub(crate) scan: ScanScratch,
 }
 
 impl FilterScratch {
-    /// For a mesh of `tets` tetrahedra and the candidates and the level of `capacity`; nothing where every candidate is an entry.
+    /// Takes the scratch memory for a mesh of `tets` tetrahedra and for the candidates and the level of `capacity`;
+    /// `None` if every candidate is an entry.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -174,7 +214,7 @@ impl FilterScratch {
         if !filtered(options) {
             return Ok(None);
         }
-        // All full but the last one of each.
+        // All shares of a tetrahedron but its last are full.
         let most = tets.saturating_add(capacity.candidates / SHARE);
         let seeds = if options.lists == Lists::Boundary { Some(SeedScratch::carve(arena, most, capacity.level)?) } else { None };
         Ok(Some(Self {
@@ -190,12 +230,12 @@ impl FilterScratch {
     }
 }
 
-/// What it takes to filter coarser levels until the entries fit.
+/// Scratch memory to filter coarser levels until the entries fit.
 #[derive(Clone, Copy, Debug)]
 pub struct CoarserScratch {
-    /// Tetrahedra of the try and one, or 0 where there is none.
+    /// The number of tetrahedra plus one while another level is to be tried, otherwise 0.
     pub(crate) live: BufferRef,
-    /// Of its three dispatches over tetrahedra.
+    /// Workgroups of the three dispatches that such a try takes over tetrahedra.
     pub(crate) groups: BufferRef,
     pub(crate) shares: BufferRef,
     pub(crate) entries: BufferRef,
@@ -207,12 +247,12 @@ impl CoarserScratch {
     }
 }
 
-/// What `Lists::Boundary` takes besides.
+/// Additional scratch memory of `Lists::Boundary`.
 #[derive(Clone, Copy, Debug)]
 pub struct SeedScratch {
-    /// One bit per cell that the boundary touches.
+    /// One bit per cell: the mesh surface may pass through it.
     pub(crate) marks: BufferRef,
-    /// Shares with centres in doubt, and their number.
+    /// Shares with cell centres whose owner needs a closer look; their number is in `doubt_count`.
     pub(crate) doubts: BufferRef,
     pub(crate) doubt_count: BufferRef,
 }
@@ -230,21 +270,22 @@ pub struct SortedScratch {
     pub(crate) codes: BufferRef,
     pub(crate) sort: SortScratch,
     pub(crate) splits: BufferRef,
-    /// Length of the table of splits, and the total of its scan.
+    /// Length of the table of splits; the total of its scan is in `node_total`.
     pub(crate) table_length: BufferRef,
     pub(crate) node_total: BufferRef,
     pub(crate) groups: BufferRef,
-    /// Of the dispatch that emits codes; of those over sorted entries.
+    /// Workgroups of the dispatch that emits codes; those of the dispatches over sorted entries are in `arguments`.
     pub(crate) emit_arguments: BufferRef,
     pub(crate) arguments: BufferRef,
     pub(crate) scan: ScanScratch,
 }
 
 impl SortedScratch {
-    /// For this many entries and levels.
+    /// Takes the scratch memory for this capacity.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small, [`crate::Error::TooLarge`] for 2^31 entries and more.
+    /// [`crate::Error::Invalid`] if the arena is too small, [`crate::Error::TooLarge`] for 2^31 entries and more, or
+    /// for more counts than shaders can number.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, capacity: &Capacity) -> Result<Self> {
         if capacity.entries > MAX_ENTRIES {
             return Err(Error::TooLarge(format!(

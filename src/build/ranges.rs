@@ -1,4 +1,5 @@
-//! The range of a field's values in every node of a tree (a min–max octree): new values need this alone, not a new tree.
+//! The range of a field's values in every node of a tree (a min–max octree). New values need new ranges, but no new
+//! tree.
 
 use super::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
@@ -6,22 +7,26 @@ use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{MergeRanges, MergeRangesSpec, PushRanges, PushRangesSpec, ScatterRanges, ScatterRangesSpec};
 use crate::mesh::On;
 
-/// Bytes of the ranges of so many nodes: the smallest and the largest value of each, as floats.
+/// Bytes of the ranges of `nodes` nodes: the smallest and the largest value of each, as floats.
 pub fn range_bytes(nodes: u32) -> u64 {
     8 * u64::from(nodes)
 }
 
-/// Records the ranges of a field (one float per point of the mesh or per tetrahedron) into `ranges`, [`range_bytes`] for the nodes of the tree's
-/// capacity; what they hold is said in [`mod@crate::reference::ranges`]. Needs no scratch memory.
+/// Records the computation of a field's ranges (one float per point or per tetrahedron of the mesh) into `ranges`,
+/// which has [`range_bytes`] for the nodes of the tree's capacity. Their definition is in
+/// [`mod@crate::reference::ranges`]. Needs no scratch memory.
 ///
-/// First use of `ranges`: a transfer write. Mesh, tree and field are read by compute shaders. The last use is a compute write, behind it stands a barrier
-/// to compute, transfer and indirect reads.
+/// The first use of `ranges` is a transfer write. Mesh, tree and field are read by compute shaders. The last use is a
+/// compute write, followed by a barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
-/// [`Error::Vulkan`] if a pipeline cannot be made.
+/// [`Error::TooLarge`] for more nodes than shaders can number, [`Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (field, on): (BufferRef, On), ranges: BufferRef) -> Result<()> {
     let (input, bad, workgroup) = (mesh.input, mesh.arrays.bad, r.gpu().target().each);
     let TreeMemory { capacity, status, grid, co, masks, .. } = *tree;
+    if capacity.nodes > i32::MAX.cast_unsigned() / 2 {
+        return Err(Error::TooLarge(format!("ranges of {} nodes; shaders number {} at most", capacity.nodes, i32::MAX / 2)));
+    }
     let of_level = |level: u32| Groups::Count(8u64.pow(level).min(u64::from(capacity.nodes)).div_ceil(u64::from(workgroup)) as u32);
     r.stage("build.ranges", |r| {
         r.fill(ranges.part(0, range_bytes(capacity.nodes)), 0);
@@ -55,7 +60,7 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
     })
 }
 
-/// The ranges of a field in device memory of our own.
+/// The ranges of a field in device memory owned by this crate.
 #[derive(Debug)]
 pub struct FieldRanges {
     gpu: Gpu,
@@ -64,7 +69,7 @@ pub struct FieldRanges {
 }
 
 impl FieldRanges {
-    /// The ranges of a field (values per point or per tetrahedron) over a tree.
+    /// Computes the ranges of a field (one value per point or per tetrahedron) over a tree.
     ///
     /// # Errors
     /// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
@@ -76,12 +81,14 @@ impl FieldRanges {
         Ok(made)
     }
 
-    /// The same for new values, in the same memory. The tree must be the one that the ranges were made for.
+    /// Recomputes the ranges for new values, in the same memory. The tree must be the one that the ranges were made
+    /// for.
     ///
     /// # Errors
-    /// As [`FieldRanges::new`].
+    /// Those of [`FieldRanges::new`].
     pub fn update(&mut self, mesh: &DeviceMesh, tree: &Tree, (values, on): (&[f32], On)) -> Result<()> {
         mesh.check(tree.mesh())?;
+        mesh.check_device(&self.gpu)?;
         on.check(values, mesh.sizes())?;
         if self.buffer.size() < range_bytes(tree.status().nodes) {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
@@ -92,12 +99,12 @@ impl FieldRanges {
         Ok(())
     }
 
-    /// Where they lie: two floats per node.
+    /// The ranges in device memory: two floats per node.
     pub fn memory(&self) -> BufferRef {
         self.buffer.all()
     }
 
-    /// `[smallest, largest]` of every node, `[∞, −∞]` of those without a value.
+    /// `[smallest, largest]` of every node, `[∞, −∞]` for a node without a value.
     ///
     /// # Errors
     /// A failed transfer.

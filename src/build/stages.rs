@@ -1,4 +1,5 @@
-//! The stages of a build as functions that append to a recorder, but for what chooses entries ([`super::candidates`]); [`super`] puts them in order.
+//! The stages of a build as functions that append to a recorder. Those that choose the entries are in
+//! [`super::candidates`]; [`super`] calls them in order.
 
 use super::mesh::{MeshInput, MeshView, summing_share};
 use super::plan::{CountScratch, FilterScratch, SortedScratch, TreeMemory};
@@ -14,10 +15,10 @@ use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::reference::quarters::id_mask;
 
-/// An α with which cells of any size ask for level 10, in units of 1/65536.
+/// An α with which tetrahedra of any size lead to level 10, in units of 1/65536.
 const FINEST: i32 = -(11 << 16);
 
-/// Stage 1: the level of the leaves (§3.2; SPEC 2.4), into `grid` and `status`.
+/// Stage 1: chooses the level of the leaves (§3.2; SPEC 2.4) and writes it to `grid` and `status`.
 pub(crate) fn cmd_depth(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -30,7 +31,7 @@ pub(crate) fn cmd_depth(
     let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
     let fixed = options.alpha_fixed()?;
-    // A level that is asked for is the deepest, and an α below 0 wants the deepest whatever the cells.
+    // A requested level replaces the deepest one, and an α below 0 chooses the deepest level whatever the tetrahedra.
     let (alpha, deepest) = options.level.map_or((fixed, deepest), |level| (FINEST.cast_unsigned(), deepest.min(level)));
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
     let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
@@ -66,7 +67,7 @@ pub(crate) fn cmd_depth(
     })
 }
 
-/// Stage 2, second part: codes and primitive ids of all entries, sorted by code.
+/// Stage 2, second part: codes and tetrahedron ids of all entries, sorted by code.
 pub(crate) fn cmd_codes(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -122,12 +123,13 @@ pub(crate) fn cmd_codes(
     r.stage("build.sort", |r| cmd_sort_pairs(r, codes, ids, 3 * capacity.level, entries, &scratch.sort))
 }
 
-/// The number of entries as the device knows it.
+/// The number of entries, in device memory.
 pub(crate) fn entries(tree: &TreeMemory, counts: &CountScratch, filter: Option<&FilterScratch>) -> Count {
     Count::device(tree.capacity.entries, filter.map_or(counts.candidates, |f| f.entries))
 }
 
-/// Stage 3, first part: how many nodes end where on each level; `NO` and the number of nodes, into `status`.
+/// Stage 3, first part: counts the nodes that end at each run of entries on each level; writes `NO` and the number of
+/// nodes to `status`.
 pub(crate) fn cmd_count_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count, scratch: &SortedScratch) -> Result<()> {
     let TreeMemory { status, grid, capacity, .. } = *tree;
     let target = r.gpu().target();
@@ -148,7 +150,7 @@ pub(crate) fn cmd_count_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries:
             run,
         };
         r.dispatch(&plan, PlanNodesSpec { workgroup: once, stage: 0, each: target.each, ..Default::default() }, Groups::Count(1))?;
-        // The words serve the splits and the leaves too.
+        // The indirect arguments are used again for the splits and the leaves.
         let groups = entries.groups(r, target.run.tile(), scratch.arguments, "codes.sort → splits.count")?;
         let count = CountSplits { grid, entries: live, codes, counts: splits, capacity: capacity.entries };
         r.dispatch(&count, CountSplitsSpec { workgroup: target.run.workgroup, rows: run }, groups)?;
@@ -162,7 +164,7 @@ pub(crate) fn cmd_count_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries:
     })
 }
 
-/// Stage 3, second part: `PO` and `CO`.
+/// Stage 3, second part: writes `PO` and `CO`.
 pub(crate) fn cmd_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count, scratch: &SortedScratch) -> Result<()> {
     let target = r.gpu().target().run;
     let TreeMemory { status, grid, po, co, capacity, .. } = *tree;
@@ -190,7 +192,7 @@ pub(crate) fn cmd_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count
     })
 }
 
-/// Stage 4, first part: leaves (Alg. 1).
+/// Stage 4, first part: the leaves (Alg. 1).
 pub(crate) fn cmd_leaves(
     r: &mut Recorder<'_>,
     mesh: &MeshView,
@@ -201,7 +203,7 @@ pub(crate) fn cmd_leaves(
 ) -> Result<()> {
     let target = r.gpu().target();
     let TreeMemory { status, grid, p, po, flags, masks, .. } = *tree;
-    // Leaves of marked cells are those with boundary primitives.
+    // The cells marked by the filter are those with boundary tetrahedra.
     let marks = filter.and_then(|f| f.seeds).map(|s| s.marks);
     r.stage("build.leaves", |r| {
         let groups = Groups::Indirect(scratch.arguments.part(0, 12));
@@ -227,7 +229,7 @@ pub(crate) fn cmd_leaves(
     })
 }
 
-/// Stage 4, second part: internal nodes, level by level upwards (Alg. 2).
+/// Stage 4, second part: the internal nodes, level by level upwards (Alg. 2).
 pub(crate) fn cmd_levels(r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
     let workgroup = r.gpu().target().each;
     let TreeMemory { status, grid, po, co, flags, masks, .. } = *tree;

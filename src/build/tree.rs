@@ -1,4 +1,4 @@
-//! A tree in device memory of our own.
+//! A tree in device memory owned by this crate.
 
 use super::candidates::{cmd_count, cmd_filter};
 use super::mesh::{DeviceMesh, KeptMesh, MeshView};
@@ -30,7 +30,7 @@ pub struct Tree {
     node_buffer: Buffer,
 }
 
-/// Scratch or tree memory carved to measure.
+/// Allocates a buffer of exactly the size that `carve` takes, and carves it.
 fn reserve<T>(gpu: &Gpu, name: &str, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<(Buffer, T)> {
     let buffer = gpu.buffer(name, Arena::measure(&carve)?)?;
     let parts = carve(&mut Arena::new(buffer.all()))?;
@@ -42,16 +42,17 @@ fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Resul
 }
 
 impl Tree {
-    /// Builds a tree over a mesh: in four submissions (three with the paper's lists, where every candidate is an entry), between them the numbers of
-    /// candidates, entries and nodes are read back, so that exactly what is needed is allocated. Where
-    /// [`BuildOptions::fineness`] asks for a finer one, that is built after it, if there is memory for both.
+    /// Builds a tree over a mesh in four submissions (three if every candidate is an entry, as with the paper's lists).
+    /// Between them the numbers of candidates, entries and nodes are read back, so that exactly the needed memory is
+    /// allocated. If [`BuildOptions::fineness`] calls for a finer tree, that is built afterwards, provided there is
+    /// memory for both.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity,
-    /// [`crate::Error::Memory`] if it does not fit the device.
+    /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree
+    /// does not fit 32-bit entries or the given capacity, [`crate::Error::Memory`] if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let mut tree = Self::build_once(gpu, mesh, options)?;
-        let mut room = MAX_LEVEL; // the finest level that there is memory for
+        let mut room = MAX_LEVEL; // the finest level that fits the memory
         while let Some(finer) = tree.finer() {
             let level = finer.level.unwrap_or(MAX_LEVEL).min(room);
             if level <= tree.status.level {
@@ -70,7 +71,7 @@ impl Tree {
         Ok(tree)
     }
 
-    /// The options of a finer tree, if that suits better.
+    /// The options of a finer tree, if one suits better.
     fn finer(&self) -> Option<BuildOptions> {
         let BuildStatus { level, entries, leaves, .. } = self.status;
         finer(&self.options, level, u64::from(entries), u64::from(leaves), &candidates(&self.status))
@@ -82,7 +83,7 @@ impl Tree {
         let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
         let mut stages = Vec::new();
 
-        // Depth and counts: the level, and the number of candidates.
+        // First submission: the level, and the number of candidates.
         let (head, (status, grid)) = reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
         let (counts_buffer, counts) = reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
         let ((), time) = gpu.submit("olbvh.build.counts", |r| {
@@ -95,7 +96,7 @@ impl Tree {
         let level = measured.level;
         let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
 
-        // Which candidates are entries.
+        // Second submission: which candidates are entries.
         let (filter_buffer, filter) = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         if let Some(filter) = &filter {
             let ((), time) = gpu.submit("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
@@ -103,7 +104,7 @@ impl Tree {
             capacity.entries = first(gpu, &filter_buffer, filter.entries)?;
         }
 
-        // Codes and the number of nodes. P is the tree's; the rest is scratch.
+        // Third submission: codes, and the number of nodes. P is part of the tree; the rest is scratch memory.
         capacity.nodes = Capacity::for_entries(capacity.entries, level).nodes;
         let entry_buffer = gpu.buffer("olbvh.tree.p", 4 * u64::from(capacity.entries.max(4)))?;
         let (sorted_buffer, sorted) = reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
@@ -131,23 +132,11 @@ impl Tree {
         refuse_overflow(&planned, options)?;
         capacity.nodes = planned.nodes;
 
-        // Nodes.
+        // Fourth submission: the nodes.
         let carve_nodes = |a: &mut Arena| {
-            let (status, grid) = TreeMemory::carve_head(a)?;
-            let (nodes, internal, leaves) = (u64::from(planned.nodes), u64::from(planned.internal), u64::from(planned.leaves));
-            Ok(TreeMemory {
-                assign,
-                capacity,
-                lists,
-                status,
-                grid,
-                p: entry_buffer.all(),
-                po: a.words(leaves + 1)?,
-                co: a.words(internal + 1)?,
-                flags: a.words(nodes.div_ceil(32))?,
-                masks: a.words(nodes.div_ceil(4))?,
-                boxes: if options.boxes { Some(a.words(6 * nodes)?) } else { None },
-            })
+            let head = TreeMemory::carve_head(a)?;
+            let sizes = [planned.nodes, planned.internal, planned.leaves].map(u64::from);
+            TreeMemory::carve_nodes(a, head, entry_buffer.all(), sizes, &capacity, options)
         };
         let (node_buffer, memory) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
         let ((), time) = gpu.submit("olbvh.build.nodes", |r| {
@@ -177,7 +166,7 @@ impl Tree {
         })
     }
 
-    /// The arrays in host memory.
+    /// Reads the arrays back to host memory.
     ///
     /// # Errors
     /// A failed transfer.
@@ -205,22 +194,22 @@ impl Tree {
         })
     }
 
-    /// The device.
+    /// The device that the tree lies on.
     pub fn gpu(&self) -> &Gpu {
         &self.gpu
     }
 
-    /// The mesh it was built over.
+    /// The mesh that the tree was built over.
     pub(crate) fn mesh(&self) -> &MeshView {
         &self.mesh.view
     }
 
-    /// Where the arrays lie.
+    /// The arrays in device memory.
     pub fn memory(&self) -> &TreeMemory {
         &self.memory
     }
 
-    /// What was built.
+    /// The sizes of the tree and the outcome of the build.
     pub fn status(&self) -> &BuildStatus {
         &self.status
     }
@@ -230,7 +219,7 @@ impl Tree {
         &self.grid
     }
 
-    /// The options it was built with.
+    /// The options that the tree was built with.
     pub fn options(&self) -> &BuildOptions {
         &self.options
     }
@@ -246,13 +235,13 @@ impl Tree {
         TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes)
     }
 
-    /// Bytes of scratch memory that the build used beside the tree.
+    /// Bytes of scratch memory that the build used in addition to the tree.
     pub fn scratch_bytes(&self) -> u64 {
         self.scratch_bytes
     }
 }
 
-/// Entries of `Aabb` on every level.
+/// The number of `Aabb` entries on every level.
 fn candidates(status: &BuildStatus) -> [u64; 11] {
     std::array::from_fn(|k| wide([status.total[2 * k], status.total[2 * k + 1]]))
 }

@@ -1,33 +1,35 @@
-//! A host's Vulkan device, across the border to C.
+//! The C interface to a Vulkan device that the host owns.
 
 use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing, put};
 use crate::error::Error;
-use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice, Requirements};
+use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice, HostQueue, Requirements};
 use ash::vk::{self, Handle};
-use std::ffi::c_char;
+use std::ffi::{c_char, c_void};
 use std::ptr::null;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
-/// What a host enables when it makes a device for olbvh.
+/// What a host should enable when it creates a device for olbvh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhHostRequirements {
-    /// The first queue family with compute; any other with compute will do.
+    /// The first queue family with compute; any other family with compute works as well.
     pub queue_family: u32,
     /// Not 0: the device has the feature `bufferDeviceAddress`. Without it, buffers are bound by descriptors.
     pub buffer_addresses: u32,
-    /// Not 0: it has the feature `shaderInt64`.
+    /// Not 0: the device has the feature `shaderInt64`.
     pub shader_int64: u32,
-    /// Not 0: it has the features `subgroupSizeControl` and `computeFullSubgroups`, and heeds them.
+    /// Not 0: the device has the features `subgroupSizeControl` and `computeFullSubgroups`, and lets compute shaders
+    /// require a subgroup size.
     pub subgroup_size_control: u32,
-    /// Number of names that follow.
+    /// Number of entries in `extensions`.
     pub extension_count: u32,
-    /// Names of device extensions, which stay where they are.
+    /// Names of the device extensions to enable. The strings are static: they stay valid and must not be freed.
     pub extensions: [*const c_char; 4],
 }
 
-/// Tells what to enable on a physical device before a device is made from it. Handles are cast to `uint64_t`, `vkGetInstanceProcAddr` to a function without
-/// arguments. Ends with `OLBVH_STATUS_DEVICE` where the device does not qualify; `olbvh_last_error` tells what it lacks.
+/// Reports what to enable on a physical device, before a device is created from it. Handles are cast to `uint64_t`,
+/// `vkGetInstanceProcAddr` to a function without arguments. Returns `OLBVH_STATUS_DEVICE` if the physical device does
+/// not qualify; `olbvh_last_error` then says what it lacks.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_host_check(
     get_instance_proc_addr: Option<unsafe extern "C" fn()>,
@@ -39,7 +41,7 @@ pub extern "C" fn olbvh_host_check(
         let Some(get) = get_instance_proc_addr.filter(|_| instance != 0 && physical_device != 0) else {
             return Err(missing("the loader's function or a handle"));
         };
-        // SAFETY: the host passes the loader's function and handles of a living instance.
+        // SAFETY: the host passes the loader's function and handles of an instance that has not been destroyed.
         let instance = unsafe { load(get, instance) };
         let found = Requirements::check(&instance, vk::PhysicalDevice::from_raw(physical_device));
         if !found.missing.is_empty() {
@@ -61,50 +63,106 @@ pub extern "C" fn olbvh_host_check(
     })
 }
 
-/// The functions of an instance.
+/// Loads the functions of an instance.
 ///
 /// # Safety
-/// The loader's function, cast, and a living instance.
+/// `get` is the loader's `vkGetInstanceProcAddr`, cast; `instance` is a `VkInstance` that has not been destroyed.
 unsafe fn load(get: unsafe extern "C" fn(), instance: u64) -> ash::Instance {
-    // SAFETY: as promised.
+    // SAFETY: the caller promises that `get` is `vkGetInstanceProcAddr` and that the instance has not been destroyed.
     unsafe {
         let get = std::mem::transmute::<unsafe extern "C" fn(), vk::PFN_vkGetInstanceProcAddr>(get);
         ash::Instance::load(&ash::StaticFn { get_instance_proc_addr: get }, vk::Instance::from_raw(instance))
     }
 }
 
-/// A Vulkan device of the host's, to be used and never destroyed by olbvh. Handles are cast to `uint64_t`.
+/// A Vulkan device that the host owns; olbvh uses it and never destroys it. Handles are cast to `uint64_t`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhHostDevice {
     /// `vkGetInstanceProcAddr`, cast to this type.
     pub get_instance_proc_addr: Option<unsafe extern "C" fn()>,
-    /// `VkInstance`, of Vulkan 1.2 or later.
+    /// `VkInstance`, created for Vulkan 1.2 or later.
     pub instance: u64,
     /// `VkPhysicalDevice`.
     pub physical_device: u64,
     /// `VkDevice`.
     pub device: u64,
-    /// `VkQueue` of that family. Nobody else submits to it while a function runs that does work at once (`olbvh_gpu_from_host` with its self-test, uploads,
-    /// builds, queries); those that record do not touch it. 0: recording is all that is done, untested.
+    /// `VkQueue` of the family `queue_family`, which owning calls submit to (`olbvh_gpu_from_host` with its self-test,
+    /// uploads, builds, queries); recording functions do not touch it. Nothing else may use the queue while an owning
+    /// call runs, or, with `lock_queue`, while it holds that lock. 0: only recording is possible, and the self-test is
+    /// skipped.
     pub queue: u64,
-    /// `VkPipelineCache` of the host's, which knows the kernels of earlier runs. 0: one that lasts as long as the `olbvh_gpu`.
+    /// Takes the host's lock of the queue, which the host also takes for its own use of it; may be null. It is called
+    /// with `queue_lock` before each submission, on the thread of the owning call. Set both `lock_queue` and
+    /// `unlock_queue`, or neither.
+    pub lock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
+    /// Releases the host's lock of the queue; may be null. It is called with `queue_lock` after each submission.
+    pub unlock_queue: Option<unsafe extern "C" fn(*mut c_void)>,
+    /// Argument of `lock_queue` and `unlock_queue`.
+    pub queue_lock: *mut c_void,
+    /// The host's `VkPipelineCache`, which may hold the kernels of earlier runs; not one that needs external
+    /// synchronization, since threads compile at the same time. 0: a cache that lasts as long as the `olbvh_gpu`.
     pub pipeline_cache: u64,
-    /// Queue family with compute; it needs nothing else.
+    /// Index of a queue family with compute; it needs no other capability.
     pub queue_family: u32,
     /// Not 0: the feature `bufferDeviceAddress` is enabled.
     pub buffer_addresses: u32,
-    /// Not 0: feature `shaderInt64` is enabled, which only drivers for processors profit from.
+    /// Not 0: the feature `shaderInt64` is enabled, from which only drivers for processors profit.
     pub shader_int64: u32,
-    /// Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes
-    /// vary: without it the driver is trusted to run kernels with its usual size, which the self-test at the opening checks; Intel's are not.
+    /// Not 0: `VK_EXT_subgroup_size_control` (or Vulkan 1.3) is enabled with `subgroupSizeControl` and
+    /// `computeFullSubgroups`. Enable it where subgroup sizes vary. Without it, the driver is trusted to run kernels
+    /// with its usual subgroup size, which the self-test checks on opening; Intel devices whose subgroup sizes vary are
+    /// refused.
     pub subgroup_size_control: u32,
     /// Not 0: the instance extension `VK_EXT_debug_utils` is enabled.
     pub debug_utils: u32,
 }
 
-/// Works on a device of the host's, which outlives everything made from the handle. Buffers are used by queues of that family alone, with exclusive sharing: a
-/// host that reads or writes them on another family transfers their ownership.
+/// The host's queue and its lock.
+struct LentQueue {
+    queue: vk::Queue,
+    lock: Option<[unsafe extern "C" fn(*mut c_void); 2]>,
+    argument: *mut c_void,
+    /// Makes the threads that use this handle wait for each other, even if the host gives no lock.
+    own: Mutex<()>,
+}
+
+// SAFETY: the queue is used only while `own` is held; the host vouches that its functions may be called from any thread
+// with `argument`, see `OlbvhHostDevice`.
+unsafe impl Send for LentQueue {}
+// SAFETY: the queue is used only while `own` is held, so shared references cause no concurrent use; for the host's
+// functions see `OlbvhHostDevice`.
+unsafe impl Sync for LentQueue {}
+
+impl HostQueue for LentQueue {
+    fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
+        let _own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
+        let _host = self.lock.map(|[lock, unlock]| HostLock::take(lock, unlock, self.argument));
+        submit(self.queue);
+    }
+}
+
+/// The host's lock, while it is held.
+struct HostLock(unsafe extern "C" fn(*mut c_void), *mut c_void);
+
+impl HostLock {
+    fn take(lock: unsafe extern "C" fn(*mut c_void), unlock: unsafe extern "C" fn(*mut c_void), argument: *mut c_void) -> Self {
+        // SAFETY: the host's function, with the argument that it gave for it.
+        unsafe { lock(argument) };
+        Self(unlock, argument)
+    }
+}
+
+impl Drop for HostLock {
+    fn drop(&mut self) {
+        // SAFETY: as above; the lock was taken.
+        unsafe { self.0(self.1) };
+    }
+}
+
+/// Makes a handle for the host's device, which must outlive everything made from the handle. Buffers are used by queues
+/// of that family alone, with exclusive sharing: a host that reads or writes them on another family transfers their
+/// ownership.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
@@ -113,7 +171,13 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
         let Some(get) = host.get_instance_proc_addr.filter(|_| !null) else {
             return Err(missing("a handle of the host's device"));
         };
-        // SAFETY: the host passes handles of one living device, and the loader's function.
+        let lock = match (host.lock_queue, host.unlock_queue) {
+            (Some(lock), Some(unlock)) => Some([lock, unlock]),
+            (None, None) => None,
+            _ => return Err(missing("one of lock_queue and unlock_queue")),
+        };
+        let queue = LentQueue { queue: vk::Queue::from_raw(host.queue), lock, argument: host.queue_lock, own: Mutex::new(()) };
+        // SAFETY: the host passes the loader's function and handles of one device that has not been destroyed.
         let gpu = unsafe {
             let instance = load(get, host.instance);
             let device = ash::Device::load(instance.fp_v1_0(), vk::Device::from_raw(host.device));
@@ -121,7 +185,7 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
                 physical: vk::PhysicalDevice::from_raw(host.physical_device),
                 device,
                 family: host.queue_family,
-                queue: (host.queue != 0).then(|| Arc::new(Mutex::new(vk::Queue::from_raw(host.queue)))),
+                queue: if host.queue == 0 { None } else { Some(Arc::new(queue)) },
                 allocator: None,
                 pipeline_cache: (host.pipeline_cache != 0).then(|| vk::PipelineCache::from_raw(host.pipeline_cache)),
                 enabled: Enabled {

@@ -1,11 +1,12 @@
-//! The C interface, `include/olbvh.h`: opaque handles, status codes, a message per thread. Build it with
+//! The C interface, `include/olbvh.h`: opaque handles, status codes, and one error message per thread. Build it with
 //! `cargo rustc --release --lib --no-default-features --features capi --crate-type cdylib` (or `staticlib`).
 //!
-//! Functions return 0 or the code of an error, whose text [`olbvh_last_error`] gives. No panic crosses the border. A handle keeps what it was made
-//! from alive, so the order of freeing means nothing. One handle may be used by many threads at a time, a
-//! recording by one.
+//! Functions return 0 or an error code; [`olbvh_last_error`] returns the text of the error. No panic crosses the border
+//! to C. A handle keeps alive what it was made from, so handles may be freed in any order. Several threads may use one
+//! handle at the same time, except a recording, which belongs to one thread at a time.
 //!
-//! Not for Rust, where a pointer cannot be trusted as a C caller's must be: the module is private, and its functions reach C by their names.
+//! The module is private: a C caller must be trusted with its pointers, which a safe Rust interface may not assume. C
+//! finds the functions by their exported names.
 #![allow(unsafe_code, reason = "the border to C")]
 
 mod host;
@@ -26,25 +27,25 @@ use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 
-/// How a call ended.
+/// Result of a call.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OlbvhStatus {
-    /// Done.
+    /// The call succeeded.
     Ok = 0,
-    /// An argument makes no sense.
+    /// An argument is invalid.
     Invalid = 1,
-    /// No Vulkan, or no device that qualifies.
+    /// There is no Vulkan, no suitable device, or the device failed the self-test.
     Device = 2,
-    /// The device's memory does not suffice.
+    /// There is not enough device memory.
     Memory = 3,
-    /// The mesh is larger than 32-bit offsets reach.
+    /// The problem is larger than the device or 32-bit offsets allow.
     TooLarge = 4,
     /// A Vulkan call failed.
     Vulkan = 5,
-    /// Anything else; please report it.
+    /// Any other error; please report it.
     Internal = 6,
-    /// The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles, and begin again with another device.
+    /// The device is lost (`VK_ERROR_DEVICE_LOST`): free all handles and start again with a new device.
     Lost = 7,
 }
 
@@ -54,20 +55,20 @@ pub struct OlbvhGpu(Gpu);
 /// A mesh in the device's memory.
 pub struct OlbvhMesh(Arc<HeldMesh>);
 
-/// A mesh, and what its tetrahedra and points are called.
+/// A mesh, and the caller's numbers of its tetrahedra and points.
 struct HeldMesh {
     device: DeviceMesh,
-    /// For each tetrahedron and each point its number with the caller, where that is another.
+    /// The caller's number of each tetrahedron and of each point, if the mesh was reordered.
     ids: Option<[Vec<u32>; 2]>,
 }
 
 impl HeldMesh {
-    /// The caller's number of a tetrahedron; what is none stays so.
+    /// The caller's number of a tetrahedron; `NONE` stays `NONE`.
     fn cell(&self, tet: u32) -> u32 {
         self.ids.as_ref().and_then(|[cells, _]| cells.get(tet as usize).copied()).unwrap_or(tet)
     }
 
-    /// A field of the caller's in the order of the mesh.
+    /// The caller's field, brought into the order of the mesh.
     fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
         let (on, count) = on(on_cells, self.device.input());
         let values = array(values, count as usize, "values")?;
@@ -76,12 +77,12 @@ impl HeldMesh {
     }
 }
 
-/// What values belong to, and how many there are.
+/// What the values of a field belong to, and how many values there must be.
 fn on(on_cells: u32, mesh: &MeshInput) -> (On, u32) {
     if on_cells == 0 { (On::Points, mesh.points) } else { (On::Cells, mesh.tets) }
 }
 
-/// What a tolerance below 0 stands for.
+/// The tolerance to use; a negative argument selects the default.
 fn tolerance(given: f32) -> f32 {
     if given < 0.0 { TOLERANCE } else { given }
 }
@@ -90,28 +91,32 @@ fn tolerance(given: f32) -> f32 {
 pub struct OlbvhTree {
     mesh: Arc<HeldMesh>,
     tree: Tree,
-    /// What shaders get, see `olbvh.glsl`.
+    /// The device addresses that shaders read, see `olbvh.glsl`.
     addresses: Buffer,
 }
 
-/// How to build a tree; `olbvh_default_build_options` fills it.
+/// How to build a tree. `olbvh_default_build_options` returns the defaults.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhBuildOptions {
-    /// The paper's alpha, 0 to 10: how many levels coarser than the cells' size the leaves are.
+    /// The paper's alpha, from 0 to 10: how many levels coarser than the size of the tetrahedra the leaves are.
     pub alpha: f32,
-    /// 0: cells of the bounding box. 1: of those, the cells that no face plane separates. 2: exactly the cells touched.
+    /// Which octree cells list a tetrahedron. 0: all cells of its bounding box. 1: of these, the cells that no face
+    /// plane of the tetrahedron separates from it. 2: exactly the cells that it touches.
     pub assign: u32,
-    /// 0: all primitives are listed (the paper). 1: where the surface is, seeds and walks elsewhere.
+    /// Which leaves have full lists. 0: every leaf lists all its tetrahedra (the paper). 1: only leaves that the
+    /// surface touches; every other leaf has one entry, from which walks across faces find the others.
     pub lists: u32,
-    /// Level of the leaves whatever alpha says, 1 to 10: one finer than alpha 0 asks for suits thin parts. 0: as alpha says.
+    /// Level of the leaves, from 1 to 10, which overrides alpha; meshes with thin parts profit from a level finer than
+    /// alpha 0 gives. 0: alpha decides.
     pub level: u32,
-    /// How fine leaves are beyond that: 0: as it says. 1: finer where lists are long, as suits points, slices and overlap. 2: as suits pictures. A recorded
-    /// build takes no notice.
+    /// Whether leaves become finer than that. 0: no. 1: yes where lists are long, which suits location of points,
+    /// slices and overlap. 2: as fine as suits pictures. A recorded build ignores this.
     pub fineness: u32,
-    /// Most entries the tree may have; it gets coarser until it fits. 0: the usual capacity, 64 per tetrahedron and at least 2^20.
+    /// Maximum number of entries of the tree, which is made coarser until it fits. 0: the usual capacity, 64 entries
+    /// per tetrahedron and at least 2^20.
     pub capacity: u32,
-    /// Most bytes the arrays of the tree may have together; it gets coarser until it fits. 0: no limit.
+    /// Maximum number of bytes of all arrays of the tree together; it is made coarser until it fits. 0: no limit.
     pub budget: u64,
 }
 
@@ -131,28 +136,29 @@ impl OlbvhBuildOptions {
     }
 }
 
-/// What was built.
+/// Properties of a tree.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhTreeInfo {
     /// Level of the leaves.
     pub level: u32,
-    /// Primitive ids in the leaves.
+    /// Number of entries, that is of (tetrahedron, leaf) pairs.
     pub entries: u32,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: u32,
-    /// Leaves.
+    /// Number of leaves.
     pub leaves: u32,
     /// Lower corner of the mesh.
     pub lo: [f32; 3],
     /// Upper corner of the mesh.
     pub hi: [f32; 3],
-    /// Tetrahedra left out: a vertex that does not exist, occurs twice or is not finite.
+    /// Number of tetrahedra left out because a vertex does not exist, occurs twice or is not finite.
     pub bad_cells: u32,
-    /// Milliseconds of device time.
+    /// Device time of the construction in milliseconds.
     pub build_ms: f64,
-    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. Shaders see a mesh that was reordered in its new order, and no
-    /// field: `olbvh_value` is NaN there. Scenes have fields (`olbvh_scene_arrays`).
+    /// Device address for `olbvh_open` of olbvh.glsl; 0 where the device has no buffer addresses. If the mesh was
+    /// reordered, shaders see it in its new order. There is no field, so `olbvh_value` returns NaN; scenes can have one
+    /// (`olbvh_scene_arrays`).
     pub address: u64,
 }
 
@@ -173,12 +179,12 @@ fn status_of(error: &Error) -> OlbvhStatus {
 }
 
 fn remember(message: &str) {
-    // A text with a zero in it ends there.
+    // The text is cut at its first zero byte.
     let text = CString::new(message.split('\0').next().unwrap_or_default()).unwrap_or_default();
     MESSAGE.with(|m| *m.borrow_mut() = text);
 }
 
-/// Runs the work of a function of the interface; keeps errors and panics on this side.
+/// Runs the body of an interface function and turns errors and panics into a status.
 fn border(work: impl FnOnce() -> Result<()>) -> OlbvhStatus {
     match catch_unwind(AssertUnwindSafe(work)) {
         Ok(Ok(())) => OlbvhStatus::Ok,
@@ -197,25 +203,26 @@ fn missing(what: &str) -> Error {
     Error::Invalid(format!("{what} is null"))
 }
 
-/// What a handle means.
+/// The object that a handle refers to.
 fn handle<'a, T>(pointer: *const T, what: &str) -> Result<&'a T> {
-    // SAFETY: the caller passes null or a handle that is not freed yet (see each function).
+    // SAFETY: the caller passes null or a handle that has not been freed yet (see each function).
     unsafe { pointer.as_ref() }.ok_or_else(|| missing(what))
 }
 
-/// As [`handle`], of one that nobody else uses meanwhile.
+/// The object that a handle refers to, which nothing else uses during the call.
 fn handle_mut<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut T> {
-    // SAFETY: as above, and the caller vouches for the rest (see each function).
+    // SAFETY: the caller passes null or a handle that has not been freed yet, and vouches that nothing else uses the
+    // object meanwhile (see each function).
     unsafe { pointer.as_mut() }.ok_or_else(|| missing(what))
 }
 
-/// Fills a struct of the caller's.
+/// Writes a result to the caller's memory.
 fn put<T>(out: *mut T, value: T) -> Result<()> {
     *handle_mut(out, "the place for the result")? = value;
     Ok(())
 }
 
-/// An array of the caller's; a null pointer is an empty one of no elements.
+/// The caller's array. A null pointer is allowed for an array without elements.
 fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
     match (pointer.is_null(), count) {
         (_, 0) => Ok(&[]),
@@ -225,36 +232,45 @@ fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> 
     }
 }
 
-/// Hands a value over to the caller.
+/// Moves a value to the heap and passes ownership to the caller as a handle.
 fn give<T>(out: *mut *mut T, value: T) -> Result<()> {
     *handle_mut(out, "the place for the result")? = Box::into_raw(Box::new(value));
     Ok(())
 }
 
-/// Takes back what [`give`] gave.
+/// Frees what [`give`] passed out; does nothing for null.
 fn release<T>(pointer: *mut T) {
     if !pointer.is_null() {
         let _ = border(|| {
-            // SAFETY: the pointer came from `give` and is not used again.
+            // SAFETY: the pointer came from `give`, and the caller does not use it again.
             drop(unsafe { Box::from_raw(pointer) });
             Ok(())
         });
     }
 }
 
-/// The text of the last error of this thread; valid until its next call.
+/// Text of the last error of this thread; valid until the next call of this thread.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_last_error() -> *const c_char {
     MESSAGE.with(|m| m.borrow().as_ptr())
 }
 
-/// Version of the library, such as "0.1.0".
+/// Version of the library, for example "0.1.0".
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_version() -> *const c_char {
     concat!(env!("CARGO_PKG_VERSION"), "\0").as_ptr().cast()
 }
 
-/// Opens a device: part of its name, or its number; null: the best that qualifies.
+/// Version of this interface. A header and a library with different versions are incompatible.
+pub const OLBVH_ABI: u32 = 1;
+
+/// Returns the `OLBVH_ABI` of the library, for comparison with that of the header.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_abi() -> u32 {
+    OLBVH_ABI
+}
+
+/// Opens a device, chosen by a part of its name or by its number; null selects the best suitable device.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_gpu_open(device: *const c_char, out: *mut *mut OlbvhGpu) -> OlbvhStatus {
     border(|| {
@@ -264,15 +280,17 @@ pub extern "C" fn olbvh_gpu_open(device: *const c_char, out: *mut *mut OlbvhGpu)
     })
 }
 
-/// Lets a device go; null is allowed.
+/// Frees the handle of a device; null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_gpu_free(gpu: *mut OlbvhGpu) {
     release(gpu);
 }
 
-/// Brings a mesh to the device: three floats per point, four indices per tetrahedron. Bad cells are left out and counted. `reorder`, if not 0, brings points
-/// and tetrahedra into the order of a Z curve on the way, which pays where they come in no order; all functions go on to take and to give the caller's numbers.
-/// Of the tetrahedra that share a face, edge or vertex, the first along the curve owns its points then, not that of the lowest number.
+/// Uploads a mesh to the device: three floats per point, four indices per tetrahedron. Invalid tetrahedra are left out
+/// and counted (`olbvh_tree_info`). If `reorder` is not 0, points and tetrahedra are first sorted along a Z-order
+/// curve, which pays where they come in no spatial order; all functions still take and return the caller's numbers. Of
+/// the tetrahedra that share a face, edge or vertex, the first along the curve then owns its points, instead of the one
+/// with the lowest number.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_mesh_upload(
     gpu: *const OlbvhGpu,
@@ -293,13 +311,13 @@ pub extern "C" fn olbvh_mesh_upload(
     })
 }
 
-/// Lets a mesh go; null is allowed.
+/// Frees the handle of a mesh; null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_mesh_free(mesh: *mut OlbvhMesh) {
     release(mesh);
 }
 
-/// What `olbvh_tree_build` takes where it is given no options.
+/// The default build options, which `olbvh_tree_build` also uses when its `options` are null.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
     let BuildOptions { alpha, assign, lists, level, fineness, capacity, budget, .. } = BuildOptions::default();
@@ -307,12 +325,12 @@ pub extern "C" fn olbvh_default_build_options() -> OlbvhBuildOptions {
     OlbvhBuildOptions { alpha, assign: assign as u32, lists: lists as u32, level, fineness: fineness as u32, capacity, budget }
 }
 
-/// Builds the tree over a mesh. `options` may be null.
+/// Builds the tree over a mesh. `options` may be null: the defaults.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const OlbvhBuildOptions, out: *mut *mut OlbvhTree) -> OlbvhStatus {
     border(|| {
         let mesh = handle(mesh, "mesh")?.0.clone();
-        // SAFETY: null, or the caller's options.
+        // SAFETY: the caller passes null or valid options.
         let options = unsafe { options.as_ref() }.map_or(Ok(BuildOptions::default()), OlbvhBuildOptions::read)?;
         let device = &mesh.device;
         let gpu = device.gpu();
@@ -322,13 +340,13 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
     })
 }
 
-/// Lets a tree go; null is allowed.
+/// Frees the handle of a tree; null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_tree_free(tree: *mut OlbvhTree) {
     release(tree);
 }
 
-/// Tells what a tree is like.
+/// Reports the properties of a tree.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInfo) -> OlbvhStatus {
     border(|| {

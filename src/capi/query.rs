@@ -1,4 +1,4 @@
-//! The convenient calls: each asks a tree of olbvh's own, waits, and fills arrays of the caller's.
+//! The owning calls of the C interface: each queries a tree that olbvh owns, waits, and fills the caller's arrays.
 
 use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, tolerance};
 use crate::error::{Error, Result};
@@ -11,59 +11,61 @@ use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
 
-/// What a picture shows; `olbvh_default_picture_settings` fills it.
+/// What a picture shows. `olbvh_default_picture_settings` returns the defaults.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhPictureSettings {
-    /// Pixels in a row.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
-    /// The camera, as `olbvh render --camera` takes it; null: it sees the whole mesh from an angle.
+    /// The camera, in the form of `olbvh render --camera`; null: it sees the whole mesh from an oblique direction.
     pub camera: *const c_char,
-    /// Name of a colour map, as `olbvh render --tf` takes it; null: the usual one.
+    /// Name of a colour map, as for `olbvh render --tf`; null: the default.
     pub colors: *const c_char,
-    /// Opacity, as `olbvh render --opacity` takes it; null: `olbvh_render` makes it fit the field, `olbvh_view_make` lets it rise with the value.
+    /// Opacity, in the form of `olbvh render --opacity`; null: `olbvh_render` adapts it to the field, `olbvh_view_make`
+    /// lets it increase with the value.
     pub opacity: *const c_char,
     /// Values of iso-surfaces, which are drawn instead of the volume.
     pub iso: [f32; 8],
-    /// How many of them there are; 0: the volume is drawn.
+    /// Number of values in `iso` that are used; 0: the volume is drawn.
     pub iso_count: u32,
-    /// Values at the ends of the colour map; the first above the second: all values that the field has.
+    /// Values at the two ends of the colour map. If the first is greater than the second, all values of the field are
+    /// covered.
     pub range: [f32; 2],
-    /// Distance of two samples in units of the mesh; 0: 1/512 of its diagonal.
+    /// Distance between two samples in units of the mesh; 0: 1/512 of the diagonal of its bounding box.
     pub step: f64,
-    /// Factor on the opacity: 2 is as opaque as twice the way through the mesh.
+    /// Factor on the opacity: 2 makes the mesh as opaque as if rays travelled twice the distance through it.
     pub opacity_scale: f32,
-    /// A ray ends once it is this opaque.
+    /// A ray ends when its opacity reaches this.
     pub termination: f32,
-    /// Not 0: surface and steep values are lit.
+    /// Not 0: the surface, and steep changes of the field, are lit.
     pub shading: u32,
-    /// Opacity that a lit surface seen from the side has at least.
+    /// Minimum opacity of a lit surface that is seen edge-on.
     pub outline: f32,
-    /// Direction to the light: right, up, towards the viewer.
+    /// Direction to the light: components to the right, upwards, and towards the viewer.
     pub light: [f32; 3],
 }
 
-/// Where the voxels of a stack of layers lie.
+/// Geometry of a stack of layers of voxels.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhVoxels {
     /// Centre of voxel (0, 0) of layer 0.
     pub origin: [f32; 3],
-    /// From one voxel to the next in a row.
+    /// Vector from one voxel to the next in a row.
     pub across: [f32; 3],
-    /// From one row to the next.
+    /// Vector from one row to the next.
     pub down: [f32; 3],
-    /// From one layer to the next.
+    /// Vector from one layer to the next.
     pub up: [f32; 3],
     /// Half axes of a voxel's box.
     pub half: [[f32; 3]; 3],
-    /// Voxels in a row.
+    /// Number of voxels in a row.
     pub width: u32,
-    /// Rows of a layer.
+    /// Number of rows in a layer.
     pub height: u32,
-    /// Layers.
+    /// Number of layers.
     pub layers: u32,
 }
 
@@ -107,7 +109,7 @@ impl OlbvhVoxels {
 }
 
 impl HeldMesh {
-    /// As it lies on the device.
+    /// The mesh in the order in which it lies on the device.
     fn download(&self) -> Result<Mesh> {
         let input = self.device.input();
         let (points, tets) = (self.download_part(input.positions, input.points)?, self.download_part(input.cells, input.tets)?);
@@ -123,19 +125,20 @@ impl HeldMesh {
     }
 }
 
-/// An array of the caller's to be filled.
+/// The caller's array that a call fills. A null pointer is allowed for an array without elements.
 fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [T]> {
     match (pointer.is_null(), count) {
         (_, 0) => Ok(&mut []),
         (true, _) => Err(missing(what)),
-        // SAFETY: the caller vouches for `count` elements that nobody else uses (see each function).
+        // SAFETY: the caller vouches for `count` elements that nothing else uses during the call (see each function).
         (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) }),
     }
 }
 
-/// Finds the owner of each of `count` points (three floats each): a tetrahedron, or 0xffffffff outside of the mesh. `barycentrics`, four floats per
-/// point in the order of the cell's vertices, may be null. A point outside is taken in if its smallest coordinate in the nearest cell is at least
-/// `-tolerance`; below 0 means the default, 1e-5.
+/// Finds the owner of each of `count` points (three floats each): a tetrahedron, or `UINT32_MAX` if the point lies
+/// outside of the mesh. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices; it may
+/// be null. A point slightly outside of the mesh is accepted if its smallest barycentric coordinate in the nearest
+/// tetrahedron is at least `-tolerance`; a negative `tolerance` selects the default, 1e-5.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_locate(
     tree: *const OlbvhTree,
@@ -160,7 +163,7 @@ pub extern "C" fn olbvh_locate(
     })
 }
 
-/// What pictures are like where nothing else is asked for.
+/// The default settings of pictures.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
     let RenderSettings { size: [width, height], opacity_scale, termination, shading, outline, light, .. } = RenderSettings::default();
@@ -184,8 +187,9 @@ pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
     }
 }
 
-/// Draws a field: `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets four floats per pixel, the upper row first: colour
-/// (sRGB from 0 to 1) multiplied by its opacity, and opacity; what is behind is the caller's.
+/// Draws a field as a picture. `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets
+/// four floats per pixel, upper row first: colour (sRGB, 0 to 1) multiplied by its opacity, and opacity. The caller
+/// adds the background.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_render(
     tree: *const OlbvhTree,
@@ -212,10 +216,12 @@ pub extern "C" fn olbvh_render(
     })
 }
 
-/// Slices a mesh conservatively: no voxel that it touches is left empty. `answers`, if not null, gets a word per voxel, layer by layer and row by row: the
-/// tetrahedron of its centre; plus 2^31 the nearest that touches its box, if the centre lies in none; 0xffffffff if it is empty. `results`, if not null, gets a
-/// float: the value of the field (`values` and `on_cells` as `olbvh_render` takes them) there, NaN where it is empty. A voxel that is merely touched gets the
-/// value of the tetrahedron's nearest point or, if `linear` is not 0, its field continued to the centre.
+/// Slices a mesh conservatively: no voxel that the mesh touches is left empty. `answers`, if not null, gets a word per
+/// voxel, layer by layer and row by row: the tetrahedron that contains its centre; if there is none, 2^31 plus the
+/// tetrahedron nearest to its centre of those that touch its box; `UINT32_MAX` if the voxel is empty. `results`, if not
+/// null, gets a float per voxel: the value of the field (`values` and `on_cells` as for `olbvh_render`), NaN if the
+/// voxel is empty. A voxel that is merely touched gets the value at the tetrahedron's point nearest to its centre or,
+/// if `linear` is not 0, the tetrahedron's linear field extrapolated to its centre.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_slice(
     tree: *const OlbvhTree,
@@ -248,8 +254,9 @@ pub extern "C" fn olbvh_slice(
     })
 }
 
-/// Finds the tetrahedra of either mesh that intersect the other, whose points lie in one space. Of `hits_a` and `hits_b` word i / 32 gets bit i % 32
-/// set if tetrahedron i does; both have a word for 32 tetrahedra, the last of them perhaps for fewer. The trees are of one `olbvh_gpu`.
+/// Finds the tetrahedra of each mesh that intersect the other mesh. The points of both meshes are in the same
+/// coordinate system. In `hits_a` and `hits_b`, bit i % 32 of word i / 32 is set if tetrahedron i intersects the other
+/// mesh; each has one word per 32 tetrahedra, rounded up. Both trees must have been made with the same `olbvh_gpu`.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a: *mut u32, hits_b: *mut u32) -> OlbvhStatus {
     border(|| {

@@ -1,5 +1,6 @@
-//! Recording into a host's command buffer and memory, across the border to C: nothing is submitted, waited for or made.
-//! The head of the header says what all of it has in common, see `.config/cbindgen.toml`.
+//! The C interface for recording into the host's command buffer and memory: nothing is submitted, waited for or
+//! allocated. What all recording functions have in common is stated at the head of the header, see
+//! `.config/cbindgen.toml`.
 
 mod locate;
 mod overlap;
@@ -19,15 +20,15 @@ use crate::query::{Rounds, Scene};
 use ash::vk::{self, Handle};
 use std::ffi::c_char;
 
-/// A part of a buffer of the host's.
+/// A part of one of the host's buffers.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhBuffer {
     /// `VkBuffer`.
     pub buffer: u64,
-    /// Bytes from its start.
+    /// Offset of the part from the start of the buffer, in bytes.
     pub offset: u64,
-    /// Bytes.
+    /// Size of the part in bytes.
     pub size: u64,
     /// Device address of the first byte of the part; 0 where buffer addresses are not enabled.
     pub address: u64,
@@ -39,7 +40,7 @@ impl OlbvhBuffer {
         BufferRef { buffer: vk::Buffer::from_raw(self.buffer), offset, size, address }
     }
 
-    /// The part, which must begin where parts of buffers may.
+    /// The part, whose offset must be a multiple of the alignment.
     fn aligned(&self, what: &str) -> Result<BufferRef> {
         if !self.offset.is_multiple_of(ALIGNMENT) {
             return Err(Error::Invalid(format!(
@@ -50,7 +51,7 @@ impl OlbvhBuffer {
         Ok(self.part())
     }
 
-    /// The part, which must have so many bytes.
+    /// The part, which must have at least this many bytes.
     fn holds(&self, bytes: u64, what: &str) -> Result<BufferRef> {
         if self.size < bytes {
             return Err(Error::Invalid(format!("{what} in {} bytes; {bytes} are needed", self.size)));
@@ -58,17 +59,18 @@ impl OlbvhBuffer {
         Ok(self.part())
     }
 
-    /// The same; `None` of no bytes.
+    /// The part, or `None` if its size is 0; otherwise it must have at least this many bytes.
     fn optional(&self, bytes: u64, what: &str) -> Result<Option<BufferRef>> {
         if self.size == 0 { Ok(None) } else { self.holds(bytes, what).map(Some) }
     }
 
-    /// The parts of this memory.
+    /// Carves the parts out of this memory.
     fn place<T>(self, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<T> {
         carve(&mut Arena::new(self.part()))
     }
 
-    /// The parts of this memory, and how many bytes they take. Of memory that is not there yet offsets count from its beginning.
+    /// The number of bytes that the parts take, and the parts. If the memory does not exist yet (size 0), offsets count
+    /// from its start.
     fn carve<T>(self, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<(u64, T)> {
         let bytes = Arena::measure(&carve)?;
         let given = if self.size == 0 { Self { size: bytes, ..self } } else { self };
@@ -83,13 +85,13 @@ impl From<BufferRef> for OlbvhBuffer {
     }
 }
 
-/// Values on a mesh.
+/// A scalar field on a mesh.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhField {
-    /// A 32-bit float per point, or per tetrahedron.
+    /// One 32-bit float per point or per tetrahedron.
     pub values: OlbvhBuffer,
-    /// 0: per point, linear in a tetrahedron. Else: per tetrahedron.
+    /// 0: one value per point, interpolated linearly in a tetrahedron. Otherwise: one value per tetrahedron.
     pub on_cells: u32,
 }
 
@@ -100,14 +102,14 @@ impl OlbvhField {
     }
 }
 
-/// How far a recording goes with work that takes as many dispatches as it takes: a dispatch looks at so much and no more, so that no device is kept
-/// busy for long. The status of the query says what is left.
+/// How many dispatches are recorded for work whose length is not known in advance. Each dispatch does a bounded amount
+/// of work, so that the device is never kept busy for long. The status of the query says how much is left.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhRounds {
-    /// Dispatches, one after the other; what is finished is passed over.
+    /// Number of dispatches, one after the other; they skip what is finished.
     pub count: u32,
-    /// Not 0: go on where an earlier recording of the same ended.
+    /// Not 0: continue where an earlier recording of the same query ended.
     pub resume: u32,
 }
 
@@ -117,37 +119,37 @@ impl From<OlbvhRounds> for Rounds {
     }
 }
 
-/// Commands being recorded, and the descriptor sets they use: one per frame in flight.
+/// A recording of commands and the descriptor sets that they use: one per frame in flight.
 pub struct OlbvhRecording {
-    /// Refers to the two below, which it is dropped before.
+    /// Refers to `gpu` and `pools`, and is dropped before them.
     recorder: Option<Recorder<'static>>,
     gpu: *mut Gpu,
     pools: *mut DescriptorPools,
-    /// Of the recording that has ended.
+    /// Timed stages of the recording that has ended: name, first and last query.
     stages: Vec<(String, u32, u32)>,
 }
 
-/// A stage that was timed.
+/// A timed stage of a recording.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhStage {
-    /// Such as "build.levels".
+    /// Name of the stage, for example "build.levels"; ends with a zero byte.
     pub name: [c_char; 64],
-    /// Query with the time of its begin.
+    /// Index of the query with the time of its start.
     pub begin: u32,
-    /// Query with the time of its end.
+    /// Index of the query with the time of its end.
     pub end: u32,
 }
 
 impl Drop for OlbvhRecording {
     fn drop(&mut self) {
         self.recorder = None;
-        // SAFETY: both came from boxes, and the recorder that referred to them is gone.
+        // SAFETY: both pointers came from `Box::into_raw`, and the recorder that referred to them is gone.
         drop(unsafe { (Box::from_raw(self.pools), Box::from_raw(self.gpu)) });
     }
 }
 
-/// Makes what commands are recorded with: one per frame in flight, used by one thread at a time.
+/// Makes a recording: one per frame in flight, used by one thread at a time.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_new(gpu: *const OlbvhGpu, out: *mut *mut OlbvhRecording) -> OlbvhStatus {
     border(|| {
@@ -157,33 +159,37 @@ pub extern "C" fn olbvh_recording_new(gpu: *const OlbvhGpu, out: *mut *mut Olbvh
     })
 }
 
-/// Lets a recording go, when its commands have been executed; null is allowed.
+/// Frees a recording after its commands have been executed; null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_free(recording: *mut OlbvhRecording) {
     release(recording);
 }
 
-/// Begins anew. `commands` is a `VkCommandBuffer` in the recording state, outside of a render pass; what was recorded before has been executed. 0
-/// rehearses: commands compile what they need, and the end makes room for the descriptor sets they would take, so that recording the same later makes
-/// nothing. `queries` is a reset `VkQueryPool` for timestamps of that many queries, or 0; stages are timed as long as there are queries left.
-/// The recording binds a compute pipeline, push constants, and set 0 where the device has no buffer addresses.
+/// Starts a recording and forgets the previous one, whose commands must have been executed. `commands` is a
+/// `VkCommandBuffer` in the recording state, outside of a render pass. If it is 0, the recording is a rehearsal:
+/// commands compile the pipelines that they need, and the end reserves room for their descriptor sets, so that
+/// recording the same commands later creates nothing. `queries` is a reset `VkQueryPool` of `query_count` timestamp
+/// queries, or 0; stages are timed as long as queries are left. The recording binds a compute pipeline, push constants,
+/// and descriptor set 0 where the device has no buffer addresses.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_begin(recording: *mut OlbvhRecording, commands: u64, queries: u64, query_count: u32) -> OlbvhStatus {
     border(|| {
         let recording = handle_mut(recording, "recording")?;
         recording.recorder = None;
-        // SAFETY: both live until the recorder is gone, see `drop`, and nobody else refers to the pools; the host vouches for the commands.
+        // SAFETY: both pointers stay valid until the recorder is dropped, see `drop`, and nothing else refers to the
+        // pools; the host vouches for the command buffer and the queries.
         unsafe {
             (*recording.pools).reset()?;
             let queries = (queries != 0).then(|| (vk::QueryPool::from_raw(queries), query_count));
             let recorder = Recorder::new(&*recording.gpu, vk::CommandBuffer::from_raw(commands), queries);
-            recording.recorder = Some(recorder.with_pools(&mut *recording.pools));
+            recording.recorder = Some(recorder.with_pools(&mut *recording.pools)?);
         }
         Ok(())
     })
 }
 
-/// Ends the recording, the command buffer stays open. Fails where a barrier is missing between two commands, and names them.
+/// Ends the recording; the command buffer stays in the recording state. Returns an error that names both commands if a
+/// barrier is missing between two of them.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhStatus {
     border(|| {
@@ -193,14 +199,15 @@ pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhSt
         recording.stages = std::mem::take(&mut recorder.stages);
         drop(recorder);
         if rehearsed {
-            // SAFETY: no recorder refers to the pools.
+            // SAFETY: the recorder, which alone referred to the pools, has been dropped.
             unsafe { &mut *recording.pools }.reserve(room)?;
         }
         ended
     })
 }
 
-/// Tells which queries of a recording that has ended have the times of its `index`th stage; fails behind the last.
+/// Reports which queries hold the times of stage `index` (from 0) of a recording that has ended; returns an error if
+/// there is no such stage.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_stage(recording: *const OlbvhRecording, index: u32, out: *mut OlbvhStage) -> OlbvhStatus {
     border(|| {
@@ -212,7 +219,8 @@ pub extern "C" fn olbvh_recording_stage(recording: *const OlbvhRecording, index:
     })
 }
 
-/// Records a barrier: what was written so far is visible to the compute shaders, transfers and indirect commands that follow.
+/// Records a barrier: what was written so far becomes visible to the compute shaders, transfers and indirect commands
+/// that follow.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
     recorded(recording, |r| {
@@ -221,7 +229,8 @@ pub extern "C" fn olbvh_cmd_barrier(recording: *mut OlbvhRecording) -> OlbvhStat
     })
 }
 
-/// Says that the host recorded a barrier of its own instead of `olbvh_cmd_barrier`, which does as much or more: the end misses none there. Records nothing.
+/// States that the host itself recorded a barrier at this place, equivalent to `olbvh_cmd_barrier` or stronger, so that
+/// `olbvh_recording_end` does not report one missing. Records nothing.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_host_barrier(recording: *mut OlbvhRecording) -> OlbvhStatus {
     recorded(recording, |r| {
@@ -234,7 +243,7 @@ fn not_begun() -> Error {
     Error::Invalid("the recording has not begun".into())
 }
 
-/// Appends to a recording that has begun.
+/// Runs `work` on a recording that has been started.
 fn recorded(recording: *mut OlbvhRecording, work: impl FnOnce(&mut Recorder<'static>) -> Result<()>) -> OlbvhStatus {
     border(|| work(handle_mut(recording, "recording")?.recorder.as_mut().ok_or_else(not_begun)?))
 }

@@ -1,4 +1,4 @@
-//! The recording functions, called as a C host calls them.
+//! Tests of the recording functions, called as a C host calls them.
 
 #[path = "../../tests/host/mod.rs"]
 mod host;
@@ -15,13 +15,15 @@ use crate::reference::locate::Locator;
 use ash::vk::{self, Handle};
 use host::Host;
 use host::counted::{ARMED, CALLS, counting};
+use std::ffi::c_void;
 use std::ptr::{null, null_mut};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
-/// For fewer stages than a frame has.
+/// Number of timestamp queries: too few for all stages of a frame.
 const QUERIES: u32 = 8;
 
 fn message() -> String {
-    // SAFETY: a C string until the next call.
+    // SAFETY: the pointer is a C string that is valid until the next call.
     unsafe { CStr::from_ptr(olbvh_last_error()) }.to_string_lossy().into_owned()
 }
 
@@ -29,15 +31,15 @@ fn ok(status: OlbvhStatus) {
     assert_eq!(status, OlbvhStatus::Ok, "{}", message());
 }
 
-/// What a call puts behind its last argument.
+/// The value that a call writes through its last argument.
 fn made<T>(call: impl FnOnce(*mut T) -> OlbvhStatus) -> T {
     let mut out = std::mem::MaybeUninit::zeroed();
     ok(call(out.as_mut_ptr()));
-    // SAFETY: the call went well, so it has been filled.
+    // SAFETY: the call succeeded, so it has filled the value.
     unsafe { out.assume_init() }
 }
 
-/// Three frames on the host's device, of which only what comes before them makes anything.
+/// Records three frames on the host's device, after a rehearsal; recording them creates nothing.
 fn frames(gpu: *mut OlbvhGpu) {
     let mesh = kuhn_jittered([5, 4, 3], 0.3, 1).unwrap();
     let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
@@ -82,14 +84,14 @@ fn frames(gpu: *mut OlbvhGpu) {
         owners: owners_of,
         barycentrics: weights,
     };
-    // The host's own barrier, which it may tell of or not.
+    // The host's own barrier, which it may report to olbvh or not.
     let own_barrier = |commands: u64, told: bool| {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
         let barrier = [vk::MemoryBarrier::default().src_access_mask(writes).dst_access_mask(writes | vk::AccessFlags::SHADER_READ)];
         if commands != 0 {
             let commands = vk::CommandBuffer::from_raw(commands);
-            // SAFETY: the commands are in the recording state.
+            // SAFETY: the command buffer is in the recording state.
             unsafe { device.device().cmd_pipeline_barrier(commands, stages, stages, vk::DependencyFlags::empty(), &barrier, &[], &[]) };
         }
         if told {
@@ -113,12 +115,12 @@ fn frames(gpu: *mut OlbvhGpu) {
     ok(record(0, vk::QueryPool::null(), true));
 
     let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(QUERIES);
-    // SAFETY: plain creation; destroyed below.
+    // SAFETY: the create info is complete, and the query pool is destroyed below.
     let queries = unsafe { device.device().create_query_pool(&info, None) }.unwrap();
     let before = CALLS.get();
     for _ in 0..3 {
         let frame = |r: &mut Recorder<'_>| {
-            // SAFETY: no command uses the queries meanwhile.
+            // SAFETY: the command buffer is in the recording state, and no pending command uses the queries.
             unsafe { device.device().cmd_reset_query_pool(r.commands(), queries, 0, QUERIES) };
             ARMED.set(true);
             let status = record(r.commands().as_raw(), queries, true);
@@ -130,7 +132,8 @@ fn frames(gpu: *mut OlbvhGpu) {
     }
     assert_eq!(CALLS.get(), before, "calls made while recording");
     let (mut ticks, flags) = ([0u64; QUERIES as usize], vk::QueryResultFlags::TYPE_64);
-    // SAFETY: `run` has waited, and all queries have been written: there are more stages than that.
+    // SAFETY: `submit` has waited for the commands, and all queries have been written, since there are more stages than
+    // that.
     unsafe {
         device.device().get_query_pool_results(queries, 0, &mut ticks, flags).unwrap();
         device.device().destroy_query_pool(queries, None);
@@ -138,7 +141,7 @@ fn frames(gpu: *mut OlbvhGpu) {
     let mut used = Vec::new();
     for i in 0..QUERIES / 2 {
         let stage: OlbvhStage = made(|out| olbvh_recording_stage(recording, i, out));
-        // SAFETY: it ends with a zero.
+        // SAFETY: the name ends with a zero byte.
         let name = unsafe { CStr::from_ptr(stage.name.as_ptr()) }.to_str().unwrap();
         assert!(name.starts_with("mesh.") || name.starts_with("build."), "{name}");
         assert!(ticks[stage.begin as usize] <= ticks[stage.end as usize], "{name}: {ticks:?}");
@@ -161,26 +164,49 @@ fn frames(gpu: *mut OlbvhGpu) {
     olbvh_scene_free(scene);
 }
 
+/// The lock of a host, which counts how often it was taken.
+#[derive(Default)]
+struct Held {
+    now: AtomicBool,
+    times: AtomicU32,
+}
+
+unsafe extern "C" fn lock(held: *mut c_void) {
+    // SAFETY: the pointer is the one that the test passed, to a `Held` that outlives the `Gpu`.
+    let held = unsafe { &*held.cast::<Held>() };
+    assert!(!held.now.swap(true, Relaxed));
+    held.times.fetch_add(1, Relaxed);
+}
+
+unsafe extern "C" fn unlock(held: *mut c_void) {
+    // SAFETY: the pointer is the one that the test passed, to a `Held` that outlives the `Gpu`.
+    assert!(unsafe { &*held.cast::<Held>() }.now.swap(false, Relaxed));
+}
+
 #[test]
 fn a_c_host_records_by_address_and_asks() {
     let host = Host::new();
-    // SAFETY: a function pointer for another.
+    // SAFETY: one function pointer type is cast to another, and back before the call.
     let get =
         unsafe { std::mem::transmute::<*const (), unsafe extern "C" fn()>(host.entry.static_fn().get_instance_proc_addr as *const ()) };
     let (instance, physical) = (host.instance.handle().as_raw(), host.physical.as_raw());
     let needs: OlbvhHostRequirements = made(|out| olbvh_host_check(Some(get), instance, physical, out));
     let told = [needs.buffer_addresses, needs.shader_int64, needs.subgroup_size_control].map(|told| told != 0);
     assert_eq!((needs.queue_family, told), (host.family, [host.addresses, host.int64, host.control]));
-    // SAFETY: C strings that last, so many of them.
+    // SAFETY: `extension_count` entries are static C strings.
     let names = needs.extensions[..needs.extension_count as usize].iter().map(|&name| unsafe { CStr::from_ptr(name) });
     assert!(names.eq(Requirements::check(&host.instance, host.physical).extensions_without_rays()), "{needs:?}");
     assert_eq!(olbvh_host_check(None, instance, physical, std::ptr::from_ref(&needs).cast_mut()), OlbvhStatus::Invalid);
+    let held = Held::default();
     let mut lent = OlbvhHostDevice {
         get_instance_proc_addr: Some(get),
         instance,
         physical_device: physical,
         device: host.device.handle().as_raw(),
         queue: host.queue().lock().unwrap().as_raw(),
+        lock_queue: Some(lock),
+        unlock_queue: Some(unlock),
+        queue_lock: (&raw const held).cast_mut().cast(),
         pipeline_cache: 0,
         queue_family: host.family,
         buffer_addresses: u32::from(host.addresses),
@@ -192,8 +218,8 @@ fn a_c_host_records_by_address_and_asks() {
     frames(gpu);
     queries::owned(gpu);
     olbvh_gpu_free(gpu);
-    // Without a queue there is nothing but recording, here with a pipeline cache of the host's.
-    // SAFETY: plain creation; destroyed below, when nothing uses it any more.
+    // Without a queue, only recording is possible; here with the host's pipeline cache.
+    // SAFETY: the create info is complete, and the cache is destroyed below, when nothing uses it any more.
     let cache = unsafe { host.device.create_pipeline_cache(&vk::PipelineCacheCreateInfo::default(), None) }.unwrap();
     (lent.queue, lent.pipeline_cache) = (0, cache.as_raw());
     let gpu = made(|out| olbvh_gpu_from_host(&raw const lent, out));
@@ -207,7 +233,7 @@ fn a_c_host_records_by_address_and_asks() {
     assert!(upload == OlbvhStatus::Invalid && message().contains("lent no queue"), "{}", message());
     assert_eq!(handle(gpu, "gpu").unwrap().0.pipeline_cache(), cache);
     olbvh_gpu_free(gpu);
-    // SAFETY: as above.
+    // SAFETY: the cache was created by this device, and the `Gpu` that used it has been freed.
     unsafe { host.device.destroy_pipeline_cache(cache, None) };
     lent.device = 0;
     let mut none = null_mut();
@@ -218,7 +244,8 @@ fn a_c_host_records_by_address_and_asks() {
 fn a_c_host_records_by_descriptors_and_makes_nothing() {
     let host = Host::new();
     let options = GpuOptions { binding: Some(Binding::Descriptors), ..GpuOptions::default() };
-    // SAFETY: the host's handles belong together and outlive the frames; the counted functions do what the device's own do.
+    // SAFETY: the host's handles belong to one device and outlive the frames; the counted functions call the device's
+    // own.
     let gpu = unsafe { Gpu::from_raw(HostDevice { device: counting(&host.device), ..host.lend() }, &options) }.unwrap();
     let gpu = Box::into_raw(Box::new(OlbvhGpu(gpu)));
     frames(gpu);

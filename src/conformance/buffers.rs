@@ -1,14 +1,14 @@
-//! Device memory with guard words behind it.
+//! Device memory with guard words after it.
 
 use super::failure::{Verdict, fail};
 use crate::gpu::{Buffer, BufferRef, Gpu};
 
-/// What memory holds before a case writes to it: no index, no count, not a likely sum.
+/// Value that memory holds before a case writes to it: unlikely as an index, a count or a sum.
 pub(crate) const FILL: u32 = 0xa5c3_9e17;
-/// Words behind every buffer that nobody may touch.
+/// Number of guard words after every buffer, which no kernel may write.
 const GUARD: usize = 64;
 
-/// Words in device memory, and behind them a guard.
+/// Words in device memory, followed by a guard.
 pub(crate) struct Guarded {
     buffer: Buffer,
     words: usize,
@@ -16,7 +16,7 @@ pub(crate) struct Guarded {
 }
 
 impl Guarded {
-    /// `words` words: the data, then [`FILL`].
+    /// A buffer of `words` words: the data, then [`FILL`].
     pub(crate) fn new(gpu: &Gpu, name: &'static str, data: &[u32], words: usize) -> Verdict<Self> {
         let mut content = Vec::with_capacity(words.max(data.len()) + GUARD);
         content.extend_from_slice(data);
@@ -24,17 +24,17 @@ impl Guarded {
         Ok(Self { buffer: gpu.upload(name, &content)?, words: words.max(data.len()), name })
     }
 
-    /// As many bytes, rounded up to words, of scratch memory.
+    /// Scratch memory of this many bytes, rounded up to words.
     pub(crate) fn scratch(gpu: &Gpu, name: &'static str, bytes: u64) -> Verdict<Self> {
         Self::new(gpu, name, &[], bytes.div_ceil(4) as usize)
     }
 
-    /// Without the guard.
+    /// The buffer without its guard.
     pub(crate) fn all(&self) -> BufferRef {
         self.buffer.all().part(0, 4 * self.words as u64)
     }
 
-    /// The words; whoever wrote behind them fails.
+    /// Reads the words; fails if the guard has been overwritten.
     pub(crate) fn read(&self, gpu: &Gpu, stage: &str) -> Verdict<Vec<u32>> {
         let mut content: Vec<u32> = gpu.download(&self.buffer, self.buffer.all())?;
         if let Some(i) = content[self.words..].iter().position(|&w| w != FILL) {
@@ -52,7 +52,7 @@ impl Guarded {
     }
 }
 
-/// The first words of a part, from the words of its memory.
+/// The first words of a part; `content` holds all words of its memory.
 pub(crate) fn part(content: &[u32], part: BufferRef, words: usize) -> &[u32] {
     let begin = (part.offset / 4) as usize;
     content.get(begin..begin + words).unwrap_or_default()

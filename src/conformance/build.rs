@@ -1,4 +1,4 @@
-//! Construction against the reference, stage by stage.
+//! Cases that compare the construction with the reference implementation, stage by stage.
 
 use super::TargetKind;
 use super::buffers::{Guarded, part as part_of};
@@ -14,22 +14,23 @@ use crate::primitives::Arena;
 use crate::reference::quarters::split_entries;
 use crate::tree::{TreeArrays, TreeBytes};
 
-/// Which interface builds, within what.
+/// Which interface builds the tree, and within which limits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Way {
-    /// [`Tree::build`]: counts are read back, exactly what is needed is allocated.
+    /// [`Tree::build`]: counts are read back, and exactly the memory needed is allocated.
     Owned,
     /// [`cmd_build`] with room to spare.
     Recorded,
     /// [`cmd_build`] with room for exactly this tree.
     Tight,
-    /// [`cmd_build`] with room for one entry less than the heuristic's level needs.
+    /// [`cmd_build`] with room for one entry less than the level of the heuristic needs.
     Clipped,
-    /// [`cmd_build`] with room for all candidates, and for one entry less than the heuristic's level keeps of them.
+    /// [`cmd_build`] with room for all candidates, but for one entry less than the level of the heuristic keeps of
+    /// them.
     Narrow,
     /// [`cmd_build`] with as much room as level 0 may need, and no more.
     Root,
-    /// [`cmd_build`] within a budget of less than level 0: nothing is built, and the status says so.
+    /// [`cmd_build`] within a budget that is too small for level 0: nothing is built, and the status says so.
     Nothing,
     /// [`cmd_build`] with room for levels 0 to 2 only.
     Shallow,
@@ -72,15 +73,15 @@ pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &Devic
     recorded(gpu, device, &BuildOptions { budget, ..options }, &capacity, &expected)
 }
 
-/// The capacity of a way of building, and what is built within it.
+/// The capacity for a way of building, and what is built within it.
 fn within(way: Way, twin: &mut Twin, options: &BuildOptions) -> Verdict<(Capacity, Expected)> {
     let limit = |entries: u64| u32::try_from(entries).unwrap_or(u32::MAX);
     let heuristic = twin.sizes.heuristic(options.alpha_fixed()?);
-    // Bad cells are not known when a build is planned.
+    // A plan does not know which tetrahedra are bad, so it counts all.
     let tets = twin.mesh.tets.len() as u32;
     let room = limit(twin.sizes.entries[heuristic as usize]).max(tets);
     let (entries, level) = match way {
-        // No deeper than need be: marks take a bit per cell of the deepest level.
+        // The level is no deeper than necessary, because marks take a bit per cell of the deepest level.
         Way::Clipped => (room.saturating_sub(1).max(tets), if options.lists == Lists::All { 10 } else { heuristic }),
         Way::Root | Way::Nothing => (tets, 10),
         Way::Shallow => (room, 2),
@@ -110,7 +111,7 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
     let tree = Tree::build(gpu, device, options)?;
     compare_status(&expected.status, tree.status())?;
     compare_arrays(expected, &tree.download()?)?;
-    // Exactly the plan, nothing more (arrays have 16 bytes at least).
+    // The arrays have exactly the planned sizes (but at least 16 bytes).
     let (s, memory) = (&expected.status, tree.memory());
     let size = |name: &str, words: u32, part: BufferRef| compare_one("build.plan", name, &(4 * u64::from(words)).max(16), &part.size);
     size("P (bytes)", s.entries, memory.p)?;
@@ -180,7 +181,7 @@ fn one<T: bytemuck::Pod>(words: &[u32]) -> Verdict<T> {
         .map_err(|e| super::failure::fail("build", "status", None, "bytes", &e.to_string()))
 }
 
-/// Counters, those first that are written first.
+/// Compares the counters, in the order in which they are written.
 fn compare_status(expected: &BuildStatus, found: &BuildStatus) -> Result<(), Stop> {
     compare_one("build.choose_depth", "status.level", &expected.level, &found.level)?;
     compare_one("build.plan_nodes", "status.entries", &expected.entries, &found.entries)?;
@@ -198,7 +199,7 @@ fn compare_status(expected: &BuildStatus, found: &BuildStatus) -> Result<(), Sto
     )
 }
 
-/// The arrays of the tree, those first that are written first.
+/// Compares the arrays of the tree, in the order in which they are written.
 fn compare_arrays(expected: &Expected, f: &TreeArrays) -> Verdict {
     let Some(e) = expected.tree() else { return compare_one("build", "entries", &0, &f.p.len()) };
     let words = |grid| bytemuck::cast_slice::<Grid, u32>(std::slice::from_ref(grid)).to_vec();

@@ -1,4 +1,4 @@
-//! The cases of meshes and trees.
+//! The list of cases for meshes and trees.
 
 use super::build::{BuildCase, Way};
 use super::meshes::{MeshRecipe, recipes};
@@ -7,9 +7,9 @@ use super::{Case, Group, TargetKind, Work};
 use crate::kernels::Row;
 use crate::options::{Assign, Lists};
 
-/// α of the quick group, one per assignment so that all of them are seen, and the rest.
+/// All values of α of the full group.
 const ALPHAS: [f32; 9] = [0.0, 0.3, 0.5, 1.0, 1.5, 2.0, 4.0, 7.0, 10.0];
-/// Meshes that are built in every way and under every target.
+/// Meshes over which trees are built in every way and with every target.
 const THOROUGH: [&str; 7] = ["one-tet", "bad-cells", "jitter-12x13x11", "slivers", "huge-among-small", "one-place", "no-cells"];
 
 pub(super) fn add(cases: &mut Vec<Case>) {
@@ -36,7 +36,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     };
     for (i, assign) in Assign::EVERY.into_iter().enumerate() {
         let case = BuildCase { assign, ..case };
-        // Quick: the record-only layer with boxes at α = 0, ours at a larger α.
+        // Quick group: recorded with boxes at α = 0, and owned at a larger α.
         build(cases, mesh.group, BuildCase { boxes: true, ..case });
         build(cases, mesh.group, BuildCase { alpha: [0.5, 1.0, 2.0][i], way: Way::Owned, ..case });
         for (alpha, boxes) in ALPHAS.into_iter().zip([false, true].into_iter().cycle()) {
@@ -48,7 +48,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
         for (alpha, way) in [(0.0, Way::Owned), (2.0, Way::Owned), (0.0, Way::Tight), (0.0, Way::Clipped), (0.0, Way::Shallow)] {
             build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { alpha, way, boxes: true, ..case });
         }
-        // Marked cells at several levels of one build.
+        // A build that marks cells at several levels.
         build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { way: Way::Narrow, ..case });
         let case = BuildCase { lists: Lists::All, ..case };
         let group = if thorough { mesh.group } else { Group::Full };
@@ -64,7 +64,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
 }
 
-/// Trees under every row of the table of targets.
+/// Adds trees with every row of the table of targets.
 fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for target in Row::EVERY.map(TargetKind::Row) {
         for (assign, lists) in [(Assign::Aabb, Lists::All), (Assign::Exact, Lists::Boundary)] {
@@ -73,7 +73,7 @@ fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
 }
 
-/// Trees over a mesh of the caller's.
+/// Adds trees over a mesh of the caller.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for (assign, lists) in Assign::EVERY.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
         let tight = BuildCase { mesh, alpha: 0.0, assign, lists, boxes: false, way: Way::Tight, target: TargetKind::Device };
@@ -92,7 +92,7 @@ fn build(cases: &mut Vec<Case>, group: Group, case: BuildCase) {
 }
 
 impl Lists {
-    /// What the names of cases say about it.
+    /// Part of the names of cases for these lists.
     pub(super) fn suffix(self) -> &'static str {
         match self {
             Self::All => "",

@@ -1,4 +1,4 @@
-//! What a device should build, with everything in between that its stages leave behind.
+//! The tree that a device should build, and what the stages of its construction should leave in memory.
 
 use super::failure::Verdict;
 use super::twin::{Built, Twin};
@@ -8,20 +8,22 @@ use crate::reference::codes::Stage;
 use crate::tree::TreeArrays;
 use std::sync::Arc;
 
-/// A tree and its making.
+/// A tree and the intermediate results of its construction.
 pub(crate) struct Expected {
-    /// Where the candidates of every tetrahedron begin, or shares of 32 where they are filtered, and behind them their number.
+    /// Where the candidates of each tetrahedron start (or, if candidates are filtered, their shares of 32), followed by
+    /// the total number.
     pub offsets: Vec<u32>,
-    /// Whether the device stores boxes; the reference always does.
+    /// Whether the device stores boxes; the reference implementation always does.
     pub boxes: bool,
-    /// What the device's status block should say.
+    /// Expected content of the device's status block.
     pub status: BuildStatus,
-    /// The reference's tree; none where not even the root fits.
+    /// The tree of the reference implementation; `None` if not even the root fits.
     built: Option<Arc<Built>>,
 }
 
 impl Expected {
-    /// Within `room` candidates, `None`: not even those of the root, `most` entries, and down to `level` at most.
+    /// The tree within `room` candidates (`None`: too few even for the root), at most `most` entries, and down to
+    /// `level` at most.
     pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, room: Option<u32>, most: u32, level: u32) -> Verdict<Self> {
         let sizes = twin.sizes;
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
@@ -31,7 +33,8 @@ impl Expected {
         for (k, n) in sizes.entries.iter().enumerate() {
             (status.total[2 * k], status.total[2 * k + 1]) = (*n as u32, (n >> 32) as u32);
         }
-        // A capacity of the deepest level that is allowed is a capacity for no deeper one (more entries at each), except where levels tie.
+        // A level needs at least as many entries as a coarser one. A capacity that just suffices for one level
+        // therefore excludes deeper ones, except where levels tie.
         let fits = |k: u32| k <= level && room.is_some_and(|room| sizes.entries[k as usize] <= u64::from(room));
         let Some(mut chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
             status.overflow = 1;
@@ -67,12 +70,12 @@ impl Expected {
         Ok(Self { offsets, boxes: options.boxes, status, built: Some(built) })
     }
 
-    /// The reference's tree, with boxes; none where not even the root fits.
+    /// The tree of the reference implementation, with boxes; `None` if not even the root fits.
     pub(crate) fn tree(&self) -> Option<&TreeArrays> {
         Some(self.built.as_ref()?.tree())
     }
 
-    /// The sorted codes of its entries.
+    /// The sorted codes of the entries.
     pub(crate) fn codes(&self) -> &[u32] {
         self.built.as_ref().map_or(&[], |built| &built.made.codes)
     }

@@ -1,8 +1,8 @@
-//! Seeded inputs.
+//! Seeded input data.
 
 pub(crate) use crate::mesh::hash as mix;
 
-/// Kinds of keys.
+/// Kinds of sequences of keys.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Keys {
     /// Well mixed.
@@ -11,18 +11,18 @@ pub(crate) enum Keys {
     Sorted,
     /// Descending.
     Reversed,
-    /// One value.
+    /// All keys equal.
     Equal,
-    /// Three values, so that stability shows.
+    /// Three different values, so that stability becomes visible.
     Few,
     /// All bits set.
     Ones,
-    /// Random, with random bits above those that count.
+    /// Random, with random bits above those that are sorted.
     Dirty,
 }
 
 impl Keys {
-    /// Name in cases.
+    /// Name in the names of cases.
     pub(crate) fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
@@ -35,7 +35,7 @@ impl Keys {
         }
     }
 
-    /// `n` keys of `bits` bits.
+    /// Makes `n` keys of `bits` bits.
     pub(crate) fn make(self, n: u32, bits: u32) -> Vec<u32> {
         let mask = u32::MAX.checked_shr(32 - bits).unwrap_or(0);
         // Ascending over the whole range of the keys.
@@ -53,7 +53,7 @@ impl Keys {
     }
 }
 
-/// A seeded sequence.
+/// A seeded pseudo-random sequence.
 pub(crate) struct Random(u32);
 
 impl Random {
@@ -61,23 +61,23 @@ impl Random {
         Self(mix(seed ^ 0x9e37_79b9))
     }
 
-    /// The next word.
+    /// The next 32-bit word.
     pub(crate) fn word(&mut self) -> u32 {
         self.0 = self.0.wrapping_add(0x9e37_79b9);
         mix(self.0)
     }
 
-    /// Below `n`.
+    /// A number below `n`.
     pub(crate) fn below(&mut self, n: u32) -> u32 {
         ((u64::from(self.word()) * u64::from(n)) >> 32) as u32
     }
 
-    /// In 0…1.
+    /// A number in [0, 1).
     pub(crate) fn unit(&mut self) -> f32 {
         (self.word() >> 8) as f32 / 16_777_216.0
     }
 
-    /// In any order, reproducibly.
+    /// Shuffles items, reproducibly.
     pub(crate) fn shuffle<T>(&mut self, items: &mut [T]) {
         for i in (1..items.len()).rev() {
             items.swap(i, self.below(i as u32 + 1) as usize);

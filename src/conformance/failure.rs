@@ -1,27 +1,27 @@
-//! What a failing case tells.
+//! What a failing case reports.
 
 use crate::error::Error;
 use std::fmt::Debug;
 
-/// Where a device and the reference part.
+/// The first difference between the device and the reference implementation.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Failure {
     /// Stage or kernel that wrote the array.
     pub stage: String,
-    /// The array.
+    /// Name of the array.
     pub array: String,
-    /// First index that differs; `None` if it is not about an element.
+    /// First index that differs; `None` if the failure does not concern an element.
     pub index: Option<u64>,
-    /// The reference's value there.
+    /// Value of the reference implementation.
     pub expected: String,
-    /// The device's.
+    /// Value of the device.
     pub found: String,
 }
 
-/// How a case ends without an answer.
+/// Why a case ends early.
 #[derive(Debug)]
 pub(crate) enum Stop {
-    /// Wrong.
+    /// The results differ.
     Failed(Failure),
     /// The device cannot hold the case.
     Skipped(String),
@@ -49,13 +49,13 @@ impl From<Error> for Stop {
     }
 }
 
-/// A failure.
+/// Makes a failure.
 pub(crate) fn fail(stage: &str, array: &str, index: Option<usize>, expected: &str, found: &str) -> Stop {
     let index = index.map(|i| i as u64);
     Stop::Failed(Failure { stage: stage.into(), array: array.into(), index, expected: expected.into(), found: found.into() })
 }
 
-/// Holds an array of the device against the reference's.
+/// Compares an array of the device with that of the reference implementation.
 pub(crate) fn compare<T: PartialEq + Debug>(stage: &str, array: &str, expected: &[T], found: &[T]) -> Verdict {
     if let Some(i) = expected.iter().zip(found).position(|(e, f)| e != f) {
         return Err(fail(stage, array, Some(i), &format!("{:?}", expected[i]), &format!("{:?}", found[i])));
@@ -66,7 +66,7 @@ pub(crate) fn compare<T: PartialEq + Debug>(stage: &str, array: &str, expected: 
     Ok(())
 }
 
-/// Holds one value against the reference's.
+/// Compares one value with that of the reference implementation.
 pub(crate) fn compare_one<T: PartialEq + Debug>(stage: &str, what: &str, expected: &T, found: &T) -> Verdict {
     if expected == found { Ok(()) } else { Err(fail(stage, what, None, &format!("{expected:?}"), &format!("{found:?}"))) }
 }

@@ -1,4 +1,4 @@
-//! Runs cases on a device.
+//! The runner of cases on a device.
 
 use super::failure::{Stop, Verdict};
 use super::meshes::MeshRecipe;
@@ -12,22 +12,22 @@ use std::time::{Duration, Instant};
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// Device and reference agree.
+    /// The device and the reference implementation agree.
     Passed,
-    /// They do not.
+    /// They differ.
     Failed(Failure),
     /// The device cannot hold the case; the text says why.
     Skipped(String),
 }
 
-/// A case that was run.
+/// The result of a case.
 #[derive(Clone, Debug)]
 pub struct Report {
     /// Name of the case.
     pub name: String,
-    /// How it ended.
+    /// The outcome.
     pub outcome: Outcome,
-    /// How long it took.
+    /// The time that it took.
     pub time: Duration,
 }
 
@@ -40,8 +40,8 @@ pub struct Lab {
 }
 
 impl Lab {
-    /// A lab on the device and binding that `options` name. The self-test is left to the case `device/self-test`, so that a device that fails it
-    /// can still be looked into.
+    /// Opens a lab on the device and binding that `options` name. The self-test is not run here but in the case
+    /// `device/self-test`, so that a device that fails it can still be examined.
     ///
     /// # Errors
     /// As [`Gpu::new`].
@@ -50,12 +50,12 @@ impl Lab {
         Ok(Self { device, messages: 0, subject: None })
     }
 
-    /// The device as it chose its shapes itself.
+    /// The device, with the target of the options or its own choice.
     pub fn device(&self) -> &Gpu {
         &self.device
     }
 
-    /// The device under a shape.
+    /// The device with another target.
     fn gpu(&self, kind: TargetKind) -> Result<Gpu> {
         match kind.target(&self.device.report().room) {
             Some(target) => self.device.with_target(target),
@@ -63,7 +63,7 @@ impl Lab {
         }
     }
 
-    /// Runs a case. A message of a validation layer fails it.
+    /// Runs a case. It fails if a validation layer reports a message.
     pub fn run(&mut self, case: &Case) -> Report {
         let begin = Instant::now();
         let outcome = match self.work(&case.work) {
@@ -107,7 +107,7 @@ impl Lab {
         }
     }
 
-    /// Checks something over a mesh. The mesh stays, on host and device, until a case of another one comes.
+    /// Runs a check over a mesh. The mesh is kept, on host and device, until a case of another mesh follows.
     fn over(&mut self, recipe: &MeshRecipe, check: impl FnOnce(&Gpu, &mut Twin, &DeviceMesh) -> Verdict) -> Verdict {
         let subject = if let Some(kept) = self.subject.take().filter(|(twin, _)| twin.name == recipe.name) {
             kept

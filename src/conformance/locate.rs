@@ -1,4 +1,4 @@
-//! Point location against the reference: owners and barycentric coordinates to the bit.
+//! Cases that compare point location with the reference implementation: owners and barycentric coordinates to the bit.
 
 use super::buffers::Guarded;
 use super::data::Random;
@@ -13,27 +13,27 @@ use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_loc
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
 
-/// Meshes with cells turned over, 93 of 10,296 here: they overlap their neighbours' neighbours.
+/// Meshes with inverted tetrahedra (93 of 10,296 in this one), which overlap the neighbours of their neighbours.
 const OVERLAPPING: [&str; 1] = ["jitter-12x13x11"];
 
-/// How points are located.
+/// How the points of a case are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum How {
-    /// By descent, the convenient way.
+    /// By descent, with the owning call.
     Descent,
-    /// By the paper's traversal with a short stack of that many nodes.
+    /// By the paper's traversal with a short stack of this many nodes.
     Traversal(u32),
-    /// By runs in the given order, the convenient way.
+    /// By runs in the given order, with the owning call.
     Runs,
-    /// By runs in sorted order, the convenient way.
+    /// By runs in sorted order, with the owning call.
     Sorted,
-    /// Recorded, with the right owner, a wrong one or none as a hint.
+    /// Recorded, with the right owner, a wrong one, or none as a hint.
     Hints,
     /// All owners.
     All,
-    /// With the values of a field.
+    /// With interpolated values of a field.
     Values,
-    /// Trees of every α and assignment name the same owners, and lose no point of the mesh.
+    /// Trees of every α and assignment must give the same owners and lose no point of the mesh.
     Same,
 }
 
@@ -52,7 +52,7 @@ impl How {
     }
 }
 
-/// Points to locate.
+/// Points to locate in a tree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct LocateCase {
     pub mesh: MeshRecipe,
@@ -88,7 +88,8 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
             compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, TOLERANCE, quiet)?)
         }
         How::Values => {
-            // Whole numbers below 2^12: products and sums differ by the rounding of the barycentrics' division at most.
+            // Values are whole numbers below 2^12, so products and sums differ at most by the rounding of the division
+            // that computes the barycentric coordinates.
             for (on, n) in [(On::Points, mesh.points.len()), (On::Cells, mesh.tets.len())] {
                 let field = crate::mesh::Field {
                     name: "test".into(),
@@ -115,7 +116,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
             if let Some(i) = first.owners[..inside].iter().position(|&o| o == NONE) {
                 return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
             }
-            // Where cells overlap, only lists name the lowest of those that contain a point (SPEC 3.1).
+            // Where tetrahedra overlap, only full lists give the lowest of those that contain a point (SPEC 3.1).
             let kinds = if OVERLAPPING.contains(&case.mesh.name) { vec![Lists::All] } else { Lists::EVERY.to_vec() };
             for (alpha, assign) in [(0.0, Assign::Planes), (1.0, Assign::Exact), (2.0, Assign::Planes), (4.0, Assign::Aabb)] {
                 for &lists in &kinds {
@@ -143,7 +144,8 @@ fn compare_locations(expected: &[Location], owners: &[u32], barycentrics: &[[f32
     compare("query.locate", "barycentrics (bits)", &wanted, &barycentrics.iter().map(bits).collect::<Vec<_>>())
 }
 
-/// Hints: the owner, another valid cell, or none; the reference gets the same.
+/// Locates points with hints: the owner, another valid tetrahedron, or none. The reference implementation gets the same
+/// hints.
 fn hints(gpu: &Gpu, mesh: &Mesh, device: &DeviceMesh, tree: &Tree, locator: &Locator<'_>, points: &[[f32; 3]]) -> Verdict {
     let bad = device.bad_cells()?;
     let valid: Vec<u32> = (0..mesh.tets.len() as u32).filter(|t| bad.binary_search(t).is_err()).collect();

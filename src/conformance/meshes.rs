@@ -1,11 +1,11 @@
-//! The meshes of the suite: procedural, seeded, small enough that a software device builds a tree over each in a moment.
+//! The meshes of the suite: procedural, seeded, and so small that a software device quickly builds a tree over each.
 
 use super::Group;
 use super::data::Random;
 use crate::error::Result;
 use crate::mesh::{Mesh, kuhn, kuhn_jittered};
 
-/// A mesh by name.
+/// A named mesh.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct MeshRecipe {
     pub name: &'static str,
@@ -21,7 +21,7 @@ enum Source {
 }
 
 impl MeshRecipe {
-    /// A mesh that is not of the suite.
+    /// A mesh that does not belong to the suite.
     pub(crate) fn given(name: &str, mesh: Mesh) -> Self {
         let name = Box::leak(name.to_owned().into_boxed_str());
         Self { name, group: Group::Quick, source: Source::Given(Box::leak(Box::new(mesh))) }
@@ -36,7 +36,7 @@ impl MeshRecipe {
     }
 }
 
-/// A mesh and its group.
+/// Name, group and constructor of a mesh.
 type Entry = (&'static str, Group, fn() -> Result<Mesh>);
 
 const UNIT: [[f32; 3]; 4] = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
@@ -95,18 +95,18 @@ const RECIPES: &[Entry] = &[
     ("fan-700", Group::Full, || fan(700)),
 ];
 
-/// Every mesh.
+/// All meshes of the suite.
 pub(crate) fn recipes() -> impl Iterator<Item = MeshRecipe> {
     RECIPES.iter().map(|&(name, group, make)| MeshRecipe { name, group, source: Source::Made(make) })
 }
 
-/// The wrapper makes the table above short.
+/// The `Result` keeps the table above short.
 #[allow(clippy::unnecessary_wraps)]
 fn of(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Result<Mesh> {
     Ok(Mesh::new(points.to_vec(), tets.to_vec()))
 }
 
-/// The unit tetrahedron's vertices and more.
+/// The vertices of the unit tetrahedron, followed by others.
 fn with(more: &[[f32; 3]]) -> Vec<[f32; 3]> {
     [&UNIT, more].concat()
 }
@@ -123,7 +123,7 @@ fn scaled(by: f32) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Every kind of bad cell between good ones.
+/// Every kind of bad cell, between good ones.
 fn bad_cells() -> Result<Mesh> {
     let mut mesh = kuhn_jittered([4; 3], 0.3, 2)?;
     let n = mesh.points.len() as u32;
@@ -140,7 +140,7 @@ fn bad_cells() -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Points that no cell uses, some not finite, some far away.
+/// Points that no tetrahedron uses, some of them not finite, some far away.
 fn unused_points() -> Result<Mesh> {
     let mut mesh = kuhn_jittered([3; 3], 0.3, 5)?;
     mesh.points.splice(0..0, [[f32::NAN; 3], [1e20, -1e20, 0.0]]);
@@ -149,7 +149,7 @@ fn unused_points() -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Cells squashed until their vertices meet in single precision.
+/// Tetrahedra squashed until their vertices coincide in single precision.
 fn slivers() -> Result<Mesh> {
     let mut mesh = kuhn_jittered([8; 3], 0.3, 6)?;
     let mut random = Random::new(6);
@@ -162,7 +162,7 @@ fn slivers() -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// One tetrahedron over all of the others.
+/// One tetrahedron that covers all others.
 fn huge_among_small() -> Result<Mesh> {
     let mut mesh = kuhn([10; 3])?;
     let n = mesh.points.len() as u32;
@@ -172,7 +172,7 @@ fn huge_among_small() -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// One vertex of a small mesh at 1e12.
+/// A small mesh with one vertex at 1e12.
 fn outlier() -> Result<Mesh> {
     let mut mesh = kuhn_jittered([5; 3], 0.3, 7)?;
     if let Some(p) = mesh.points.last_mut() {
@@ -204,7 +204,7 @@ fn signs_mixed() -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// Tetrahedra that share nothing and overlap at will, of sizes over three decades.
+/// Tetrahedra that share no vertices and overlap arbitrarily, of sizes over three decades.
 #[allow(clippy::unnecessary_wraps)]
 fn cloud(n: u32) -> Result<Mesh> {
     let mut random = Random::new(n);
@@ -219,7 +219,7 @@ fn cloud(n: u32) -> Result<Mesh> {
     Ok(Mesh::new(points, (0..n).map(|i| [4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3]).collect()))
 }
 
-/// Tetrahedra around one edge: all faces are near the same two vertices.
+/// Tetrahedra around one edge: all faces contain at least one of the same two vertices.
 #[allow(clippy::unnecessary_wraps)]
 fn fan(n: u32) -> Result<Mesh> {
     let mut points = vec![[0.0, 0.0, -1.0], [0.0, 0.0, 1.0]];

@@ -1,15 +1,16 @@
-//! The conformance suite: every primitive, stage and query of the device compared with the plain reference in [`crate::reference`].
+//! The conformance suite: compares every primitive, stage and query of the device with the reference implementation in
+//! [`crate::reference`].
 //!
-//! Cases are data ([`cases`]): a name, a group, and what is computed from which seeded input. One runner ([`Lab`]) serves the tests and the
-//! command line; it needs a device and nothing else. A case that fails says which kernel or stage, which array, the first index that differs,
-//! what was expected and what was found ([`Failure`]).
+//! Cases are data ([`cases`]): a name, a group, and what is computed from which seeded input. One runner ([`Lab`])
+//! serves both the tests and the command line; it needs nothing but a device. For a case that fails, [`Failure`] names
+//! the kernel or stage, the array, the first index that differs, the expected value and the value found.
 //!
 //! ```text
 //! reduce/add/65537/host                    operation, length, where the count is known [, keys] [, target]
 //! scan/100003/indirect-below/narrow        length, count [, target]
 //! sort/21-bits/100000/indirect/reversed    bits of the keys, length, count [, keys] [, target]
 //! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
-//! scan/100003/host/in-place/row-amd        … under the shapes of a kind of device
+//! scan/100003/host/in-place/row-amd        … with the target for a kind of device
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
 //! ranges/slivers/exact/alpha-1/cells       mesh, assignment [, lists], α, field
@@ -54,14 +55,14 @@ use slice::SliceCase;
 
 use crate::mesh::Mesh;
 
-/// How often a case is worth its time.
+/// Group of cases by the time that they take.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Group {
-    /// Under two minutes for all of them on two cores with lavapipe.
+    /// Cases that together take less than two minutes on two cores with lavapipe.
     Quick,
-    /// Everything but `Large`.
+    /// Further cases; together with `Quick`, everything except `Large`.
     Full,
-    /// Buffers past 2^26 words; only where they are asked for.
+    /// Cases with buffers of more than 2^26 words, which run only on request.
     Large,
 }
 
@@ -79,9 +80,9 @@ impl Group {
 /// One comparison.
 #[derive(Clone, Debug)]
 pub struct Case {
-    /// Parts separated by `/`, from the general to the particular.
+    /// Name of the case: parts separated by `/`, from the general to the particular.
     pub name: String,
-    /// When to run it.
+    /// Group of the case.
     pub group: Group,
     work: Work,
 }
@@ -103,8 +104,8 @@ enum Work {
 }
 
 impl Case {
-    /// Whether a filter means this case: the name of a group (`quick`; `full` holds `quick` as well), or a part of the case's name. Without a
-    /// filter all cases are meant that are not `large`.
+    /// Whether a filter selects this case. A filter is the name of a group (`quick`; `full`, which includes `quick`;
+    /// `large`) or a part of the case's name. Without a filter, all cases except those of `large` are selected.
     pub fn matches(&self, filter: Option<&str>) -> bool {
         match filter {
             None | Some("full") => self.group <= Group::Full,
@@ -114,7 +115,8 @@ impl Case {
         }
     }
 
-    /// What belongs together: the cases of a mesh, or those of a primitive (`sort/21-bits`; the second part of a scan's name is a length).
+    /// The family of the case: all cases of one mesh, or of one primitive (`sort/21-bits`; for a scan `scan`, because
+    /// the second part of its name is a length).
     pub fn family(&self) -> &str {
         let mut parts = self.name.match_indices('/').map(|(at, _)| at);
         let (first, second) = (parts.next().unwrap_or(self.name.len()), parts.next().unwrap_or(self.name.len()));
@@ -125,13 +127,13 @@ impl Case {
         }
     }
 
-    /// Whether it is about a mesh, not a primitive of the device.
+    /// Whether the case concerns a mesh rather than a primitive of the device.
     pub fn is_over_a_mesh(&self) -> bool {
         !matches!(self.work, Work::SelfTest | Work::Reduce(_) | Work::Scan(_) | Work::Sort(_))
     }
 }
 
-/// All cases, in the order in which a device is built up: primitives, meshes, trees.
+/// All cases, in the order in which they depend on each other: primitives, meshes, trees, queries.
 pub fn cases() -> Vec<Case> {
     let mut cases = vec![Case { name: "device/self-test".into(), group: Group::Quick, work: Work::SelfTest }];
     primitive_cases::add(&mut cases);
@@ -140,7 +142,8 @@ pub fn cases() -> Vec<Case> {
     cases
 }
 
-/// The cases of one mesh of the caller's: its topology, trees of every assignment, every query. The mesh is kept until the program ends.
+/// The cases for a mesh of the caller: its topology, trees of every assignment, every query. The mesh stays in memory
+/// until the program ends.
 pub fn cases_of(name: &str, mesh: Mesh) -> Vec<Case> {
     let mesh = MeshRecipe::given(name, mesh);
     let mut cases = vec![Case { name: format!("mesh/{name}"), group: Group::Quick, work: Work::Topology(mesh) }];

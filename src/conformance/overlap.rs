@@ -1,4 +1,4 @@
-//! Mesh overlap against the reference (SPEC 3.5): sets, pairs, and what they took.
+//! Cases that compare mesh overlap with the reference implementation (SPEC 3.5): sets, pairs, and effort.
 
 use super::failure::{Stop, Verdict, compare, compare_one};
 use super::meshes::MeshRecipe;
@@ -14,7 +14,7 @@ use crate::reference::build::build;
 use crate::reference::overlap::{OverlapSide, overlap as reference};
 use crate::tree::TreeArrays;
 
-/// A mesh against another.
+/// The overlap of a mesh with another one.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct OverlapCase {
     pub mesh: MeshRecipe,
@@ -24,12 +24,12 @@ pub(crate) struct OverlapCase {
     pub other: Other,
 }
 
-/// What a mesh is held against.
+/// The other mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Other {
     /// A jittered grid near the origin.
     Grid,
-    /// Itself, moved by a part of its extent.
+    /// The mesh itself, moved by a part of its extent.
     Itself,
 }
 
@@ -42,7 +42,7 @@ impl Other {
     }
 }
 
-/// A mesh on host and device.
+/// A mesh with its tree, on host and device.
 #[derive(Debug)]
 pub struct HostAndDevice {
     mesh: Mesh,
@@ -53,7 +53,7 @@ pub struct HostAndDevice {
 }
 
 impl HostAndDevice {
-    /// With its tree on either.
+    /// Prepares a mesh, and builds its tree, on host and device.
     ///
     /// # Errors
     /// Those of the topology and of the build.
@@ -74,7 +74,7 @@ impl HostAndDevice {
     }
 }
 
-/// What is compared: a mesh as the reference has it, and as the device does.
+/// A mesh as input of the reference implementation and of the device.
 type Sides<'a> = (OverlapSide<'a>, OverlapInput<'a>);
 
 pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
@@ -97,10 +97,11 @@ pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &Dev
     Ok(())
 }
 
-/// Holds the overlap of two meshes against the reference's; the number of primitives of the first that intersect the second.
+/// Compares the overlap of two meshes with that of the reference implementation. Returns the number of tetrahedra of
+/// the first mesh that intersect the second.
 ///
 /// # Errors
-/// What differs, or why there is no answer.
+/// The first difference, or the reason why there is no answer.
 pub fn check_overlap(a: &HostAndDevice, b: &HostAndDevice) -> std::result::Result<usize, String> {
     compare_overlaps(a.sides(), b.sides()).map_err(|stop| match stop {
         Stop::Failed(failure) => failure.to_string(),
@@ -110,7 +111,7 @@ pub fn check_overlap(a: &HostAndDevice, b: &HostAndDevice) -> std::result::Resul
 
 fn compare_overlaps(a: Sides<'_>, b: Sides<'_>) -> Verdict<usize> {
     let mut hits = 0;
-    // Pairs are found by lists.
+    // Pairs can be found only with full lists.
     let kinds: &[bool] = if a.0.tree.lists == Lists::All { &[false, true] } else { &[false] };
     for &pairs in kinds {
         let expected = reference(a.0, b.0, pairs);

@@ -1,4 +1,4 @@
-//! Volume rendering against the reference renderer (SPEC 3.3).
+//! Cases that compare volume rendering with the reference implementation (SPEC 3.3).
 
 use super::failure::{Verdict, compare, compare_one, fail};
 use super::meshes::MeshRecipe;
@@ -18,13 +18,13 @@ pub(crate) struct PictureCase {
     pub camera: &'static str,
     pub on: On,
     pub shading: bool,
-    /// Opacity points; by default what fits the field.
+    /// Opacity points; `None`: opacities that fit the field.
     pub opacity: Option<&'static str>,
-    /// Iso-surfaces instead of the volume.
+    /// Values of iso-surfaces to draw instead of the volume; empty: the volume.
     pub iso: &'static [f32],
 }
 
-/// A wave through the mesh.
+/// A field with a wave through the mesh.
 pub(super) fn field(mesh: &Mesh, on: On) -> Field {
     let wave = |p: &[f32; 3]| (p[0] * 0.9 + p[1] * 0.4).sin() + p[2] * 0.1;
     let values = match on {
@@ -62,11 +62,11 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let pixels = plan.pixels(&drawn.colors);
         let expected = draw(&scene, &|_, _| {});
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
-        // The intervals follow the tree's leaves, the picture does not.
+        // Ray intervals depend on the leaves of the tree, the picture does not.
         compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
         compare_one(&stage, "skipped samples", &expected.skipped_samples, &drawn.skipped_samples)?;
         if plan.hides(&field.values) {
-            // As if nothing were skipped, to the bit.
+            // The colours must equal, to the bit, those of a picture in which nothing is skipped.
             let all = Plan { drawn: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
             let all = render(device, &tree, &all, (&field.values, field.on), normals, &|_, _| {})?;
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
@@ -81,7 +81,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
     Ok(())
 }
 
-/// Pictures are alike: no more than `of_thousand` thousandths of the channels differ by more than `most`.
+/// Checks that two pictures are similar: at most `of_thousand` thousandths of the channels differ by more than `most`.
 fn near(stage: &str, what: &str, expected: &[u8], found: &[u8], most: u8, of_thousand: usize) -> Verdict {
     compare_one(stage, "pixels.len()", &expected.len(), &found.len())?;
     let far: Vec<usize> = (0..expected.len()).filter(|&i| expected[i].abs_diff(found[i]) > most).collect();

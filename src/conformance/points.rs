@@ -1,9 +1,10 @@
-//! Points to locate.
+//! The points that location cases use.
 
 use super::data::Random;
 use crate::mesh::Mesh;
 
-/// Points at every kind of place. Those that `inside` counts, from the first, lie in the closed cells as far as single precision can tell.
+/// Makes points in every kind of position. Returns with them the number of those, from the first on, that lie in the
+/// closed tetrahedra as far as single precision can tell.
 pub(crate) fn points(mesh: &Mesh) -> (Vec<[f32; 3]>, usize) {
     let mut random = Random::new(mesh.tets.len() as u32);
     let mut points = Vec::new();

@@ -1,4 +1,4 @@
-//! The cases of the primitives.
+//! The list of cases for primitives.
 
 use super::data::Keys;
 use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
@@ -11,11 +11,11 @@ const LENGTHS: [u32; 40] = [
     0, 1, 2, 3, 4, 5, 7, 8, 9, 15, 16, 17, 31, 32, 33, 63, 64, 65, 127, 128, 129, 255, 256, 257, 511, 1023, 1025, 2047, 2049, 4095, 4096,
     4097, 8191, 8192, 8193, 10_007, 65_535, 65_536, 65_537, 100_003,
 ];
-/// Some of them.
+/// A few lengths.
 const FEW: [u32; 9] = [0, 1, 33, 255, 4096, 4097, 8193, 65_537, 100_000];
-/// Enough workgroups that they are folded into two dimensions under the narrow target.
+/// Lengths with so many workgroups that these are folded into two dimensions with the narrow target.
 const LONG: [u32; 3] = [1_048_576, 1_000_003, 4_194_305];
-/// Past 2^26 words.
+/// More than 2^26 words.
 const LARGE: u32 = (1 << 26) + 12_347;
 const COUNTS: [Live; 5] = [Live::Host, Live::All, Live::Below, Live::Zero, Live::Above];
 const TARGETS: [TargetKind; 3] = [TargetKind::Serial, TargetKind::Ballot, TargetKind::Narrow];
@@ -108,7 +108,7 @@ fn sort(cases: &mut Vec<Case>, group: Group, case: SortCase) {
     push(cases, name, group, Work::Sort(case));
 }
 
-/// Adds a case unless one of that name is there.
+/// Adds a case unless there is one with this name.
 pub(super) fn push(cases: &mut Vec<Case>, name: String, group: Group, work: Work) {
     if cases.iter().all(|c| c.name != name) {
         cases.push(Case { name, group, work });

@@ -1,4 +1,4 @@
-//! Reduce, scan and sort against their definitions.
+//! Cases that compare reduce, scan and sort with their definitions.
 
 use super::buffers::{FILL, Guarded};
 use super::data::Keys;
@@ -9,23 +9,23 @@ use crate::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
 
-/// Shapes of kernels that a case runs under; a device's own is one of the first two.
+/// The target with which a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub(crate) enum TargetKind {
-    /// Whatever the device would choose, or the caller did.
+    /// The target that the device or the caller chose.
     Device,
-    /// Serial tiles, as for processors.
+    /// Serial tiles, as on processors.
     Serial,
-    /// Tiles of a workgroup ranked by ballots, as for GPUs.
+    /// Tiles of a workgroup, ranked by ballots, as on GPUs.
     Ballot,
-    /// Ballots with tiny tiles and digits: many tiles, many passes.
+    /// Ballots with tiny tiles and digits, which make many tiles and many passes.
     Narrow,
-    /// A row of the table, whatever the device is.
+    /// A given row of the table, whatever the device is.
     Row(Row),
 }
 
 impl TargetKind {
-    /// Name in cases; the device's own has none.
+    /// Part of the names of cases; empty for [`Self::Device`].
     pub(crate) fn suffix(self) -> String {
         match self {
             Self::Device => "",
@@ -37,7 +37,7 @@ impl TargetKind {
         .into()
     }
 
-    /// The target on a device with this room; `None`: the device's own.
+    /// The target on a device with these limits; `None`: the device's own.
     pub(crate) fn target(self, room: &WorkgroupLimits) -> Option<Target> {
         let subgroup = room.subgroup;
         match self {
@@ -58,18 +58,18 @@ impl TargetKind {
     }
 }
 
-/// Where the number of items is known, and what the device says it is.
+/// Where the number of items is stored, and how it compares with the length.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Live {
-    /// On the host.
+    /// Known on the host.
     Host,
-    /// On the device: all of them.
+    /// Stored on the device: all items.
     All,
-    /// On the device: fewer.
+    /// Stored on the device: fewer items.
     Below,
-    /// On the device: none.
+    /// Stored on the device: none.
     Zero,
-    /// On the device: more than there is room for; only those that fit count.
+    /// Stored on the device: more than there is room for; only those that fit count.
     Above,
 }
 
@@ -84,7 +84,7 @@ impl Live {
         }
     }
 
-    /// What the device's word says, and how many items that means.
+    /// The number stored on the device, and the number of items that it means.
     fn numbers(self, n: u32) -> (u32, u32) {
         match self {
             Self::Host | Self::All => (n, n),
@@ -94,7 +94,7 @@ impl Live {
         }
     }
 
-    /// The count for up to `n` items, the memory that holds it, and how many items it means.
+    /// The count for up to `n` items, the memory that holds it, and the number of items that it means.
     fn count(self, gpu: &Gpu, n: u32) -> Verdict<(Count, Guarded, usize)> {
         let (word, items) = self.numbers(n);
         let memory = Guarded::new(gpu, "olbvh.conformance.count", &[word], 1)?;
@@ -118,7 +118,7 @@ pub(crate) struct ReduceCase {
 pub(crate) struct ScanCase {
     pub n: u32,
     pub live: Live,
-    /// Whether the output is the input.
+    /// Whether the output overwrites the input.
     pub in_place: bool,
     pub target: TargetKind,
 }
@@ -169,7 +169,7 @@ pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {
         expected.push(sum);
         sum = sum.wrapping_add(*v);
     }
-    // What is not counted is not touched.
+    // Items beyond the count must be left unchanged.
     expected.extend(data[items..].iter().map(|&v| if case.in_place { v } else { FILL }));
     let stage = "primitives.scan";
     memory.read(gpu, stage)?;
@@ -197,7 +197,7 @@ pub(crate) fn sort(gpu: &Gpu, case: SortCase) -> Verdict {
     let expected: Vec<u32> = order.iter().map(|&i| data[i as usize]).collect();
     let stage = "primitives.sort";
     memory.read(gpu, stage)?;
-    // Behind the pairs that count the order is left open.
+    // The order of pairs beyond the count is unspecified.
     compare(stage, "keys", &expected, &keys.read(gpu, stage)?[..items])?;
     compare(stage, "values", &order, &values.read(gpu, stage)?[..items])
 }

@@ -1,4 +1,4 @@
-//! The cases of the queries.
+//! The list of cases for queries.
 
 use super::locate::{How, LocateCase};
 use super::meshes::{MeshRecipe, recipes};
@@ -11,15 +11,16 @@ use super::{Case, Group, Work};
 use crate::mesh::On;
 use crate::options::{Assign, Lists};
 
-/// Meshes that fill their space without overlap: every point of a cell has an owner, the same whatever the tree.
+/// Meshes that fill their space without overlap: every point of a tetrahedron has an owner, which does not depend on
+/// the tree.
 const CLOSED: [&str; 6] = ["kuhn-5x3x7", "kuhn-16x16x16", "jitter-12x13x11", "renumbered", "scaled-1e30", "far"];
 /// Meshes so small that voxels have denormal centres, which devices may flush to 0.
 const NEAR_DENORMAL: [&str; 2] = ["scaled-1e-38", "scaled-1e-42"];
-/// Meshes in which there is nothing to slice.
+/// Meshes without extent, in which there is nothing to slice.
 const WITHOUT_EXTENT: [&str; 4] = ["no-points", "no-cells", "one-place", "only-bad-cells"];
-/// A mesh whose overlap keeps the reference busy for minutes.
+/// A mesh whose overlap takes the reference implementation minutes.
 const LARGE: &str = "jitter-24x24x24";
-/// Ranges of a field: mesh, α, assignment, lists, where the values are.
+/// Cases for ranges of a field: mesh, α, assignment, lists, and what the values belong to.
 const RANGED: [(&str, f32, Assign, Lists, On); 8] = [
     ("no-cells", 0.0, Assign::Aabb, Lists::All, On::Points),
     ("one-tet", 0.0, Assign::Exact, Lists::All, On::Cells),
@@ -30,7 +31,8 @@ const RANGED: [(&str, f32, Assign, Lists, On); 8] = [
     ("jitter-12x13x11", 3.0, Assign::Aabb, Lists::All, On::Cells),
     ("jitter-12x13x11", 0.0, Assign::Planes, Lists::Boundary, On::Points),
 ];
-/// A transfer function that shows few values, and the mesh that is drawn with it, by the same kernels from all sides, as they take long to compile.
+/// A transfer function that shows few values. [`PEAKED`] is drawn with it from all directions with the same kernels,
+/// because kernels take long to compile.
 const PEAK: &str = "0:0,0.3:0,0.33:0.8,0.36:0,0.7:0,0.7:0.1,0.72:0.1,0.72:0,1:0";
 const PEAKED: &str = "jitter-12x13x11";
 /// Meshes that are drawn.
@@ -65,14 +67,14 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         for camera in ["iso", "top,ortho"].into_iter().filter(|_| mesh.name == PEAKED) {
             add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity: Some(PEAK), iso: &[] });
         }
-        // Seen through one another, and opaque.
+        // Iso-surfaces that are seen through one another, and opaque ones.
         for (camera, opacity) in [("iso", Some("0.4")), ("top,ortho", None)].into_iter().filter(|_| mesh.name == PEAKED) {
             add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity, iso: &[0.2, -0.3, 0.9] });
         }
     }
 }
 
-/// Queries of a mesh of the caller's.
+/// Adds queries of a mesh of the caller.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for how in [How::Descent, How::Traversal(8), How::Runs, How::Sorted, How::Hints, How::All] {
         for lists in Lists::EVERY {
@@ -132,7 +134,7 @@ fn add_slices(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     }
     for (i, stack) in STACKS.into_iter().enumerate() {
         for (k, (alpha, assign)) in [(0.0, Assign::Aabb), (1.0, Assign::Planes), (2.0, Assign::Exact)].into_iter().enumerate() {
-            // Quick: both kinds of lists; otherwise one of them each.
+            // Quick cases use both kinds of lists, others one of them each.
             let quick = (i + k) % 3 == 0;
             for lists in Lists::EVERY.into_iter().skip(if quick { 0 } else { k % 2 }).take(if quick { 2 } else { 1 }) {
                 let group = if quick { mesh.group } else { Group::Full };

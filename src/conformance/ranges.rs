@@ -1,4 +1,5 @@
-//! Ranges of a field per node, and which nodes have something to see, against the reference.
+//! Cases that compare the ranges of a field in every node, and the nodes with visible values, with the reference
+//! implementation.
 
 use super::buffers::Guarded;
 use super::failure::{Verdict, compare, compare_one, fail};
@@ -14,7 +15,7 @@ use crate::reference::boundary::Topology;
 use crate::reference::ranges::{ranges, visible};
 use crate::tree::TreeArrays;
 
-/// A field over a tree.
+/// A field on a mesh with a tree.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct RangesCase {
     pub mesh: MeshRecipe,
@@ -24,11 +25,11 @@ pub(crate) struct RangesCase {
     pub on: On,
 }
 
-/// What is drawn of it: everything, nothing, some values, a single one.
+/// Ranges of values that are drawn: everything, nothing, some values, a single value.
 const DRAWN: [&[[f32; 2]]; 4] =
     [&[[f32::NEG_INFINITY, f32::INFINITY]], &[], &[[f32::NEG_INFINITY, -0.9], [0.1, 0.15], [0.4, 0.4], [0.95, 2.0]], &[[0.5, 0.5]]];
 
-/// Values that are none, and such as are easily lost, among others.
+/// Replaces some values by non-finite ones and by others that are easily mishandled.
 fn spoil(field: &mut Field) {
     let odd = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0, 0.0, 1e-42, -1e-42, f32::MAX, f32::MIN];
     for (i, v) in field.values.iter_mut().enumerate().filter(|(i, _)| i % 17 == 5) {
@@ -52,7 +53,7 @@ pub(crate) fn check(gpu: &Gpu, case: &RangesCase, twin: &mut Twin, device: &Devi
         }
         let expected = ranges(mesh, topology, host, &field);
         compare("build.ranges", "ranges", &bits(&expected), &bits(&owned.download(&tree)?))?;
-        // Whatever the memory held before, and nothing behind it.
+        // The recorded form must work whatever the memory held before, and write nothing after its end.
         let memory = Guarded::scratch(gpu, "olbvh.conformance.ranges", range_bytes(nodes))?;
         let values = gpu.upload("olbvh.conformance.field", &field.values)?;
         gpu.submit("olbvh.conformance.ranges", |r| cmd_ranges(r, &view, tree.memory(), (values.all(), field.on), memory.all()))?;
@@ -70,7 +71,8 @@ pub(crate) fn check(gpu: &Gpu, case: &RangesCase, twin: &mut Twin, device: &Devi
     compare_one("build.ranges", "nodes", &nodes, &tree.status().nodes)
 }
 
-/// Every leaf's range holds the values of the tetrahedra that it lists, a node's those of its children.
+/// Checks that the range of every leaf contains the values of the tetrahedra that it lists, and that of every node
+/// those of its children.
 fn holds(tree: &TreeArrays, mesh: &Mesh, topology: &Topology, field: &Field, ranges: &[[f32; 2]]) -> Verdict {
     let wrong = |node: u32| fail("build.ranges", "ranges", Some(node as usize), "a range around all values in the node", "a smaller one");
     for leaf in tree.leaves() {

@@ -1,4 +1,4 @@
-//! Conservative slicing against the reference (SPEC 3.4): kinds and owners to the bit.
+//! Cases that compare conservative slicing with the reference implementation (SPEC 3.4): kinds and owners to the bit.
 
 use super::failure::{Stop, Verdict, compare_one, fail};
 use super::meshes::MeshRecipe;
@@ -23,7 +23,7 @@ pub(crate) struct SliceCase {
     pub stack: Stack,
 }
 
-/// Plane, layers, voxels, and what is interpolated in them.
+/// Plane, layers, voxels, and the field that is interpolated in them.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Stack {
     pub name: &'static str,
@@ -34,7 +34,7 @@ pub(crate) struct Stack {
     extrapolate: Extrapolate,
 }
 
-/// The stacks of the suite: every plane, field and extrapolation, voxels from fine to coarser than cells.
+/// The stacks of the suite: every plane, field and extrapolation; voxels from fine ones to ones larger than tetrahedra.
 pub(crate) const STACKS: [Stack; 4] = [
     Stack { name: "x", plane: Plane::Axis(0), layers: 1, size: [37, 21], field: None, extrapolate: Extrapolate::Nearest },
     Stack { name: "y", plane: Plane::Axis(1), layers: 4, size: [9, 7], field: Some(On::Points), extrapolate: Extrapolate::Nearest },
@@ -49,7 +49,7 @@ pub(crate) const STACKS: [Stack; 4] = [
     Stack { name: "z", plane: Plane::Axis(2), layers: 2, size: [3, 2], field: Some(On::Cells), extrapolate: Extrapolate::Nearest },
 ];
 
-/// A ramp over the points, or the ids of the cells.
+/// A ramp over the points, or the ids of the tetrahedra.
 fn field(mesh: &Mesh, on: On) -> Field {
     let values = match on {
         On::Points => mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect(),
@@ -70,7 +70,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
         return compare_one("query.slice", "extent, if there is nothing to slice", &lo, &hi);
     };
     if voxels.plan(&host.grid).is_err() {
-        // As large as numbers go: the device must refuse them too.
+        // The coordinates reach the limits of single precision: the device must refuse these voxels, too.
         let refused = slice(device, &tree, None, &voxels, extrapolate, &|_, _| {}, &mut |_| Ok(()));
         return compare_one("query.slice", "refusal", &true, &matches!(refused, Err(Error::Invalid(_))));
     }
@@ -99,7 +99,7 @@ fn compare_bands(expected: &Band, found: &Band) -> Result<(), Stop> {
         if a != b {
             return Err(fail("query.slice_touch", &format!("kind and owner, {}", what()), Some(i), &format!("{a:?}"), &format!("{b:?}")));
         }
-        // Devices may flush denormal products of a value; nothing else may differ.
+        // Devices may flush denormal products of a value to 0; nothing else may differ.
         let (a, b) = (expected.values[i], found.values.get(i).copied().unwrap_or_default());
         if !(a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan()) || (a - b).abs() <= 1e-36) {
             return Err(fail("query.slice_values", &format!("value, {}", what()), Some(i), &a.to_string(), &b.to_string()));

@@ -1,10 +1,11 @@
-//! Stage 0 against the reference: bad cells, bounds, normalised vertices, neighbours, boundary.
+//! Cases that compare stage 0 with the reference implementation: bad cells, bounds, normalised vertices, neighbours,
+//! boundary.
 
 use super::failure::{Verdict, compare, compare_one};
 use super::twin::Twin;
 use crate::build::DeviceMesh;
 
-/// Holds a prepared mesh against its topology.
+/// Compares a prepared mesh with its topology.
 pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
     let (mesh, expected, vertices) = (&twin.mesh, &twin.topology, &twin.vertices);
     let (counts, status) = (expected.counts, found.status());
@@ -13,7 +14,7 @@ pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
     compare_one("build.check_cells", "status.bad", &counts.bad, &status.bad)?;
     let words = |grid| bytemuck::cast_slice::<_, u32>(std::slice::from_ref(grid)).to_vec();
     compare("build.make_grid", "grid", &words(&expected.grid), &words(found.grid()))?;
-    // Points that are not finite have no place; no valid cell uses them.
+    // Points that are not finite have no position in the grid; no valid tetrahedron uses them.
     let finite: Vec<bool> = mesh.points.iter().map(|p| p.iter().all(|x| x.is_finite())).collect();
     let pack_cell = |q: [u32; 3]| q[0] | q[1] << 10 | q[2] << 20;
     let pack = |(v, q): (&[f32; 3], &[u16; 3])| [v[0].to_bits(), v[1].to_bits(), v[2].to_bits(), pack_cell(q.map(u32::from))];

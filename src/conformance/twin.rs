@@ -1,5 +1,5 @@
-//! The reference's trees and answers over one mesh, kept while cases ask for them: most cases differ in how the device works, not in what it
-//! should find.
+//! Trees and answers of the reference implementation over one mesh, cached while cases need them: most cases differ in
+//! how the device computes, not in what it should find.
 
 use super::failure::Verdict;
 use super::meshes::MeshRecipe;
@@ -15,30 +15,30 @@ use crate::tree::TreeArrays;
 use std::collections::HashMap;
 use std::sync::{Arc, OnceLock};
 
-/// What a tree is but for the mesh.
+/// What determines a tree over a given mesh: assignment, lists, level.
 type Kind = (Assign, Lists, u32);
 
-/// A mesh and what the reference has found out about it.
+/// A mesh and what the reference implementation has computed for it.
 #[derive(Debug)]
 pub(crate) struct Twin {
     /// Name of the mesh.
     pub name: &'static str,
     /// The mesh.
     pub mesh: Mesh,
-    /// Its topology.
+    /// Topology of the mesh.
     pub topology: Topology,
-    /// What the depth is chosen from.
+    /// Sizes from which the depth is chosen.
     pub sizes: Sizes,
-    /// Its vertices in the grid.
+    /// Vertices of the mesh in the grid.
     pub vertices: Vertices,
     trees: HashMap<Kind, Arc<Built>>,
     points: OnceLock<(Vec<[f32; 3]>, usize)>,
 }
 
-/// A tree of the reference.
+/// A tree of the reference implementation.
 #[derive(Debug)]
 pub(crate) struct Built {
-    /// The tree, boxes included, and its sorted codes.
+    /// The tree, including boxes, and its sorted codes.
     pub made: Construction,
     locations: OnceLock<Vec<Location>>,
 }
@@ -59,7 +59,7 @@ impl Twin {
         Ok(Self { name: recipe.name, mesh, topology, sizes, vertices, trees: HashMap::new(), points: OnceLock::new() })
     }
 
-    /// The tree with leaves at `level`; one that breaks a rule fails.
+    /// The tree with leaves at `level`; fails if the tree breaks a rule.
     pub(crate) fn built(&mut self, assign: Assign, lists: Lists, level: u32) -> Verdict<Arc<Built>> {
         let kind = (assign, lists, level);
         if let Some(built) = self.trees.get(&kind) {
@@ -73,24 +73,24 @@ impl Twin {
         Ok(built)
     }
 
-    /// The tree that options without limits give.
+    /// The tree for options without limits of size.
     pub(crate) fn tree(&mut self, options: &BuildOptions) -> Verdict<Arc<Built>> {
         let level = self.sizes.level(options)?;
         self.built(options.assign, options.lists, level)
     }
 
-    /// Points to locate, and how many of them, from the first, lie in cells.
+    /// Points to locate, and the number of those, from the first on, that lie in tetrahedra.
     pub(crate) fn points(&self) -> (&[[f32; 3]], usize) {
         let (all, inside) = self.points.get_or_init(|| points(&self.mesh));
         (all, *inside)
     }
 
-    /// Where they lie.
+    /// Locations of these points.
     pub(crate) fn locations<'a>(&self, built: &'a Built) -> &'a [Location] {
         built.locations.get_or_init(|| self.locator(built).locate_all(self.points().0))
     }
 
-    /// The reference's location over a tree.
+    /// The reference implementation of point location over a tree.
     pub(crate) fn locator<'a>(&'a self, built: &'a Built) -> Locator<'a> {
         Locator::new(&self.mesh, &self.topology, built.tree())
     }

@@ -1,4 +1,4 @@
-//! Arrays of files, and the names of the fields that they become.
+//! Arrays of files, and the names of the fields made from them.
 
 use std::collections::{HashMap, HashSet};
 
@@ -14,7 +14,8 @@ pub(crate) struct Array {
 }
 
 impl Array {
-    /// Fills it up to `tuples` with NaN where it is shorter; an error that tells the limit where the budget does not allow that.
+    /// Fills the array with NaN up to `tuples` tuples if it is shorter. Returns an error that states the limit if the
+    /// budget does not allow that.
     pub fn fill(&mut self, tuples: usize, budget: &mut Budget) -> Result<(), String> {
         let wanted = tuples * self.components;
         let missing = wanted.saturating_sub(self.values.len());
@@ -25,7 +26,7 @@ impl Array {
         Ok(())
     }
 
-    /// What the names of its fields have behind its own.
+    /// Suffixes that are appended to the array's name to name its fields.
     pub fn suffixes(&self) -> &'static [&'static str] {
         match self.components {
             1 => &[""],
@@ -35,16 +36,17 @@ impl Array {
     }
 }
 
-/// The names that fields have so far.
+/// The names that are taken by fields.
 #[derive(Default)]
 pub(crate) struct Names {
     taken: HashSet<String>,
-    /// How many names were tried in place of one, so that many arrays of one name do not try the same ones.
+    /// How many alternatives were tried for a name, so that many arrays of the same name do not try the same ones
+    /// again.
     tried: HashMap<(String, On), usize>,
 }
 
 impl Names {
-    /// A name for an array: its own, unless a field has that of one of its fields.
+    /// A free name for an array: its own, unless one of the fields that it becomes would have a name that is taken.
     pub fn free(&mut self, array: &Array) -> String {
         let fields = |name: &str| array.suffixes().iter().map(|suffix| format!("{name}{suffix}")).collect::<Vec<_>>();
         let mut name = array.name.clone();

@@ -1,4 +1,4 @@
-//! From the points, cells and arrays of a file to a [`Mesh`] and its [`Report`]: what all formats share.
+//! Conversion of the points, cells and arrays of a file to a [`Mesh`] and its [`Report`], shared by all formats.
 
 use std::collections::HashMap;
 
@@ -11,21 +11,22 @@ use crate::error::{Error, Result};
 use crate::mesh::{Field, Mesh, On};
 use crate::reference::grid::COORDINATE_LIMIT;
 
-/// A mesh under construction. Set the points, push the cells in file order, add the arrays, [`finish`](Assembly::finish).
+/// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
+/// [`finish`](Assembly::finish).
 pub(crate) struct Assembly<'a> {
     source: &'a Source,
     pub format: String,
     /// Size of all files read.
     pub bytes: u64,
     pub points: Vec<[f64; 3]>,
-    /// What the format calls its first point, for messages.
+    /// Number of the first point in the format, for messages.
     pub first_point: i64,
     pub arrays: Vec<Array>,
     pub warnings: Vec<String>,
-    /// For the NaN of arrays that do not cover the mesh.
+    /// Limit for the NaN that fill arrays which do not cover the mesh.
     pub padding: Budget,
     tets: Vec<[u32; 4]>,
-    /// Cell of each tetrahedron.
+    /// File cell of each tetrahedron.
     ids: Vec<u32>,
     n_cells: usize,
     counts: Vec<CellCount>,
@@ -57,18 +58,18 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Cells pushed so far.
+    /// Number of cells pushed so far.
     pub fn cells(&self) -> usize {
         self.n_cells
     }
 
-    /// Room for cells that are expected.
+    /// Reserves memory for cells that are expected.
     pub fn reserve(&mut self, cells: usize) {
         self.tets.reserve(cells);
         self.ids.reserve(cells);
     }
 
-    /// Adds the next cell of the file. `nodes` are indices into the points, `offset` is added to each.
+    /// Adds the next cell of the file. `nodes` are indices of points, to each of which `offset` is added.
     pub fn push(&mut self, kind: CellType, nodes: &[i64], offset: usize) -> Result<()> {
         let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
         let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.source.path.display())))?;
@@ -114,7 +115,8 @@ impl<'a> Assembly<'a> {
         Ok(())
     }
 
-    /// Turns the pieces of a cell from tetrahedron `start` on so that its volume is positive, and counts what is odd.
+    /// Orients the pieces of a cell, from tetrahedron `start` on, so that their total volume is positive, and counts
+    /// flat and tangled ones.
     fn orient(&mut self, start: usize) {
         let volumes = || self.tets[start..].iter().map(|&tet| self.volume(tet));
         let turn = volumes().sum::<f64>() < 0.0;
@@ -129,7 +131,7 @@ impl<'a> Assembly<'a> {
         }
     }
 
-    /// Counts the next cell of the file without looking at its nodes.
+    /// Counts the next cell of the file without reading its nodes.
     pub fn skip(&mut self, name: &str, fate: Fate) {
         self.count(name, fate, 0);
     }
@@ -145,14 +147,14 @@ impl<'a> Assembly<'a> {
         self.counts[i].tetrahedra += tetrahedra;
     }
 
-    /// Six times the signed volume.
+    /// Six times the signed volume of a tetrahedron.
     fn volume(&self, tet: [u32; 4]) -> f64 {
         let [a, b, c, d] = tet.map(|v| self.points[v as usize]);
         let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
         u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
     }
 
-    /// Checks the whole and converts it to single precision.
+    /// Checks the whole mesh and converts it to single precision.
     pub fn finish(mut self) -> Result<(Mesh, Report)> {
         if self.tets.is_empty() {
             let found: Vec<String> = self.counts.iter().map(|c| format!("{} {}", c.count, c.name)).collect();
@@ -195,7 +197,7 @@ impl<'a> Assembly<'a> {
         Ok((Mesh { points, tets: self.tets, cell_ids, point_ids: None, source_cells: self.n_cells as u32, fields, origin }, report))
     }
 
-    /// Which points a tetrahedron uses; an error if one of them is not finite.
+    /// Marks the points that tetrahedra use; returns an error if one of these is not finite.
     fn used(&self) -> Result<Vec<bool>> {
         let mut used = vec![false; self.points.len()];
         for (tet, id) in self.tets.iter().zip(&self.ids) {
@@ -215,8 +217,9 @@ impl<'a> Assembly<'a> {
         self.source.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
     }
 
-    /// What to subtract on each axis: the lower bound where the mesh is small against its distance from 0, so that single precision is left for
-    /// its shape, and for points, voxels and samples within. Up to 16 extents away these keep 20 bits.
+    /// The vector to subtract from all points: on each axis the lower bound if the mesh is small compared with its
+    /// distance from 0, so that single precision suffices for its shape, and for points, voxels and samples within it.
+    /// A mesh up to 16 extents away is not moved; its coordinates keep 20 bits.
     fn origin(lo: [f64; 3], hi: [f64; 3]) -> [f64; 3] {
         [0, 1, 2].map(|c| {
             let extent = hi[c] - lo[c];
@@ -237,7 +240,7 @@ impl<'a> Assembly<'a> {
         Ok(self.points.iter().map(|p| moved(p).map(|x| x as f32)).collect())
     }
 
-    /// Arrays become scalar fields; those of cells get one value per tetrahedron.
+    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron.
     fn fields(&mut self) -> Vec<Field> {
         let mut fields = Vec::new();
         let mut names = Names::default();
@@ -289,9 +292,9 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
         .fold(start, |(lo, hi), (p, _)| ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))))
 }
 
-/// Meshes of several pieces.
+/// Functions for meshes that consist of several pieces.
 impl Assembly<'_> {
-    /// Arrays get NaN for the pieces that do not have them; those that would take too much of it are left out.
+    /// Fills arrays with NaN for the pieces that do not have them; arrays that would need too many are left out.
     pub fn complete_arrays(&mut self) {
         self.arrays.retain_mut(|array| {
             let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
@@ -304,15 +307,16 @@ impl Assembly<'_> {
         });
     }
 
-    /// Lets the cells of later pieces use the points of earlier ones where coordinates are equal, so that the seam between pieces
-    /// is no boundary. Points that coincide within a piece stay apart. `starts`: first point of each piece.
+    /// Lets the cells of later pieces use the points of earlier ones that have equal coordinates, so that the seam
+    /// between pieces is not a boundary. Points that coincide within a piece stay separate. `starts` holds the first
+    /// point of each piece.
     pub fn merge_pieces(&mut self, starts: &[usize]) {
         let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.points.len());
         let mut to: Vec<u32> = Vec::with_capacity(self.points.len());
         let mut merged = 0;
         for (i, p) in self.points.iter().enumerate() {
             let piece_start = starts[starts.partition_point(|&s| s <= i).saturating_sub(1)];
-            // Adding 0 makes -0 equal to 0.
+            // Adding 0 turns -0 into 0.
             let target = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32);
             let earlier = (target as usize) < piece_start;
             merged += usize::from(earlier);
@@ -321,7 +325,7 @@ impl Assembly<'_> {
         if merged == 0 {
             return;
         }
-        // Kept points move together.
+        // Move the points that are kept together.
         let mut kept = 0;
         let mut new = vec![0; to.len()];
         for (i, &target) in to.iter().enumerate() {
@@ -352,7 +356,7 @@ impl Assembly<'_> {
 mod tests {
     use super::*;
 
-    /// Arrays of a mesh of one tetrahedron: the fields they become, and the warnings.
+    /// Adds arrays to a mesh of one tetrahedron; returns the names of the resulting fields, and the warnings.
     fn finish(arrays: &[(&str, On, usize, usize)]) -> (Vec<String>, Vec<String>) {
         let source = Source::new("one".as_ref(), Vec::new());
         let mut assembly = Assembly::new(&source, "one tetrahedron".into());

@@ -1,8 +1,8 @@
-//! How much memory a file may ask for beyond its own size.
+//! Limit of the memory that a file may demand beyond its own size.
 
 use super::LoadOptions;
 
-/// Bytes that may still be made of a file.
+/// The number of bytes that may still be allocated for a file.
 #[derive(Default)]
 pub(crate) struct Budget {
     left: u64,
@@ -10,13 +10,13 @@ pub(crate) struct Budget {
 }
 
 impl Budget {
-    /// For a file of `bytes` bytes.
+    /// The budget for a file of `bytes` bytes.
     pub fn new(bytes: usize, options: &LoadOptions) -> Self {
         let left = options.expansion.saturating_mul(bytes as u64).saturating_add(64 << 20);
         Self { left, expansion: options.expansion }
     }
 
-    /// Spends `bytes`; an error that says what the limit is if less are left.
+    /// Spends `bytes`; returns an error that states the limit if fewer are left.
     pub fn spend(&mut self, bytes: u64) -> Result<(), String> {
         self.left = self.left.checked_sub(bytes).ok_or_else(|| format!("more than {} times the size of the file", self.expansion))?;
         Ok(())

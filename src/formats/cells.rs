@@ -1,17 +1,17 @@
-//! Cell types of the formats, and the split of cells into tetrahedra.
+//! Cell types of the file formats, and the splitting of cells into tetrahedra.
 
 /// Shape of a cell, by its corners.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Shape {
-    /// Points, lines and surfaces: boundary elements.
+    /// Points, lines and surfaces, that is boundary elements.
     Flat,
     Tetrahedron,
     Hexahedron,
-    /// A hexahedron whose corners are numbered x fastest.
+    /// A hexahedron whose corners are numbered with x varying fastest.
     Voxel,
     Wedge,
     Pyramid,
-    /// A volume that cannot be split here.
+    /// A volume that cannot be split.
     Other,
 }
 
@@ -20,7 +20,7 @@ pub(crate) enum Shape {
 pub(crate) struct CellType {
     pub name: &'static str,
     pub shape: Shape,
-    /// Number of nodes, corners first; `None`: any number of at least the corners.
+    /// Number of nodes, of which the corners come first; `None`: any number that is at least the number of corners.
     pub nodes: Option<usize>,
 }
 
@@ -36,7 +36,8 @@ impl Shape {
         }
     }
 
-    /// Faces as corner numbers, counter-clockwise from outside (in VTK's numbering); a triangle has its last corner twice.
+    /// The faces as corner numbers, counter-clockwise as seen from outside (in VTK's numbering); a triangle repeats its
+    /// last corner.
     const fn faces(self) -> &'static [[u8; 4]] {
         match self {
             Shape::Pyramid => &[[0, 3, 2, 1], [0, 1, 4, 4], [1, 2, 4, 4], [2, 3, 4, 4], [3, 0, 4, 4]],
@@ -48,13 +49,14 @@ impl Shape {
     }
 }
 
-/// Splits a hexahedron, voxel, wedge or pyramid into tetrahedra and hands each to `emit`.
+/// Splits a hexahedron, voxel, wedge or pyramid into tetrahedra and passes each to `emit`.
 ///
-/// A quadrilateral is cut by the diagonal through its smallest vertex id, so two cells that share one cut it alike, whatever their
-/// types. The tetrahedra are the cones from the cell's smallest vertex over the triangles of the faces that do not hold it. The
-/// numbering's orientation does not matter (files disagree about wedges). In a hexahedron whose far corner ends no diagonal,
-/// the three tetrahedra around that corner become two: five instead of six. Collapsed cells (repeated vertices) give fewer.
-/// The tetrahedra of a convex cell all have the same sign.
+/// A quadrilateral face is cut along the diagonal through its smallest vertex id, so two cells that share the face cut
+/// it in the same way, whatever their types. Each tetrahedron is the cone from the cell's smallest vertex over a
+/// triangle of a face that does not contain it. The orientation of the numbering does not matter (files disagree about
+/// wedges). In a hexahedron, if no diagonal ends at the corner opposite to the smallest vertex, the three tetrahedra
+/// around that corner become two: five instead of six in total. Collapsed cells (with repeated vertices) give fewer.
+/// All tetrahedra of a convex cell have the same sign.
 pub(crate) fn split(shape: Shape, corners: &[u32], mut emit: impl FnMut([u32; 4])) {
     let Some(&apex) = corners.iter().min() else { return };
     let mut triangles = [[0; 3]; 12];
@@ -91,7 +93,7 @@ pub(crate) fn split(shape: Shape, corners: &[u32], mut emit: impl FnMut([u32; 4]
     }
 }
 
-/// The other two vertices of a triangle with `vertex`, in order.
+/// The other two vertices of a triangle that contains `vertex`, in cyclic order.
 fn after([a, b, c]: [u32; 3], vertex: u32) -> Option<[u32; 2]> {
     match vertex {
         v if v == a => Some([b, c]),
@@ -101,7 +103,7 @@ fn after([a, b, c]: [u32; 3], vertex: u32) -> Option<[u32; 2]> {
     }
 }
 
-/// The corner of a hexahedron opposite to `apex`.
+/// The corner of a hexahedron that is opposite to `apex`.
 fn far_corner(shape: Shape, corners: &[u32], apex: u32) -> Option<u32> {
     let at = corners.iter().position(|&v| v == apex)?;
     match shape {
@@ -115,7 +117,7 @@ const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
     CellType { name, shape, nodes: if nodes == 0 { None } else { Some(nodes) } }
 }
 
-/// The cell type of a VTK number.
+/// The cell type with this number in VTK.
 pub(crate) fn vtk(number: i64) -> Option<CellType> {
     use Shape::{Flat, Hexahedron, Other, Pyramid, Tetrahedron, Voxel, Wedge};
     Some(match number {
@@ -165,7 +167,8 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
     })
 }
 
-/// What values of a cell array of that name mark ghosts: copies of cells of a neighbouring piece. Older VTK counted levels of them.
+/// If a cell array of this name marks ghost cells (copies of cells of a neighbouring piece), the predicate for its
+/// values. Older versions of VTK store ghost levels.
 pub(crate) fn ghost(array: &str) -> Option<fn(i64) -> bool> {
     match array {
         "vtkGhostType" => Some(|bits| bits & 1 != 0),
@@ -174,7 +177,7 @@ pub(crate) fn ghost(array: &str) -> Option<fn(i64) -> bool> {
     }
 }
 
-/// The cell type of a Gmsh element number.
+/// The cell type with this element number in Gmsh.
 pub(crate) fn gmsh(number: i64) -> Option<CellType> {
     use Shape::{Flat, Hexahedron, Other, Pyramid, Tetrahedron, Wedge};
     let nodes = *GMSH_NODES.get(usize::try_from(number).ok()?)? as usize;
@@ -193,7 +196,7 @@ pub(crate) fn gmsh(number: i64) -> Option<CellType> {
     (nodes > 0).then(|| cell(if number <= 7 || number == 15 { linear } else { higher }, shape, nodes))
 }
 
-/// Nodes per Gmsh element type; 0: no such type, or not of a fixed size.
+/// Number of nodes of each Gmsh element type; 0: the type does not exist, or has no fixed number.
 #[rustfmt::skip]
 const GMSH_NODES: [u16; 133] = [
     0, 2, 3, 4, 4, 8, 6, 5, 3, 6, 9, 10, 27, 18, 14, 1, 8, 20, 15, 13, 9, 10, 12, 15, 15, 21, 4, 5, 6, 20, 35, 56, 22, 28, 0, 0,

@@ -1,4 +1,4 @@
-//! Which format a file is in: by its content, then by its name.
+//! Detection of a file's format: by its content, or else by its name.
 
 use std::path::Path;
 
@@ -16,11 +16,11 @@ pub(crate) enum Format {
     TetGen,
 }
 
-/// Endings of the formats.
+/// File name extensions of the formats that can be read.
 pub(crate) const READABLE: &str = ".vtu, .vtk, .msh, .mesh, .meshb, .node with .ele";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 
-/// The format of a file; an error that names what was found if it cannot be read.
+/// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
 pub(crate) fn detect(source: &Source) -> Result<Format> {
     let bytes = source.bytes.as_slice();
     let ending = ending(&source.path);
@@ -61,12 +61,12 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     }
 }
 
-/// The ending of a path in lower case, without the dot.
+/// The extension of a path in lower case, without the dot.
 pub(crate) fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
-/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus).
+/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus files).
 fn skip_comments(bytes: &[u8]) -> usize {
     let mut at = 0;
     loop {

@@ -1,4 +1,5 @@
-//! Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and element data.
+//! Reader for Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and
+//! element data.
 
 use std::collections::{HashMap, HashSet};
 
@@ -19,11 +20,11 @@ struct Content {
     tags: Vec<i64>,
     points: Vec<[f64; 3]>,
     elements: Elements,
-    /// First physical group of each volume.
+    /// First physical group of each volume entity.
     groups: HashMap<i64, i64>,
     views: Vec<View>,
     has: [bool; 2],
-    /// Sections that are not read, but may matter.
+    /// Sections that are not read but may matter.
     skipped: Vec<String>,
 }
 
@@ -130,7 +131,7 @@ impl Content {
         Ok(())
     }
 
-    /// The group and the geometric entity of each element as fields, where there are several.
+    /// Adds the physical group and the geometric entity of each element as fields, if any of them is not 0.
     fn marks(&self, assembly: &mut Assembly<'_>) {
         let physical: Vec<i64> = if self.groups.is_empty() {
             self.elements.physical.clone()
@@ -211,7 +212,7 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// The first physical group of each volume.
+    /// Reads the first physical group of each volume entity.
     fn entities(&mut self, version: Version, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();
@@ -224,7 +225,7 @@ impl Reader<'_> {
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = self.int("the number of an entity")?;
-                // A point has a box as well in 4.0.
+                // In version 4.0 a point has a bounding box as well.
                 for _ in 0..if dimension == 0 && version == Version::V41 { 3 } else { 6 } {
                     self.real("the bounds of an entity")?;
                 }

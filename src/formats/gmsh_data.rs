@@ -1,4 +1,4 @@
-//! `$NodeData` and `$ElementData` of Gmsh files.
+//! Reader for `$NodeData` and `$ElementData` of Gmsh files.
 
 use super::array::Array;
 use super::budget::Budget;
@@ -8,7 +8,7 @@ use super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
 
-/// Values by the numbers of nodes or elements.
+/// Values, identified by the numbers of nodes or elements.
 pub(crate) struct View {
     pub name: String,
     pub on: On,
@@ -20,8 +20,9 @@ pub(crate) struct View {
 }
 
 impl View {
-    /// One value per point or cell; NaN where the file gives none. `Err` is a warning: values for something that does not exist
-    /// (renumbered meshes have them) are no reason to refuse the mesh. `padding`: for the NaN.
+    /// Converts to an array with one value per point or cell, NaN where the file has none; `padding` limits the NaN.
+    /// `Err` holds a warning: values for something that does not exist, as in renumbered meshes, are no reason to
+    /// refuse the mesh.
     pub fn array(&self, tags: &Tags, count: usize, padding: &mut Budget) -> Result<Array, String> {
         let left_out = |why: String| format!("array `{}` is left out: {why}", printable(self.name.as_bytes()));
         if self.tags.is_empty() {

@@ -1,16 +1,16 @@
-//! `$Elements` of Gmsh files.
+//! Reader for `$Elements` of Gmsh files.
 
 use super::cells::{self, CellType};
 use super::gmsh_reader::{Reader, Version};
 use super::source::{Source, Tokens, parse_integer, printable};
 use crate::error::Result;
 
-/// The elements as the file has them.
+/// The elements as stored in the file.
 #[derive(Default)]
 pub(crate) struct Elements {
     pub tags: Vec<i64>,
     pub kinds: Vec<CellType>,
-    /// Node tags of all elements.
+    /// Node tags of all elements, one after the other.
     pub nodes: Vec<i64>,
     pub physical: Vec<i64>,
     pub entities: Vec<i64>,
@@ -24,7 +24,7 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The tokens of the next line that is not empty, so that a short line is noticed where it is.
+    /// The tokens of the next line that is not empty; reading line by line reports a short line at its own position.
     fn line(&mut self, what: &str) -> Result<(Tokens<'a>, usize)> {
         self.tokens.skip_space();
         let (line, at) =

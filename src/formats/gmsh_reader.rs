@@ -1,4 +1,5 @@
-//! What all sections of Gmsh files are read with: numbers as text or binary, in the version and byte order that the first section tells.
+//! Reader for the numbers in all sections of Gmsh files: as text or binary, in the version and byte order that the
+//! first section states.
 
 use super::scalar::{Number, Scalar};
 use super::source::{Source, Tokens, printable};
@@ -26,7 +27,7 @@ impl<'a> Reader<'a> {
         Self { source, tokens, binary: false, big_endian: false }
     }
 
-    /// Refuses a second section of a kind.
+    /// Refuses a second section of the same kind.
     pub fn once(&self, seen: &mut bool, name: &[u8], at: usize) -> Result<()> {
         if std::mem::replace(seen, true) {
             return Err(self.source.error_line(at, format!("a second section ${}", printable(name))));
@@ -80,7 +81,7 @@ impl<'a> Reader<'a> {
         Err(if self.binary { self.source.error_byte(at, message) } else { self.source.error_line(at, message) })
     }
 
-    /// Skips a section by looking for its end.
+    /// Skips a section by searching for its end.
     pub fn skip(&mut self, name: &[u8], at: usize) -> Result<()> {
         let end = [b"$End", name].concat();
         let rest = &self.source.bytes[self.tokens.at..];
@@ -90,7 +91,7 @@ impl<'a> Reader<'a> {
         Ok(())
     }
 
-    /// Bytes of binary data.
+    /// Reads `n` bytes of binary data.
     fn bytes(&mut self, n: usize, what: &str) -> Result<&[u8]> {
         let at = self.tokens.at;
         let end = at.checked_add(n).filter(|&end| end <= self.source.bytes.len());
@@ -105,22 +106,23 @@ impl<'a> Reader<'a> {
         Ok(scalar.convert(bytes, big).first().copied().unwrap_or_default())
     }
 
-    /// An integer of 4 bytes in binary.
+    /// Reads an integer, of 4 bytes in binary files.
     pub fn int(&mut self, what: &str) -> Result<i64> {
         if self.binary { self.number(Scalar::I32, what) } else { self.tokens.integer(what) }
     }
 
-    /// An unsigned integer of 8 bytes in binary, which counts or numbers something.
+    /// Reads a count or a tag: an unsigned integer, of 8 bytes in binary files.
     pub fn long(&mut self, what: &str) -> Result<i64> {
         if self.binary { self.number(Scalar::U64, what) } else { self.tokens.integer(what) }
     }
 
-    /// A number of 8 bytes in binary.
+    /// Reads a floating-point number, of 8 bytes in binary files.
     pub fn real(&mut self, what: &str) -> Result<f64> {
         if self.binary { self.number(Scalar::F64, what) } else { self.tokens.float(what) }
     }
 
-    /// How many things follow, of at least `each` bytes in binary and two in text.
+    /// Checks the count `n` of things that follow, which take at least `each` bytes in binary files and two in text
+    /// files.
     pub fn bounded(&self, n: i64, each: usize, what: &str) -> Result<usize> {
         let room = self.tokens.left() / if self.binary { each.max(1) } else { 2 } + 1;
         usize::try_from(n).ok().filter(|&n| n <= room).ok_or_else(|| {

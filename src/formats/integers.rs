@@ -1,4 +1,5 @@
-//! Whole numbers of a file, a window of them at a time: as 64-bit words all at once they would take up to eight times what they take in the file.
+//! Integers of a file, converted one window at a time: converted to 64-bit words all at once they would take up to
+//! eight times the memory that they take in the file.
 
 use std::ops::Range;
 
@@ -6,12 +7,12 @@ use super::scalar::Scalar;
 use super::stored::{Stored, WINDOW};
 use crate::error::Result;
 
-/// Whole numbers as a file has them.
+/// Integers stored in a file.
 #[derive(Default)]
 pub(crate) struct Integers<'a> {
-    /// `None`: all of them are in the window.
+    /// `None`: all numbers are in `window`.
     stored: Option<(Stored<'a>, Encoding)>,
-    /// Those converted last, from number `first` on.
+    /// The numbers converted most recently, starting with number `first`.
     window: Vec<i64>,
     first: usize,
 }
@@ -22,12 +23,12 @@ struct Encoding {
 }
 
 impl<'a> Integers<'a> {
-    /// Numbers stored as bytes.
+    /// Integers stored as bytes.
     pub fn stored(bytes: Stored<'a>, scalar: Scalar, big_endian: bool) -> Self {
         Self { stored: Some((bytes, Encoding { scalar, big_endian })), ..Self::default() }
     }
 
-    /// Numbers read from text.
+    /// Integers that were read from text.
     pub fn parsed(values: Vec<i64>) -> Self {
         Self { window: values, ..Self::default() }
     }
@@ -36,12 +37,12 @@ impl<'a> Integers<'a> {
         self.stored.as_ref().map_or(self.window.len(), |(bytes, encoding)| bytes.len() / encoding.scalar.size())
     }
 
-    /// Number `i`; 0 beyond the last.
+    /// Number `i`; 0 if `i` is beyond the last number.
     pub fn at(&mut self, i: usize) -> Result<i64> {
         Ok(self.slice(i..i + 1)?.first().copied().unwrap_or(0))
     }
 
-    /// Some that follow each other; none if there are not so many.
+    /// A range of consecutive numbers; empty if the range goes beyond the last number.
     pub fn slice(&mut self, range: Range<usize>) -> Result<&[i64]> {
         if range.end > self.len() || range.start > range.end {
             return Ok(&[]);

@@ -1,4 +1,4 @@
-//! Medit meshes as text (`.mesh`). Binary ones: `meditb`.
+//! Reader for Medit meshes in text form (`.mesh`). `meditb` reads the binary form.
 
 use super::array::Array;
 use super::assemble::Assembly;
@@ -7,7 +7,7 @@ use super::source::{Source, Tokens, printable};
 use crate::error::Result;
 use crate::mesh::On;
 
-/// Sections of cells: keyword, keyword number of the binary form, type.
+/// Sections of cells: keyword, number of the keyword in the binary form, and cell type.
 #[rustfmt::skip]
 pub(crate) const SECTIONS: [(&str, i64, CellType); 21] = [
     ("Edges", 5, cell("line", Shape::Flat, 2)),
@@ -37,7 +37,7 @@ const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
     CellType { name, shape, nodes: Some(nodes) }
 }
 
-/// Sections as the file has them; cells may come before the points.
+/// Sections as stored in the file; cells may come before the points.
 #[derive(Default)]
 pub(crate) struct Content {
     pub points: Option<Vec<[f64; 3]>>,
@@ -48,7 +48,7 @@ pub(crate) struct Content {
 }
 
 impl Content {
-    /// Builds the mesh; points count from 1.
+    /// Builds the mesh; points are numbered from 1.
     pub fn assemble(self, source: &Source, assembly: &mut Assembly<'_>) -> Result<()> {
         assembly.points =
             self.points.ok_or_else(|| source.error_line(source.bytes.len(), "the file ends, and there was no section Vertices"))?;
@@ -152,7 +152,7 @@ fn cells(tokens: &mut Tokens<'_>, content: &mut Content, name: &str, kind: CellT
     Ok(())
 }
 
-/// Skips the numbers of a section that is of no use here.
+/// Skips the numbers of a section that is not used.
 fn skip(tokens: &mut Tokens<'_>) {
     while tokens.peek().is_some_and(|t| !t[0].is_ascii_alphabetic()) {
         tokens.next_token();

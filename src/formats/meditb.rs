@@ -1,4 +1,4 @@
-//! Binary Medit meshes (`.meshb`), versions 1 to 4, either byte order.
+//! Reader for binary Medit meshes (`.meshb`), versions 1 to 4, either byte order.
 
 use super::assemble::Assembly;
 use super::medit::{Content, SECTIONS};
@@ -92,7 +92,7 @@ impl Reader<'_> {
         Ok(value)
     }
 
-    /// A number of things of `each` bytes.
+    /// Reads a count of things that take `each` bytes in the rest of the file.
     fn count(&mut self, each: usize) -> Result<usize> {
         let at = self.at;
         let n: i64 = self.number(self.int())?;

@@ -1,14 +1,16 @@
-//! Mesh files in, results out.
+//! Readers of mesh files and writers of results.
 //!
-//! [`load`] reads every mesh format; what it made of the file is in the [`Report`]. Formats are told by content, then by name.
+//! [`load`] reads every mesh format; the [`Report`] says what was found in the file and what became of it. A format is
+//! recognised by the content of the file, or else by its name.
 //!
-//! # Why own readers
-//! The libraries at hand were measured on 420 hostile files and on one mesh in 60 spellings. `vtkio` 0.7.0-rc2 refuses
-//! 16 of 39 healthy VTK files (all with appended raw data, the default of many writers; 0.6.3 refuses 25), panics on 2 (0.6.3 also
-//! asks for 22 GB on a third), and accepts 15 of 85 broken ones, indices out of range included. `mshio`
-//! 0.4.2 reads Gmsh 4.1 only, none of 4.0 and 2.2, and believes 2^40 announced nodes. Neither names a line or an array.
-//! So the readers here stand on quick-xml, base64, flate2, `lz4_flex` and lzma-rust2, and check every count against the size of
-//! the file before they allocate.
+//! # Why the crate has its own readers
+//! Existing libraries were measured on 420 hostile files and on one mesh stored in 60 variants. `vtkio` 0.7.0-rc2
+//! refuses 16 of 39 healthy VTK files (all of them with appended raw data, the default of many writers; 0.6.3 refuses
+//! 25), panics on 2 (0.6.3 also asks for 22 GB on a third), and accepts 15 of 85 broken ones, including files with
+//! indices out of range. `mshio` 0.4.2 reads only Gmsh 4.1, neither 4.0 nor 2.2, and trusts a file that announces 2^40
+//! nodes. Neither library names a line or an array in its errors. The readers here therefore build on quick-xml,
+//! base64, flate2, `lz4_flex` and lzma-rust2, and check every count against the size of the file before they allocate
+//! memory.
 
 mod array;
 mod assemble;
@@ -56,10 +58,12 @@ pub use write::{
 /// How to read a mesh.
 #[derive(Clone, Debug)]
 pub struct LoadOptions {
-    /// Points of different pieces of one file with equal coordinates become one (default), so that the seams are no boundary.
+    /// Merge points of different pieces of a file that have equal coordinates (default), so that the seams between
+    /// pieces do not become boundary.
     pub merge_pieces: bool,
-    /// Compressed arrays may unpack to this many times the size of the file (and 64 MiB); more is refused. Arrays that do not cover the mesh
-    /// may be filled up with as much NaN; those that need more are left out. Default 100.
+    /// Compressed arrays may unpack to this many times the size of the file plus 64 MiB; a file that needs more is
+    /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
+    /// more are left out. Default 100.
     pub expansion: u64,
 }
 
@@ -69,21 +73,22 @@ impl Default for LoadOptions {
     }
 }
 
-/// A mesh and what was found in its file.
+/// A mesh and the report about its file.
 #[derive(Clone, Debug)]
 pub struct Loaded {
     /// The mesh.
     pub mesh: Mesh,
-    /// What was found.
+    /// What was found in the file.
     pub report: Report,
 }
 
-/// Reads a mesh: a file, or a procedural one: `kuhn:NX,NY,NZ` (with `,jitter=J` and `,seed=S` if wanted) for [`crate::mesh::kuhn`], `graded:N`,
-/// `shell:N` and `slivers:N` for the functions of [`crate::mesh`].
+/// Reads a mesh file, or makes a procedural mesh: `kuhn:NX,NY,NZ` (optionally with `,jitter=J` and `,seed=S`) calls
+/// [`crate::mesh::kuhn`]; `graded:N`, `shell:N` and `slivers:N` call the functions of [`crate::mesh`] with these names.
 ///
 /// # Errors
-/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken or in no known format,
-/// [`crate::Error::Invalid`] for a wrong `kuhn:` or other procedural text, [`crate::Error::TooLarge`] past 32-bit indices.
+/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken or in no
+/// known format, [`crate::Error::Invalid`] for a malformed name of a procedural mesh, [`crate::Error::TooLarge`] if the
+/// mesh exceeds 32-bit indices.
 pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
     let start = Instant::now();
     let path = spec.as_ref();
@@ -93,8 +98,8 @@ pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
     read(&Source::read(path, detect::READABLE)?, options, start)
 }
 
-/// Reads a mesh from the content of a file; `name` stands for it in messages and gives its ending. The second file of TetGen's pairs
-/// is looked for beside `name`.
+/// Reads a mesh from the content of a file. `name` is the path used in messages, and its extension helps to recognise
+/// the format. The second file of a TetGen pair is searched for next to `name`.
 ///
 /// # Errors
 /// As [`load`].

@@ -1,5 +1,5 @@
-//! NumPy's array files. A header of three keys is read here by hand: the crates at hand bring a parser of Python literals along, and
-//! trust the shape before they look at the size of the file.
+//! NumPy array files (`.npy`). The header, a dictionary with three keys, is parsed by hand: existing crates bring a
+//! whole parser of Python literals, and trust the announced shape before they look at the size of the file.
 
 use super::scalar::Scalar;
 use super::source::{Source, printable};
@@ -7,7 +7,8 @@ use crate::error::Result;
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
 
-/// The header of an array of that type and shape, padded so that the data are aligned. `descr` is a Python literal.
+/// The file header for an array of this type and shape, padded so that the data are aligned. `descr` is a Python
+/// literal.
 pub(crate) fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     let comma = if shape.len() == 1 { "," } else { "" };
@@ -24,7 +25,7 @@ pub(crate) fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
     out
 }
 
-/// Points from an array of shape (n, 3), or (3,) for a single one.
+/// Reads points from an array of shape (n, 3), or of shape (3,) for a single point.
 pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
     let bytes = &source.bytes;
     let short = || source.error_byte(bytes.len(), "the file ends inside the header");
@@ -74,7 +75,7 @@ pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
     })
 }
 
-/// A type like `<f8`.
+/// Parses a NumPy type such as `<f8` into number type and byte order (`true`: big-endian).
 fn scalar(name: &str) -> Option<(Scalar, bool)> {
     let (order, kind) = name.split_at_checked(1)?;
     let big_endian = match order {

@@ -1,4 +1,4 @@
-//! Points to be located: NumPy arrays and tables of text.
+//! Readers for points to locate: NumPy arrays and text tables.
 
 use std::path::Path;
 
@@ -6,9 +6,10 @@ use super::npy;
 use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::Result;
 
-/// Reads points: a `.npy` file of shape (n, 3) with any type of numbers, or a table of text with one point per line, separated by
-/// commas, semicolons or white space. The first line of a table may name the columns; if it names `x`, `y` and `z`, these are taken,
-/// otherwise there must be three columns. Lines that begin with `#` are comments.
+/// Reads points from a `.npy` file of shape (n, 3) with any numeric type, or from a text table with one point per line
+/// and columns separated by commas, semicolons or white space. The first line of a table may name the columns: if it
+/// names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that start with `#` are
+/// comments.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
@@ -46,7 +47,8 @@ fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
                 source.error_line(at, message)
             })?;
             columns = Some(chosen);
-            // Names of other columns have no numbers among them: a point with a slip is no headline.
+            // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing
+            // error, not a header.
             if named.is_none() && numbers > 0 {
                 points.push(point(source, at, line, &fields, chosen)?);
             }
@@ -72,7 +74,7 @@ fn split(line: &[u8]) -> Vec<&[u8]> {
     }
 }
 
-/// A number; where semicolons separate, the decimal mark may be a comma.
+/// Parses a number; if semicolons separate the columns, the decimal mark may be a comma.
 fn number(field: &[u8], line: &[u8]) -> Option<f64> {
     if line.contains(&b';') && field.contains(&b',') {
         let dotted: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
@@ -81,7 +83,7 @@ fn number(field: &[u8], line: &[u8]) -> Option<f64> {
     parse_float(field)
 }
 
-/// Which columns hold x, y and z by their names.
+/// The columns that hold x, y and z, found by their names.
 fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
     let find = |names: [&str; 3]| {
         let at = names.map(|name| {
@@ -92,7 +94,7 @@ fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
         });
         Some([at[0]?, at[1]?, at[2]?])
     };
-    // The latter two are ParaView's, of different versions.
+    // The last two sets of names are those of different ParaView versions.
     [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]].into_iter().find_map(find)
 }
 

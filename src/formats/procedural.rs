@@ -1,11 +1,11 @@
-//! Meshes by name: `kuhn:31,31,31,jitter=0.3`, `graded:24`.
+//! Procedural meshes, made from names such as `kuhn:31,31,31,jitter=0.3` or `graded:24`.
 
 use super::{CellCount, Fate, Loaded, Report};
 use crate::error::{Error, Result};
 use crate::mesh::{Mesh, graded, kuhn_jittered, shell, slivers};
 use std::time::Instant;
 
-/// The mesh that a text names and what it is; `None` if it names none.
+/// The mesh that a text names, and its description; `None` if the text is not the name of a procedural mesh.
 pub(crate) fn make(text: &str) -> Option<Result<(String, Mesh)>> {
     let (name, size) = text.split_once(':')?;
     let of: fn(u32) -> Result<Mesh> = match name {
@@ -37,7 +37,7 @@ fn kuhn(text: &str) -> Result<(String, Mesh)> {
     Ok((format!("Kuhn grid {}×{}×{}", size[0], size[1], size[2]), kuhn_jittered(size, jitter, seed)?))
 }
 
-/// With the report of a reader.
+/// Adds a report like that of a file reader.
 pub(crate) fn loaded(format: String, mesh: Mesh, start: Instant) -> Loaded {
     let n = mesh.tets.len() as u64;
     let wide = |p: &[f32; 3]| p.map(f64::from);

@@ -1,28 +1,28 @@
-//! What was found in a mesh file and what became of it.
+//! The report about a mesh file: what was found in it and what became of it.
 
 use std::fmt;
 
 use serde::Serialize;
 
-/// What became of the cells of one type.
+/// What became of the file cells of one type.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Fate {
-    /// Taken as they are.
+    /// Tetrahedra that were taken unchanged.
     Kept,
-    /// Curved tetrahedra, taken as straight ones by their corners.
+    /// Curved tetrahedra, of which only the corners were used.
     Straightened,
-    /// Split into tetrahedra (curved ones by their corners).
+    /// Cells that were split into tetrahedra (curved cells by their corners only).
     Split,
     /// Points, lines and surfaces, which have no volume.
     Boundary,
-    /// Copies of cells of a neighbouring piece, marked so by the writer of a parallel file.
+    /// Copies of cells of a neighbouring piece, marked as such by the writer of a parallel file.
     Ghost,
-    /// Volumes that cannot be read: they are missing in the mesh.
+    /// Volumes of a type that cannot be read; they are missing in the mesh.
     Unsupported,
 }
 
-/// The cells of one type in a file.
+/// The file cells of one type.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize)]
 pub struct CellCount {
     /// Name of the type.
@@ -31,18 +31,18 @@ pub struct CellCount {
     pub count: u64,
     /// What became of them.
     pub fate: Fate,
-    /// Number of tetrahedra they gave.
+    /// Number of tetrahedra made from them.
     pub tetrahedra: u64,
 }
 
-/// What was found in a mesh file and what became of it. `Display` gives a few lines of text.
+/// What was found in a mesh file and what became of it. `Display` formats it as a few lines of text.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Report {
     /// Format, version, encoding.
     pub format: String,
-    /// Size of the file or files in bytes.
+    /// Size of the file, or of all files read, in bytes.
     pub bytes: u64,
-    /// Seconds it took to read them.
+    /// Time for reading in seconds.
     pub seconds: f64,
     /// Number of points.
     pub points: u64,
@@ -52,21 +52,22 @@ pub struct Report {
     pub cells: Vec<CellCount>,
     /// Number of tetrahedra of the mesh.
     pub tetrahedra: u64,
-    /// Tetrahedra of the file whose vertices are numbered against the convention (pieces of split cells are not counted).
+    /// Tetrahedra of the file whose vertices are ordered against the convention (pieces of split cells are not
+    /// counted).
     pub negative: u64,
     /// Tetrahedra whose volume is exactly zero in double precision.
     pub flat: u64,
-    /// Split cells so warped that pieces of them are turned inside out.
+    /// Split cells that are so warped that some of their pieces are inverted.
     pub tangled: u64,
-    /// Smallest and largest coordinates of the used points, in the file's coordinates.
+    /// Smallest and largest coordinates of the points in use, in the coordinates of the file.
     pub bounds: [[f64; 3]; 2],
-    /// What was subtracted from all coordinates ([`crate::mesh::Mesh::origin`]).
+    /// The vector that was subtracted from all coordinates ([`crate::mesh::Mesh::origin`]).
     pub origin: [f64; 3],
-    /// What the reader wants to be known, one sentence each.
+    /// Warnings of the reader, one sentence each.
     pub warnings: Vec<String>,
 }
 
-/// What became of them, in words.
+/// Describes what became of the cells.
 impl fmt::Display for CellCount {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.fate {
@@ -81,7 +82,7 @@ impl fmt::Display for CellCount {
 }
 
 impl Report {
-    /// Number of cells with that fate.
+    /// Number of file cells with this fate.
     pub fn count(&self, fate: Fate) -> u64 {
         self.cells.iter().filter(|c| c.fate == fate).map(|c| c.count).sum()
     }

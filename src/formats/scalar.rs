@@ -15,9 +15,9 @@ pub(crate) enum Scalar {
     F64,
 }
 
-/// What stored numbers are converted to.
+/// A type that stored numbers are converted to.
 pub(crate) trait Number: Copy {
-    /// Fractions are no values of this type.
+    /// Whether the type holds whole numbers only, so that fractions are invalid.
     const EXACT: bool = false;
     fn from_i64(v: i64) -> Self;
     fn from_u64(v: u64) -> Self;
@@ -48,7 +48,7 @@ impl Number for f32 {
     }
 }
 
-/// For indices: what does not fit becomes the largest integer, which no index equals.
+/// Used for indices: a number that does not fit becomes `i64::MAX`, which no index equals.
 impl Number for i64 {
     const EXACT: bool = true;
     fn from_i64(v: i64) -> Self {
@@ -76,7 +76,7 @@ impl Scalar {
         matches!(self, Scalar::F32 | Scalar::F64)
     }
 
-    /// Type names of VTK XML files.
+    /// The type with this name in VTK XML files.
     pub fn vtk_xml(name: &str) -> Option<Self> {
         Some(match name {
             "Int8" => Scalar::I8,
@@ -93,7 +93,7 @@ impl Scalar {
         })
     }
 
-    /// Type names of legacy VTK files, in lower case.
+    /// The type with this name, in lower case, in legacy VTK files.
     pub fn vtk_legacy(name: &str) -> Option<Self> {
         Some(match name {
             "char" | "signed_char" | "vtktypeint8" => Scalar::I8,
@@ -110,14 +110,14 @@ impl Scalar {
         })
     }
 
-    /// Converts stored numbers; a rest shorter than one number is left out.
+    /// Converts stored numbers; a remainder shorter than one number is left out.
     pub fn convert<T: Number>(self, bytes: &[u8], big: bool) -> Vec<T> {
         let mut values = Vec::with_capacity(bytes.len() / self.size());
         self.convert_to(&mut values, bytes, big);
         values
     }
 
-    /// The same, appended to others.
+    /// Converts stored numbers as [`Self::convert`] does, and appends them to `values`.
     pub fn convert_to<T: Number>(self, values: &mut Vec<T>, bytes: &[u8], big: bool) {
         macro_rules! numbers {
             ($type:ty, $from:ident, $wide:ty) => {{

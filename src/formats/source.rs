@@ -1,4 +1,4 @@
-//! A file's content, and errors that name a place in it.
+//! Contents of a file, and errors that name a place in it.
 
 use std::borrow::Cow;
 use std::fs::File;
@@ -8,32 +8,33 @@ use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
 
-/// Read at once while looking for where the raw data of a file begin.
+/// Bytes read at a time while searching for the start of raw data in a file.
 const PIECE: u64 = 1 << 14;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
 /// The content of a file.
 pub(crate) struct Source {
-    /// Its path, for messages.
+    /// Path of the file, for messages.
     pub path: PathBuf,
-    /// Its content without a UTF-8 byte-order mark: all of it, or its beginning, if `rest` is left on the disk.
+    /// Contents without a UTF-8 byte-order mark: the whole file, or only its start if `rest` remains on disk.
     pub bytes: Vec<u8>,
     rest: Option<Rest>,
 }
 
-/// A file of which the beginning has been read.
+/// An open file whose start has been read.
 struct Rest {
     file: File,
-    /// Bytes before the content, a byte-order mark.
+    /// Length in bytes of the byte-order mark before the contents.
     mark: usize,
-    /// Bytes of the content.
+    /// Length of the contents in bytes.
     length: usize,
 }
 
 impl Source {
-    /// Reads a file, of which `kinds` are understood: the whole of it, but for raw data appended to XML, which are read when they are asked for. (A memory map
-    /// would do that for all, but a map of a file that another process cuts short kills this one.)
+    /// Reads a file; `kinds` names the readable formats for messages. The whole file is read, except raw data appended
+    /// to XML, which are read on demand. (A memory map would do that for all files, but if another process truncates a
+    /// mapped file, this process is killed.)
     pub fn read(path: &Path, kinds: &str) -> Result<Self> {
         match Self::open(path) {
             Ok(source) => Ok(source),
@@ -62,7 +63,7 @@ impl Source {
         Ok(Self::new(path, bytes))
     }
 
-    /// The content of a file.
+    /// The contents of a file that are already in memory.
     pub fn new(path: &Path, mut bytes: Vec<u8>) -> Self {
         if bytes.starts_with(BYTE_ORDER_MARK) {
             bytes.drain(..BYTE_ORDER_MARK.len());
@@ -70,12 +71,12 @@ impl Source {
         Self { path: path.into(), bytes, rest: None }
     }
 
-    /// Bytes of the content.
+    /// Length of the contents in bytes.
     pub fn len(&self) -> usize {
         self.rest.as_ref().map_or(self.bytes.len(), |rest| rest.length)
     }
 
-    /// Bytes of the content, from the disk if they are there.
+    /// A range of the contents, read from disk if it is not in memory.
     pub fn window(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, String> {
         let Some(rest) = self.rest.as_ref().filter(|_| range.end > self.bytes.len()) else {
             return self.bytes.get(range).map(Cow::Borrowed).ok_or_else(|| "it lies beyond the end of the file".into());
@@ -107,7 +108,7 @@ impl Source {
         self.error_in(format_args!("byte {at}"), message)
     }
 
-    /// Number, from 1, of the line that holds byte `at`; a lone carriage return ends a line too.
+    /// Number, counted from 1, of the line that contains byte `at`; a lone carriage return also ends a line.
     pub fn line(&self, at: usize) -> usize {
         let before = &self.bytes[..at.min(self.bytes.len())];
         let feed_follows = |i: usize| self.bytes.get(i + 1) == Some(&b'\n');
@@ -115,19 +116,19 @@ impl Source {
     }
 }
 
-/// A search for raw data appended to XML, in a content that grows.
+/// Search for raw data appended to XML, in contents that are still being read.
 #[derive(Default)]
 struct RawData {
-    /// Bytes looked at.
+    /// Bytes searched so far.
     done: usize,
-    /// Where the element begins.
+    /// Position where the element `AppendedData` starts.
     tag: Option<usize>,
-    /// There are none.
+    /// Whether it is certain that there are no raw data.
     failed: bool,
 }
 
 impl RawData {
-    /// Whether they have begun: behind the element's tag there is something.
+    /// Whether raw data have started, that is whether something follows the start tag of the element.
     fn found_in(&mut self, bytes: &[u8]) -> bool {
         const TAG: &[u8] = b"<AppendedData";
         let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
@@ -142,7 +143,7 @@ impl RawData {
     }
 }
 
-/// A word of a file for a message: short, and without control characters.
+/// A word of a file, made fit for a message: short, and without control characters.
 pub(crate) fn printable(word: &[u8]) -> String {
     let cut = &word[..word.len().min(60)];
     let text = String::from_utf8_lossy(cut);
@@ -153,14 +154,14 @@ pub(crate) fn printable(word: &[u8]) -> String {
     text
 }
 
-/// The numbers and words of a text, separated by white space.
+/// The tokens (numbers and words) of a text, separated by white space.
 #[derive(Clone)]
 pub(crate) struct Tokens<'a> {
     source: &'a Source,
-    /// Next unread byte of the source.
+    /// Position of the next unread byte of the source.
     pub at: usize,
     end: usize,
-    /// Starts a comment that lasts to the end of the line.
+    /// The character that starts a comment, which extends to the end of the line.
     comment: Option<u8>,
 }
 
@@ -183,7 +184,7 @@ impl<'a> Tokens<'a> {
         }
     }
 
-    /// The next token and where it begins; `None` at the end.
+    /// The next token and its position; `None` at the end.
     pub fn next_token(&mut self) -> Option<(&'a [u8], usize)> {
         self.skip_space();
         let start = self.at.min(self.end);
@@ -199,7 +200,7 @@ impl<'a> Tokens<'a> {
         self.clone().next_token().map(|(token, _)| token)
     }
 
-    /// The next token; an error that says what was wanted at the end.
+    /// The next token; at the end of the text an error that says what was expected.
     pub fn word(&mut self, what: &str) -> Result<(&'a [u8], usize)> {
         self.next_token().ok_or_else(|| self.source.error_line(self.end, format!("the file ends where {what} should be")))
     }
@@ -210,8 +211,8 @@ impl<'a> Tokens<'a> {
         parse_integer(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
     }
 
-    /// The next token as a number that counts something of which the rest of the text must hold two bytes each, so that a wrong
-    /// count is refused before anything is allocated for it.
+    /// The next token as a count of things that take at least two bytes each in the rest of the text, so that a wrong
+    /// count is refused before memory is allocated for it.
     pub fn count(&mut self, what: &str) -> Result<usize> {
         let (token, at) = self.word(what)?;
         let fail = |why: &str| self.source.error_line(at, format!("`{}` as {what}: {why}", printable(token)));
@@ -226,7 +227,7 @@ impl<'a> Tokens<'a> {
         parse_float(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
     }
 
-    /// The rest of the line from here, its end consumed; `None` at the end of the text.
+    /// The rest of the current line, consuming the line end; `None` at the end of the text.
     pub fn line(&mut self) -> Option<(&'a [u8], usize)> {
         if self.at >= self.end {
             return None;
@@ -239,13 +240,13 @@ impl<'a> Tokens<'a> {
         Some((&rest[..length], start))
     }
 
-    /// Bytes not read yet.
+    /// Number of bytes that have not been read.
     pub fn left(&self) -> usize {
         self.end.saturating_sub(self.at)
     }
 }
 
-/// An integer in decimal; `None` if it is none or does not fit.
+/// Parses a decimal integer; `None` if the token is not an integer or does not fit.
 pub(crate) fn parse_integer(token: &[u8]) -> Option<i64> {
     let (negative, digits) = match token {
         [b'-', rest @ ..] => (true, rest),
@@ -265,7 +266,7 @@ pub(crate) fn parse_integer(token: &[u8]) -> Option<i64> {
     if negative { Some(value) } else { value.checked_neg() }
 }
 
-/// A floating-point number; Fortran's exponent letter D is understood.
+/// Parses a floating-point number; Fortran's exponent letter D is accepted.
 pub(crate) fn parse_float(token: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(token).ok()?;
     text.parse().ok().or_else(|| {

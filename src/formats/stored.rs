@@ -1,4 +1,4 @@
-//! The bytes of an array: as they stand in the file, or unpacked, a window at a time, so that no array is in memory twice.
+//! Bytes of an array, plain or compressed, accessed one window at a time, so that no array is in memory twice.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -10,34 +10,34 @@ use super::source::Source;
 use super::unpack::Compressor;
 use crate::error::Result;
 
-/// Numbers converted at once.
+/// Numbers per window of conversion.
 pub(crate) const WINDOW: usize = 1 << 18;
 
 /// An array of a file.
 pub(crate) struct Stored<'a> {
     source: &'a Source,
-    /// Which one, for messages.
+    /// Description of the array for messages.
     what: String,
     content: Content,
     blocks: Option<Blocks>,
 }
 
-/// Where bytes are.
+/// Where the stored bytes of an array are.
 pub(crate) enum Content {
     /// In this range of the file.
     File(Range<usize>),
-    /// Here: they were text.
+    /// In memory, because they were decoded from text.
     Decoded(Vec<u8>),
 }
 
-/// Blocks that were compressed one by one.
+/// Blocks that were compressed independently.
 pub(crate) struct Blocks {
     pub compressor: Compressor,
-    /// Where each lies in the content.
+    /// Range of each block within the content.
     pub packed: Vec<Range<usize>>,
-    /// Bytes of each once unpacked, but for the last.
+    /// Unpacked size of each block in bytes, except the last.
     pub block: usize,
-    /// Bytes of all of them.
+    /// Unpacked size of all blocks together in bytes.
     pub size: usize,
 }
 
@@ -46,12 +46,12 @@ impl<'a> Stored<'a> {
         Self { source, what, content, blocks }
     }
 
-    /// Bytes of it.
+    /// Size of the array in bytes, unpacked.
     pub fn len(&self) -> usize {
         self.blocks.as_ref().map_or_else(|| self.content.len(), |blocks| blocks.size)
     }
 
-    /// The bytes in a range, which must lie in it.
+    /// The unpacked bytes in a range, which must lie within the array.
     pub fn read(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>> {
         let bytes = match &self.blocks {
             None => self.content.read(self.source, range),
@@ -60,7 +60,7 @@ impl<'a> Stored<'a> {
         bytes.map_err(|message| self.source.error_in(&self.what, message))
     }
 
-    /// All of it as numbers.
+    /// Converts the whole array to numbers.
     pub fn convert<T: Number>(&self, scalar: Scalar, big_endian: bool) -> Result<Vec<T>> {
         let mut values = Vec::with_capacity(self.len() / scalar.size());
         let window = WINDOW * scalar.size();
@@ -88,7 +88,7 @@ impl Content {
 }
 
 impl Blocks {
-    /// Unpacks those that meet a range, side by side, and keeps what lies in it.
+    /// Unpacks the blocks that intersect a range, in parallel, and returns the bytes of the range.
     fn read<'c>(&self, range: Range<usize>, content: impl Fn(Range<usize>) -> Result<Cow<'c, [u8]>, String>) -> Result<Vec<u8>, String> {
         if range.is_empty() {
             return Ok(Vec::new());
@@ -111,7 +111,7 @@ impl Blocks {
 
 #[cfg(test)]
 impl Stored<'_> {
-    /// Without a file.
+    /// An array of bytes in memory, without a file.
     pub fn decoded(source: &Source, bytes: Vec<u8>) -> Stored<'_> {
         Stored::new(source, String::new(), Content::Decoded(bytes), None)
     }

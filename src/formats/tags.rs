@@ -1,9 +1,10 @@
-//! From the numbers that a file gives its points or cells to positions in memory.
+//! Mapping from the numbers that a file gives its points or cells to positions in memory.
 
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 
-/// A look-up from tags, dense where they are, so that one huge tag allocates nothing.
+/// A look-up table from tags to positions. It is dense if the tags are, so that a single huge tag does not make it
+/// huge.
 pub(crate) enum Tags {
     Dense { first: i64, table: Vec<u32> },
     Sparse(HashMap<i64, u32>),
@@ -12,7 +13,8 @@ pub(crate) enum Tags {
 const NONE: u32 = u32::MAX;
 
 impl Tags {
-    /// `Err` names a tag that occurs twice, unless `repeat` allows it (the first one counts then).
+    /// Builds the table; position `i` belongs to `tags[i]`. `Err` holds a tag that occurs twice, unless `repeat` allows
+    /// that (the first position counts then).
     pub fn new(tags: &[i64], repeat: bool) -> Result<Self, i64> {
         let first = tags.iter().copied().min().unwrap_or(0);
         let last = tags.iter().copied().max().unwrap_or(0);

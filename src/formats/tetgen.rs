@@ -1,4 +1,4 @@
-//! TetGen's pairs of `.node` and `.ele`, numbered from 0, 1 or anything.
+//! Reader for TetGen's pairs of `.node` and `.ele` files, numbered from 0, from 1, or in any way.
 
 use super::array::Array;
 use super::assemble::Assembly;
@@ -9,7 +9,7 @@ use super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
 
-/// The other file of the pair.
+/// Reads the other file of the pair.
 pub(crate) fn companion(source: &Source) -> Result<Source> {
     let other = if ending(&source.path) == "node" { "ele" } else { "node" };
     let upper = source.path.extension().is_some_and(|e| e.to_string_lossy().chars().all(|c| c.is_ascii_uppercase()));
@@ -20,7 +20,7 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
     })
 }
 
-/// `main` is the file that was named, for messages about the whole.
+/// Reads a mesh. `main` is the file that the user named; errors about the whole mesh refer to it.
 pub(crate) fn read<'a>(main: &'a Source, companion: &Source) -> Result<Assembly<'a>> {
     let (node, ele) = if ending(&main.path) == "node" { (main, companion) } else { (companion, main) };
     let mut assembly = Assembly::new(main, "TetGen .node and .ele".into());
@@ -41,7 +41,7 @@ impl<'a> Lines<'a> {
         Self { source, tokens: Tokens::new(source, 0..source.bytes.len(), Some(b'#')) }
     }
 
-    /// The words of the next line in `words`; where it begins.
+    /// Puts the words of the next line into `words` and returns the position of the line.
     fn next(&mut self, words: &mut Vec<&'a [u8]>) -> Option<usize> {
         self.tokens.skip_space();
         let (line, at) = self.tokens.line()?;
@@ -53,13 +53,13 @@ impl<'a> Lines<'a> {
         Some(at)
     }
 
-    /// The next line; an error at the end of the file.
+    /// The next line, as [`Self::next`] returns it; an error at the end of the file.
     fn need(&mut self, words: &mut Vec<&'a [u8]>, what: &str) -> Result<usize> {
         let end = self.source.bytes.len();
         self.next(words).ok_or_else(|| self.source.error_line(end, format!("the file ends where {what} should be")))
     }
 
-    /// Nothing may follow.
+    /// Returns an error if anything follows.
     fn end(mut self, words: &mut Vec<&'a [u8]>, n: usize, what: &str) -> Result<()> {
         match self.next(words) {
             None => Ok(()),
@@ -68,7 +68,7 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Counts of a first line: at least `need` numbers, the rest 0.
+/// Reads the counts in the first line: at least `need` numbers; missing further ones are 0.
 fn header<const N: usize>(source: &Source, at: usize, words: &[&[u8]], need: usize, what: &str) -> Result<[usize; N]> {
     let mut counts = [0; N];
     for (i, count) in counts.iter_mut().enumerate() {
@@ -80,7 +80,7 @@ fn header<const N: usize>(source: &Source, at: usize, words: &[&[u8]], need: usi
         };
         let n = parse_integer(word).and_then(|n| usize::try_from(n).ok());
         let n = n.ok_or_else(|| source.error_line(at, format!("`{}` in the first line, which must be `{what}`", printable(word))))?;
-        // Every thing counted takes two bytes of the file at least.
+        // Everything that is counted takes at least two bytes of the file.
         let room = source.bytes.len() / 2;
         if n > room {
             return Err(source.error_line(at, format!("{n} in the first line (`{what}`), but the file has room for {room} at most")));

@@ -1,10 +1,10 @@
-//! The compressors of VTK, one block at a time, never past the announced size.
+//! Decompression of the compressors that VTK uses, one block at a time and never beyond the announced size.
 
 use std::io::Read;
 
 use flate2::{Decompress, FlushDecompress, Status};
 
-/// A compressor.
+/// A compressor of VTK XML files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Compressor {
     Zlib,
@@ -21,7 +21,7 @@ impl Compressor {
         }
     }
 
-    /// Unpacks a block that must fill `out` exactly.
+    /// Decompresses a block, which must fill `out` exactly.
     pub fn unpack(self, packed: &[u8], out: &mut [u8]) -> Result<(), String> {
         match self {
             Compressor::Zlib => zlib(packed, out),
@@ -47,7 +47,7 @@ fn zlib(packed: &[u8], out: &mut [u8]) -> Result<(), String> {
     }
 }
 
-/// Dictionaries of xz's highest level, the largest that VTK writes, need this many KiB.
+/// Memory limit for xz in KiB: enough for the dictionaries of its highest level, the largest that VTK writes.
 const XZ_MEMORY: u32 = 66 << 10;
 
 fn xz(packed: &[u8], out: &mut [u8]) -> Result<(), String> {

@@ -1,4 +1,4 @@
-//! Legacy VTK files (`.vtk`), versions 1.0 to 5.1, text and binary (big-endian).
+//! Reader for legacy VTK files (`.vtk`), versions 1.0 to 5.1, text and binary (big-endian).
 
 use super::array::Array;
 use super::assemble::Assembly;
@@ -12,16 +12,17 @@ use super::vtk_reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
 
-/// Cells as the file has them.
+/// The cells as stored in the file.
 struct Cells<'a> {
     count: usize,
-    /// Where each begins in `nodes`, and where the last one ends; `None`: every cell's nodes follow their number.
+    /// Start of each cell in `nodes`, and end of the last one; `None`: the nodes of each cell are preceded by their
+    /// number.
     offsets: Option<Integers<'a>>,
     nodes: Integers<'a>,
 }
 
 impl Cells<'_> {
-    /// The nodes of cell `i`. `at`: where the one before ended, and then this one.
+    /// The nodes of cell `i`. `at` is the end of the previous cell, and becomes the end of this one.
     fn nodes(&mut self, i: usize, at: &mut usize) -> Result<&[i64]> {
         let (begin, end) = match &mut self.offsets {
             Some(offsets) => (*at, offsets.at(i + 1)? as usize),
@@ -79,7 +80,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
             assembly.skip("ghost cell", Fate::Ghost);
             continue;
         }
-        // A polyhedron's entry lists its faces, not its points.
+        // For a polyhedron the file lists its faces, not its points.
         assembly.push(kind, if number == 42 { &[] } else { nodes }, 0)?;
     }
     for array in &assembly.arrays {
@@ -134,7 +135,8 @@ impl<'a> Reader<'a> {
         self.integers(Some(Scalar::I32), n, "a cell type")
     }
 
-    /// `CELLS n size` with lists of a count and that many points, or, since 5.0, `CELLS n+1 size` with offsets and connectivity.
+    /// Reads `CELLS n size` with lists of a count and that many points, or, since version 5.0, `CELLS n+1 size` with
+    /// offsets and connectivity.
     fn cells(&mut self) -> Result<Cells<'a>> {
         let at = self.tokens.at;
         let n = self.tokens.count("the number of cells")?;

@@ -1,4 +1,4 @@
-//! Arrays of legacy VTK files.
+//! Reader for the arrays of legacy VTK files.
 
 use super::scalar::Scalar;
 use super::source::{parse_integer, printable};
@@ -6,10 +6,10 @@ use super::vtk_reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
 
-/// What `POINT_DATA` or `CELL_DATA` said.
+/// What the last `POINT_DATA` or `CELL_DATA` stated: what values belong to, and their number.
 pub(super) type Section = (On, usize);
 
-/// Name, components and values of an array.
+/// Name, number of components, and values of an array.
 pub(super) type Named = (String, usize, Vec<f32>);
 
 impl Reader<'_> {
@@ -18,7 +18,7 @@ impl Reader<'_> {
         Ok(decode_name(word))
     }
 
-    /// An array in a `POINT_DATA` or `CELL_DATA` section (or before them, where it belongs to neither).
+    /// Reads an array in a `POINT_DATA` or `CELL_DATA` section (or before the first one, where it belongs to neither).
     pub(super) fn attribute(&mut self, keyword: &[u8], at: usize, section: Option<Section>) -> Result<Vec<Named>> {
         let unknown = || Err(self.source.error_line(at, format!("`{}` where a keyword should be", printable(keyword))));
         if keyword == b"FIELD" {
@@ -38,7 +38,7 @@ impl Reader<'_> {
         };
         let name = self.name()?;
         let components = if components == 0 { self.components()? } else { components };
-        // Colours are bytes in binary files and fractions in text.
+        // Colours are bytes in binary files and fractions in text files.
         let scalar = if typed { self.scalar()? } else { Some(if self.binary { Scalar::U8 } else { Scalar::F32 }) };
         let values = self.values(scalar, n * components, &value_of(&name))?;
         Ok(vec![(name, components, values)])
@@ -56,7 +56,7 @@ impl Reader<'_> {
         let mut rest = self.tokens.clone();
         let same_line = rest.line().map_or(&b""[..], |(line, _)| line.trim_ascii());
         let components = if same_line.is_empty() { 1 } else { self.components()? };
-        // The look-up table is required, but often missing.
+        // The format requires the look-up table, but it is often missing.
         let mut ahead = self.tokens.clone();
         ahead.line();
         if ahead.line().is_some_and(|(line, _)| line.trim_ascii().get(..12).is_some_and(|w| w.eq_ignore_ascii_case(b"LOOKUP_TABLE"))) {
@@ -67,7 +67,7 @@ impl Reader<'_> {
         Ok(vec![(name, components, values)])
     }
 
-    /// A table of colours, which is of no use here.
+    /// Skips a table of colours, which is not used.
     fn lookup_table(&mut self) -> Result<Vec<Named>> {
         self.name()?;
         let n = self.tokens.count("the size of a look-up table")?;
@@ -100,7 +100,7 @@ impl Reader<'_> {
         Ok(arrays)
     }
 
-    /// Skips texts: one per line, or each with its length before it in binary.
+    /// Skips strings: one per line in text files, each preceded by its length in binary files.
     fn strings(&mut self, count: usize) -> Result<()> {
         self.tokens.line();
         for _ in 0..count {
@@ -112,7 +112,7 @@ impl Reader<'_> {
             let at = self.tokens.at;
             let rest = &self.source.bytes[at..];
             let head = rest.first().copied().unwrap_or(0);
-            // The upper two bits tell how many bytes hold the length: 8, 4, 2 or 1.
+            // The upper two bits encode how many bytes hold the length: 8, 4, 2 or 1.
             let size = 8usize >> (head >> 6);
             let word = rest.get(..size).ok_or_else(|| self.source.error_byte(at, "the file ends in an array of texts"))?;
             let length = word.iter().fold(0u64, |n, &b| n << 8 | u64::from(b)) & (u64::MAX >> (64 - 8 * size) >> 2);
@@ -127,7 +127,7 @@ fn value_of(name: &str) -> String {
     format!("a value of array `{}`", printable(name.as_bytes()))
 }
 
-/// Names have spaces and the like as %20.
+/// Decodes a name, in which spaces and other characters are percent-encoded (%20).
 fn decode_name(word: &[u8]) -> String {
     let mut out = Vec::with_capacity(word.len());
     let mut rest = word;

@@ -1,4 +1,4 @@
-//! Numbers of legacy VTK files, as text or binary.
+//! Reader for the numbers of legacy VTK files, as text or binary.
 
 use std::ops::Range;
 
@@ -8,7 +8,7 @@ use super::source::{Source, Tokens, parse_float, parse_integer, printable};
 use super::stored::{Content, Stored};
 use crate::error::Result;
 
-/// What is read next, and how numbers are stored.
+/// Position in the file, and how its numbers are stored.
 pub(super) struct Reader<'a> {
     pub source: &'a Source,
     pub tokens: Tokens<'a>,
@@ -16,7 +16,7 @@ pub(super) struct Reader<'a> {
 }
 
 impl<'a> Reader<'a> {
-    /// A number type; `None`: bits.
+    /// Reads a number type; `None`: bits.
     pub(super) fn scalar(&mut self) -> Result<Option<Scalar>> {
         let (word, at) = self.tokens.word("a number type")?;
         let name = String::from_utf8_lossy(word).to_ascii_lowercase();
@@ -28,7 +28,7 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// `count` numbers; in binary they begin after the end of the line.
+    /// Reads `count` numbers; in binary files they start after the end of the line.
     pub(super) fn values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
         if self.binary {
             self.tokens.line();
@@ -44,14 +44,14 @@ impl<'a> Reader<'a> {
         for _ in 0..count {
             let (token, at) = self.tokens.word(what)?;
             let value = if float { parse_float(token).map(T::from_f64) } else { parse_integer(token).map(T::from_i64) };
-            // Some writers announce a whole-number type and then write fractions.
+            // Some writers announce an integer type and then write fractions.
             let value = value.or_else(|| if T::EXACT { None } else { parse_float(token).map(T::from_f64) });
             values.push(value.ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))?);
         }
         Ok(values)
     }
 
-    /// `count` whole numbers.
+    /// Reads `count` integers.
     pub(super) fn integers(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Integers<'a>> {
         let Some(scalar) = scalar.filter(|_| self.binary) else { return self.values(scalar, count, what).map(Integers::parsed) };
         self.tokens.line();
@@ -59,7 +59,7 @@ impl<'a> Reader<'a> {
         Ok(Integers::stored(Stored::new(self.source, what.to_owned(), Content::File(range), None), scalar, true))
     }
 
-    /// Where the bytes of `count` binary numbers are.
+    /// The range of the bytes of `count` binary numbers, which is consumed.
     fn range(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Range<usize>> {
         let at = self.tokens.at;
         let size = scalar.map_or(Some(count.div_ceil(8)), |s| count.checked_mul(s.size()));
@@ -79,14 +79,14 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// A number of values that may come or not; bounded where they do.
+    /// Reads a number of values that may or may not follow; if they do, their number is checked then.
     pub(super) fn size(&mut self, what: &str) -> Result<usize> {
         let (token, at) = self.tokens.word(what)?;
         let n = parse_integer(token).and_then(|n| u32::try_from(n).ok());
         n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("`{}` as {what}", printable(token))))
     }
 
-    /// Skips a block of meta data, which an empty line ends.
+    /// Skips a block of metadata, which ends with an empty line.
     pub(super) fn metadata(&mut self) {
         self.tokens.line();
         while self.tokens.line().is_some_and(|(line, _)| !line.trim_ascii().is_empty()) {}

@@ -1,4 +1,4 @@
-//! VTK XML unstructured grids (`.vtu`), version 0.1 to 2.x: the XML skeleton. The arrays themselves: `vtu_data`.
+//! Reader for VTK XML unstructured grids (`.vtu`), versions 0.1 to 2.x: the XML structure. `vtu_data` reads the arrays.
 
 use std::borrow::Cow;
 use std::collections::HashMap;
@@ -25,14 +25,14 @@ struct Piece {
     at: usize,
     points: u64,
     cells: u64,
-    /// Arrays by the element that holds them.
+    /// Arrays, by the element that contains them.
     point_data: Vec<StoredArray>,
     cell_data: Vec<StoredArray>,
     positions: Option<StoredArray>,
     topology: Vec<StoredArray>,
 }
 
-/// What the elements outside the arrays say.
+/// The content of the XML elements, without the values of arrays.
 struct Skeleton {
     codec: Codec,
     pieces: Vec<Piece>,
@@ -60,8 +60,8 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     Ok(assembly)
 }
 
-/// The part of the file that is XML: up to the appended data. Bytes that are no UTF-8 become question marks, so that a name in
-/// another encoding does no harm.
+/// The part of the file that is XML, that is up to the appended data. If it is not UTF-8, non-ASCII bytes become
+/// question marks, so that a name in another encoding does no harm.
 fn head(source: &Source) -> Cow<'_, str> {
     const APPENDED: &[u8] = b"<AppendedData";
     let bytes = &source.bytes;
@@ -153,7 +153,8 @@ impl Parser<'_, '_> {
 
     fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {
         let mut found = Vec::new();
-        // Without the check for duplicates, which is quadratic; 64 attributes are more than any element of this format has.
+        // The check for duplicates is quadratic, so it is disabled; no element of this format has more than 64
+        // attributes.
         for attribute in element.attributes().with_checks(false).take(64) {
             let attribute = attribute.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
             let value = quick_xml::escape::unescape(&attribute.value);
@@ -238,7 +239,7 @@ impl Parser<'_, '_> {
         Ok(StoredArray { name, scalar, components, place, at })
     }
 
-    /// Text belongs to the array whose element is innermost.
+    /// Assigns text to the array whose element is innermost.
     fn text(&mut self, range: Range<usize>) {
         let [.., group, last] = self.stack.as_slice() else { return };
         if last != "DataArray" {
@@ -262,10 +263,11 @@ fn get<'s>(attributes: &'s [(String, String)], name: &str) -> Option<&'s str> {
     attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
 }
 
-/// What an array of a piece has in common with the arrays of other pieces that it continues, or that continue it.
+/// Identifies an array across pieces: arrays of different pieces with the same key continue each other.
 type Key<'p> = (On, &'p str, u64);
 
-/// Where in the assembly each array is; of several alike in a piece, each continues that of its own turn.
+/// Position of each array in the assembly. If a piece has several arrays with the same key, the n-th of them continues
+/// the n-th of the other pieces.
 type Places<'p> = HashMap<(Key<'p>, usize), usize>;
 
 fn read_piece<'p>(
@@ -301,7 +303,7 @@ fn read_piece<'p>(
                 assembly.warnings.push(message);
             } else {
                 let values: Vec<f32> = codec.floats(source, array, count)?;
-                // An empty piece is no reason to fill an array up.
+                // An empty piece does not require that an array is filled up.
                 if values.is_empty() {
                     continue;
                 }
@@ -312,7 +314,7 @@ fn read_piece<'p>(
                     assembly.arrays.push(Array { name: array.name.clone(), on, components, values: Vec::new() });
                     assembly.arrays.len() - 1
                 });
-                // One that the budget does not allow to be filled up stays too short, and is left out in the end.
+                // An array that the budget does not allow to be filled up stays too short, and is left out at the end.
                 let array = &mut assembly.arrays[place];
                 if array.fill(before, &mut assembly.padding).is_ok() {
                     array.values.extend_from_slice(&values);

@@ -1,7 +1,7 @@
-//! Arrays of VTK XML files: text, base64 and raw bytes, compressed or not.
+//! Reader for the arrays of VTK XML files: text, base64 and raw bytes, compressed or not.
 //!
-//! Every size is checked against the bytes that are there, and against what the number of points and cells asks for, before
-//! anything of that size is allocated.
+//! Every size is checked against the bytes that are present, and against what the number of points and cells requires,
+//! before memory of that size is allocated.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -17,24 +17,24 @@ use super::stored::{Blocks, Content, Stored};
 use super::unpack::Compressor;
 use crate::error::{Error, Result};
 
-/// An array as the XML describes it.
+/// An array as described by the XML.
 pub(crate) struct StoredArray {
     pub name: String,
     /// `None`: text or bits.
     pub scalar: Option<Scalar>,
     pub components: u64,
     pub place: Place,
-    /// Where its element begins.
+    /// Position of its XML element.
     pub at: usize,
 }
 
-/// Where the values are.
+/// Where the values of an array are.
 pub(crate) enum Place {
-    /// Numbers in these ranges of the file.
+    /// As text, in these ranges of the file.
     Ascii(Vec<Range<usize>>),
-    /// Base64 in these ranges of the file.
+    /// As base64, in these ranges of the file.
     Inline(Vec<Range<usize>>),
-    /// At this offset of the appended data.
+    /// In the appended data, at this offset.
     Appended(u64),
 }
 
@@ -47,11 +47,11 @@ pub(crate) struct Appended {
 /// How a file stores binary arrays.
 pub(crate) struct Codec {
     big_endian: bool,
-    /// Bytes of a number in the headers of arrays: 4 or 8.
+    /// Size in bytes of a number in the headers of arrays: 4 or 8.
     word: usize,
     compressor: Option<Compressor>,
     pub appended: Option<Appended>,
-    /// For what is unpacked.
+    /// Limit for decompressed data.
     pub budget: Budget,
 }
 
@@ -62,7 +62,7 @@ enum Stream<'a> {
 }
 
 impl Codec {
-    /// From the attributes of the root element.
+    /// Makes a codec from the attributes of the root element.
     pub fn new<'s>(get: impl Fn(&str) -> Option<&'s str>) -> Result<Self, String> {
         let quote = |s: &str| printable(s.as_bytes());
         let big_endian = match get("byte_order") {
@@ -85,20 +85,20 @@ impl Codec {
         Ok(Self { big_endian, word, compressor, appended: None, budget: Budget::default() })
     }
 
-    /// Byte order and compressor in words.
+    /// Byte order and compressor, as text for the report.
     pub fn describe(&self) -> String {
         let order = if self.big_endian { ", big-endian" } else { "" };
         self.compressor.map_or(order.to_owned(), |c| format!("{order}, {}", c.name()))
     }
 
-    /// All values of an array of `tuples` tuples.
+    /// Reads all values of an array of `tuples` tuples.
     pub fn floats<T: Number + Send>(&mut self, source: &Source, array: &StoredArray, tuples: u64) -> Result<Vec<T>> {
         let count = tuples.checked_mul(array.components).filter(|&n| n < 1 << 60);
         let count = count.ok_or_else(|| place(source, array, &format!("{tuples} × {} values", array.components)))?;
         self.values(source, array, Some(count))
     }
 
-    /// All values of an array of indices; `count` of them if it is given.
+    /// Reads all values of an array of indices; there must be `count` of them if it is given.
     pub fn integers<'a>(&mut self, source: &'a Source, array: &StoredArray, count: Option<u64>) -> Result<Integers<'a>> {
         let scalar = array.scalar.filter(|s| !s.is_float()).ok_or_else(|| place(source, array, "its type must be an integer type"))?;
         if array.components != 1 {
@@ -118,7 +118,7 @@ impl Codec {
         self.stored(source, array, scalar, count)?.convert(scalar, self.big_endian)
     }
 
-    /// The bytes of an array that is no text.
+    /// The bytes of an array that is not stored as text.
     fn stored<'a>(&mut self, source: &'a Source, array: &StoredArray, scalar: Scalar, count: Option<u64>) -> Result<Stored<'a>> {
         let what = name(source, array);
         if count == Some(0) {
@@ -147,7 +147,7 @@ impl Codec {
         }
     }
 
-    /// A number of an array's header.
+    /// Number `i` of an array's header.
     fn header(&self, bytes: &[u8], i: usize) -> u64 {
         let word = bytes.get(i * self.word..(i + 1) * self.word).unwrap_or_default();
         let mut wide = [0; 8];
@@ -167,7 +167,7 @@ impl Codec {
         stream.content(self.word, all)
     }
 
-    /// Where the compressed blocks are, and what they are like.
+    /// Locates the compressed blocks of an array, and determines their sizes.
     fn packed(
         &mut self,
         stream: &Stream<'_>,
@@ -205,12 +205,12 @@ impl Codec {
     }
 }
 
-/// An array for messages.
+/// Describes an array for messages.
 fn name(source: &Source, array: &StoredArray) -> String {
     format!("array `{}` (line {})", printable(array.name.as_bytes()), source.line(array.at))
 }
 
-/// An error about an array.
+/// Makes an error about an array.
 fn place(source: &Source, array: &StoredArray, message: &str) -> Error {
     source.error_in(name(source, array), message)
 }
@@ -256,7 +256,7 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
 }
 
 impl<'a> Stream<'a> {
-    /// `n` as a size, if there are so many bytes.
+    /// Converts `n` to a size, if that many bytes are left.
     fn within(&self, n: u64) -> Result<usize, String> {
         let room = match self {
             Stream::Raw(_, range) => range.len(),
@@ -275,7 +275,7 @@ impl<'a> Stream<'a> {
         }
     }
 
-    /// What lies behind a header, up to byte `n`.
+    /// The bytes that follow a header of `header` bytes, up to byte `n`.
     fn content(&self, header: usize, n: u64) -> Result<Content, String> {
         let n = self.within(n)?;
         Ok(match self {
@@ -289,7 +289,8 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// Decodes the first `n` bytes. The header and the data of an array may be encoded one by one, with padding between them.
+/// Decodes the first `n` bytes. The header and the data of an array may be encoded separately, with padding between
+/// them.
 fn decode_base64(parts: &[&[u8]], n: usize) -> Result<Vec<u8>, String> {
     const CONFIG: GeneralPurposeConfig =
         GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true);

@@ -1,5 +1,5 @@
-//! Acceleration structures over triangles, where the device traces rays: built on the device, compacted, and put as its one instance into a scene
-//! that shaders trace rays in.
+//! Acceleration structures over triangles, for devices that support ray tracing: built on the device, compacted, and
+//! made the only instance of a scene that shaders trace rays in.
 
 use super::buffer_ref::BufferRef;
 use super::context::Gpu;
@@ -15,18 +15,18 @@ use gpu_allocator::MemoryLocation;
 /// Bytes from one vertex to the next.
 const VERTEX_STRIDE: u64 = 16;
 
-/// Triangles in device memory, visible to everything.
+/// Triangles in device memory, visible to all commands.
 #[derive(Clone, Copy, Debug)]
-pub struct Triangles {
+pub(crate) struct Triangles {
     /// Three 32-bit floats per vertex, 16 bytes apart.
     pub vertices: BufferRef,
     /// Number of vertices.
     pub points: u32,
-    /// Three vertices per triangle.
+    /// Three vertex indices per triangle.
     pub indices: BufferRef,
     /// Number of triangles.
     pub count: u32,
-    /// Factor from the coordinates to those of the rays.
+    /// Factor from these coordinates to those of the rays.
     pub scale: f32,
 }
 
@@ -44,7 +44,7 @@ impl Structure {
         let usage = vk::BufferUsageFlags::ACCELERATION_STRUCTURE_STORAGE_KHR;
         let memory = Buffer::with_usage(gpu, name, bytes, MemoryLocation::GpuOnly, usage)?;
         let info = vk::AccelerationStructureCreateInfoKHR::default().buffer(memory.all().buffer).size(bytes).ty(ty);
-        // SAFETY: the buffer has the usage and size asked for, and lives as long as the structure.
+        // SAFETY: the buffer has the required usage and size, and lives as long as the structure.
         let (handle, address) = unsafe {
             let handle = functions.create_acceleration_structure(&info, None).map_err(failed("vkCreateAccelerationStructureKHR"))?;
             let info = vk::AccelerationStructureDeviceAddressInfoKHR::default().acceleration_structure(handle);
@@ -58,7 +58,7 @@ impl Structure {
 impl Drop for Structure {
     fn drop(&mut self) {
         if let Some(extension) = self.gpu.acceleration() {
-            // SAFETY: work with the structure has ended: submissions of the convenient layer are waited for.
+            // SAFETY: work with the structure has ended, since owning calls wait for their submissions.
             unsafe { extension.functions.destroy_acceleration_structure(self.handle, None) };
         }
     }
@@ -70,14 +70,14 @@ fn extension(gpu: &Gpu) -> Result<&Acceleration> {
 
 const BUILDS: vk::PipelineStageFlags = vk::PipelineStageFlags::ACCELERATION_STRUCTURE_BUILD_KHR;
 
-/// What was written in shaders and transfers becomes visible to builds.
+/// Makes writes of compute shaders and transfers visible to builds.
 fn barrier_before(r: &mut Recorder<'_>) {
     let source = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
     let written = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
     r.barrier_between("acceleration.input → acceleration.build", (source, written), (BUILDS, vk::AccessFlags::SHADER_READ));
 }
 
-/// A structure that was written becomes visible to copies, builds and rays.
+/// Makes a written structure visible to copies, builds and rays.
 fn barrier_after(r: &mut Recorder<'_>) {
     let written = vk::AccessFlags::ACCELERATION_STRUCTURE_WRITE_KHR;
     let ways = r.gpu().report().requirements.ray_tracing;
@@ -92,7 +92,7 @@ fn barrier_after(r: &mut Recorder<'_>) {
     r.barrier_between("acceleration.build → acceleration.use", (BUILDS, written), target);
 }
 
-/// Builds one structure over `count` primitives of a geometry; also the bytes of scratch memory, and the time.
+/// Builds one structure over `count` primitives of a geometry. Also returns the bytes of scratch memory, and the times.
 fn build(
     gpu: &Gpu,
     names: [&str; 2],
@@ -107,7 +107,7 @@ fn build(
     info.mode = vk::BuildAccelerationStructureModeKHR::BUILD;
     let mut sizes = vk::AccelerationStructureBuildSizesInfoKHR::default();
     let kind = vk::AccelerationStructureBuildTypeKHR::DEVICE;
-    // SAFETY: sizes depend on counts and formats only, no address is read.
+    // SAFETY: sizes depend on counts and formats only; no address is read.
     unsafe { functions.get_acceleration_structure_build_sizes(kind, &info, &[count], &mut sizes) };
     let structure = Structure::new(gpu, names[0], ty, sizes.acceleration_structure_size)?;
     let scratch = gpu.buffer("olbvh.acceleration.scratch", sizes.build_scratch_size + scratch_alignment)?;
@@ -117,7 +117,8 @@ fn build(
     let ((), time) = gpu.submit("olbvh.acceleration.build", |r| {
         barrier_before(r);
         r.stage(names[1], |r| {
-            // SAFETY: structure and scratch memory have the sizes that the device named; inputs are visible through the barrier.
+            // SAFETY: structure and scratch memory have the sizes that the device reported; the barrier makes the
+            // inputs visible.
             unsafe { functions.cmd_build_acceleration_structures(r.commands, &[info], &[&range]) };
             Ok(())
         })?;
@@ -127,7 +128,7 @@ fn build(
     Ok((structure, scratch.size(), time.stages))
 }
 
-/// A copy that is as small as it can be; also the time.
+/// Makes a compacted copy. Also returns the times.
 fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime>)> {
     let functions = &extension(gpu)?.functions;
     let kind = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
@@ -135,7 +136,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     // SAFETY: plain creation; destroyed below on every path.
     let queries = unsafe { gpu.device().create_query_pool(&info, None) }.map_err(failed("vkCreateQueryPool"))?;
     let asked = gpu.submit("olbvh.acceleration.size", |r| {
-        // SAFETY: the structure was built by a submission that has ended, behind a barrier.
+        // SAFETY: the structure was built by a submission that has ended, after a barrier.
         unsafe {
             gpu.device().cmd_reset_query_pool(r.commands, queries, 0, 1);
             functions.cmd_write_acceleration_structures_properties(r.commands, &[structure.handle], kind, queries, 0);
@@ -157,7 +158,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     let ((), time) = gpu.submit("olbvh.acceleration.compact", |r| {
         r.stage("acceleration.compact", |r| {
             let info = vk::CopyAccelerationStructureInfoKHR::default().src(structure.handle).dst(smaller.handle);
-            // SAFETY: the copy has the size that the device named.
+            // SAFETY: the copy has the size that the device reported.
             unsafe {
                 functions.cmd_copy_acceleration_structure(r.commands, &info.mode(vk::CopyAccelerationStructureModeKHR::COMPACT));
             }
@@ -169,7 +170,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     Ok((smaller, time.stages))
 }
 
-/// A scene of triangles that `GL_EXT_ray_query` and `GL_EXT_ray_tracing` trace rays in.
+/// A scene of triangles in which `GL_EXT_ray_query` and `GL_EXT_ray_tracing` trace rays.
 pub struct AccelerationStructure {
     scene: Structure,
     triangles: Structure,
@@ -180,11 +181,13 @@ pub struct AccelerationStructure {
 }
 
 impl AccelerationStructure {
-    /// Builds the structure, compacts it, and makes the scene. Triangle i of the input is primitive i of the scene, opaque.
+    /// Builds the structure, compacts it, and makes the scene. Triangle i of the input is primitive i of the scene. All
+    /// are opaque.
     ///
     /// # Errors
-    /// [`Error::Invalid`] where the device traces no rays, [`Error::TooLarge`], [`Error::Memory`], or a failed Vulkan call.
-    pub fn build(gpu: &Gpu, input: &Triangles) -> Result<Self> {
+    /// [`Error::Invalid`] if the device does not support ray tracing, [`Error::TooLarge`], [`Error::Memory`], or a
+    /// failed Vulkan call.
+    pub(crate) fn build(gpu: &Gpu, input: &Triangles) -> Result<Self> {
         let most = extension(gpu)?.most_triangles;
         if u64::from(input.count) > most {
             return Err(Error::TooLarge(format!("{} triangles; the device's acceleration structures hold {most}", input.count)));
@@ -209,7 +212,7 @@ impl AccelerationStructure {
         let (built, scratch_bytes, mut stages) = build(gpu, names, bottom, geometry, input.count)?;
         let (triangles, time) = compact(gpu, &built)?;
         stages.extend(time);
-        // VkAccelerationStructureInstanceKHR: transform, mask and index, flags and offset, reference.
+        // The words of a VkAccelerationStructureInstanceKHR: transform, mask and index, flags and offset, reference.
         let mut words: Vec<u32> = scaled(1.0).map(f32::to_bits).to_vec();
         words.extend([0xff00_0000, 0, triangles.address as u32, (triangles.address >> 32) as u32]);
         let instance = gpu.upload("olbvh.acceleration.instance", &words)?;
@@ -223,7 +226,8 @@ impl AccelerationStructure {
         Ok(Self { scene, triangles, built_bytes: built.memory.size(), scratch_bytes, stages, _instance: instance })
     }
 
-    /// Device address of the scene, low word first: `accelerationStructureEXT(uvec2)` in shaders. Visible to shaders that trace rays.
+    /// Device address of the scene, low word first, for `accelerationStructureEXT(uvec2)` in shaders. The scene is
+    /// visible to shaders that trace rays.
     pub fn address(&self) -> [u32; 2] {
         [self.scene.address as u32, (self.scene.address >> 32) as u32]
     }

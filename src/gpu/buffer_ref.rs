@@ -2,7 +2,8 @@
 
 use ash::vk;
 
-/// Usage of every buffer that kernels touch, whatever the device; the host's need what [`super::Gpu::usage`] says.
+/// Usage flags of every buffer that kernels access, on any device. A host's buffers need those of
+/// [`super::Gpu::usage`].
 pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
     vk::BufferUsageFlags::STORAGE_BUFFER.as_raw()
         | vk::BufferUsageFlags::TRANSFER_SRC.as_raw()
@@ -10,8 +11,8 @@ pub const USAGE: vk::BufferUsageFlags = vk::BufferUsageFlags::from_raw(
         | vk::BufferUsageFlags::INDIRECT_BUFFER.as_raw(),
 );
 
-/// A part of a buffer, ours or the host's: what kernels get as an argument. It does not keep the buffer: that must live until commands that were recorded
-/// with it have been executed.
+/// A part of a buffer of this crate or of the host, as an argument of kernels. It does not keep the buffer alive: the
+/// buffer must live until commands recorded with it have been executed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BufferRef {
     pub(crate) buffer: vk::Buffer,
@@ -21,11 +22,12 @@ pub struct BufferRef {
 }
 
 impl BufferRef {
-    /// A part of a buffer of the host's, `size` bytes from `offset` on. `address`: device address of the first byte, 0 where the device has no buffer addresses.
+    /// A part of the host's buffer: `size` bytes, starting at `offset`. `address` is the device address of the first
+    /// byte, or 0 if the device has no buffer addresses.
     ///
     /// # Safety
-    /// The buffer belongs to the device that the part is used on, has the usage of [`super::Gpu::usage`], and so many bytes, at
-    /// that address.
+    /// The buffer belongs to the device that the part is used on, has the usage flags of [`super::Gpu::usage`], and has
+    /// this many bytes at that offset and address.
     pub unsafe fn from_raw(buffer: vk::Buffer, offset: u64, size: u64, address: u64) -> Self {
         Self { buffer, offset, size, address }
     }
@@ -35,22 +37,22 @@ impl BufferRef {
         self.buffer
     }
 
-    /// Bytes from the buffer's start.
+    /// Offset of the part in the buffer, in bytes.
     pub fn offset(self) -> u64 {
         self.offset
     }
 
-    /// Bytes.
+    /// Size in bytes.
     pub fn size(self) -> u64 {
         self.size
     }
 
-    /// Device address of the first byte; 0 where the device has no buffer addresses.
+    /// Device address of the first byte; 0 if the device has no buffer addresses.
     pub fn address(self) -> u64 {
         self.address
     }
 
-    /// The part from `offset`, `size` bytes long, both within this part; what is not is cut off.
+    /// The part that starts at `offset` and is `size` bytes long, both within this part; anything beyond is cut off.
     #[must_use]
     pub fn part(self, offset: u64, size: u64) -> Self {
         debug_assert!(offset + size <= self.size, "part {offset}+{size} of {}", self.size);

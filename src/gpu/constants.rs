@@ -1,4 +1,4 @@
-//! What kernels are given where there is no buffer to give them.
+//! Buffers that kernels receive where there is nothing else to bind.
 
 use super::buffer_ref::{BufferRef, USAGE};
 use super::foundation::Foundation;
@@ -6,8 +6,8 @@ use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// A small buffer that is made before everything else and outlives every recording, in memory of its own: a word of ones, the device count of whoever
-/// knows the count on the host, and room to name where a kernel's optional array is not there.
+/// A small buffer in its own memory, created first and destroyed last. It holds a word of value `u32::MAX`, used as the
+/// device count where the host knows the count, and a part to bind in place of a kernel's optional array.
 #[derive(Default)]
 pub(super) struct Constants {
     buffer: vk::Buffer,
@@ -15,11 +15,11 @@ pub(super) struct Constants {
     address: u64,
 }
 
-/// Its bytes.
+/// Size of the buffer in bytes.
 const BYTES: u64 = 512;
 
 impl Constants {
-    /// Makes the constants; what there is of them when something fails goes with the rest.
+    /// Creates the buffer. If that fails, `destroy` frees the parts already made.
     pub fn make(&mut self, foundation: &Foundation, names: Option<&ash::ext::debug_utils::Device>) -> Result<()> {
         let Foundation { instance, physical, device, report, .. } = foundation;
         let addresses = report.requirements.buffer_addresses;
@@ -40,7 +40,8 @@ impl Constants {
                 (0..memory.memory_type_count)
                     .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted))
             };
-            // Every invocation reads the word: beside the device, if there is room, and not across a bus.
+            // Every invocation reads the word, so it should lie in device memory, if there is room, and not across a
+            // bus.
             let mut allocated = Err(Error::NoDevice("no host-visible memory for buffers".into()));
             for kind in [wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL, wanted].into_iter().filter_map(find) {
                 let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
@@ -62,24 +63,25 @@ impl Constants {
         Ok(())
     }
 
-    /// Destroys what there is of them.
+    /// Destroys the handles that exist.
     ///
     /// # Safety
-    /// They are of this device, and nothing uses them any more.
+    /// The handles belong to this device, and nothing uses them any more.
     pub unsafe fn destroy(&self, device: &ash::Device) {
-        // SAFETY: as the caller vouches; null handles are passed over.
+        // SAFETY: the caller guarantees that the handles belong to this device and are unused; null handles are
+        // ignored.
         unsafe {
             device.destroy_buffer(self.buffer, None);
             device.free_memory(self.memory, None);
         }
     }
 
-    /// A buffer whose first word is all ones.
+    /// A buffer whose first word is `u32::MAX`.
     pub fn unbounded(&self) -> BufferRef {
         self.all().part(0, 16)
     }
 
-    /// A buffer to name where a kernel's optional array is not there.
+    /// A buffer to bind in place of an optional array that is absent.
     pub fn nothing(&self) -> BufferRef {
         self.all().part(256, 16)
     }

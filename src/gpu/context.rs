@@ -1,4 +1,5 @@
-//! A device in use: its queue, allocator and pipelines. `open.rs` makes one of our own, `host.rs` takes one of the host's.
+//! A device in use: its queue, allocator and pipelines. `open.rs` opens a device owned by this crate, `host.rs` takes
+//! one of the host.
 
 use super::buffer_ref::BufferRef;
 use super::constants::Constants;
@@ -6,6 +7,7 @@ use super::foundation::Foundation;
 use super::ledger::Ledger;
 use super::pipelines::Pipelines;
 use super::pool::Pool;
+use super::queue::HostQueue;
 use super::ray_functions::Acceleration;
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
@@ -13,36 +15,38 @@ use crate::kernels::{ALL, Row, Target};
 use ash::vk;
 use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex, MutexGuard};
+use std::sync::{Arc, Mutex};
 
-/// How kernels get their buffers.
+/// How kernels receive their buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Binding {
     /// By address in the push constants.
     Address,
-    /// By storage-buffer descriptors: for devices without buffer addresses, and for synchronization validation, which follows descriptors only.
+    /// By storage-buffer descriptors: for devices without buffer addresses, and for synchronization validation, which
+    /// tracks descriptors only.
     Descriptors,
 }
 
-/// What to open.
+/// How to open a device.
 #[derive(Clone, Debug, Default)]
 pub struct GpuOptions {
-    /// Part of a device's name, or its index in the list of [`super::list_devices`]; `None`: the best that qualifies.
+    /// Part of a device's name, or its index in the list of [`super::list_devices`]; `None`: the best device that meets
+    /// the requirements.
     pub device: Option<String>,
-    /// How kernels get their buffers; `None`: by address where the device can.
+    /// How kernels receive their buffers; `None`: by address where the device supports it.
     pub binding: Option<Binding>,
-    /// Shapes of the kernels; `None`: by the kind of device, see [`Row`].
+    /// Tuning parameters of the kernels; `None`: those of the kind of device, see [`Row`].
     pub target: Option<Target>,
     /// File of the pipeline cache; `None`: no cache on disk.
     pub pipeline_cache: Option<PathBuf>,
-    /// Leave the start-up self-test out.
+    /// Skip the start-up self-test.
     pub trust: bool,
 }
 
 /// An opened device. Cheap to clone; everything made from it keeps it alive.
 #[derive(Clone)]
 pub struct Gpu {
-    // Before the device, so that what it keeps is gone first.
+    // Declared before `inner`, so that the kept memory is freed before the device is destroyed.
     pool: Option<Arc<Pool>>,
     inner: Arc<Inner>,
     target: Arc<Target>,
@@ -51,7 +55,7 @@ pub struct Gpu {
 
 struct Inner {
     foundation: Foundation,
-    // Held in an option so that it is gone before the device.
+    // An option, so that it can be dropped before the device.
     allocator: Option<Arc<Mutex<Allocator>>>,
     pipelines: Pipelines,
     binding: Binding,
@@ -61,7 +65,7 @@ struct Inner {
     constants: Constants,
 }
 
-/// An allocator of our own.
+/// Makes an allocator owned by this crate.
 fn make_allocator(foundation: &Foundation) -> Result<Arc<Mutex<Allocator>>> {
     let made = Allocator::new(&AllocatorCreateDesc {
         instance: foundation.instance.clone(),
@@ -77,7 +81,8 @@ fn make_allocator(foundation: &Foundation) -> Result<Arc<Mutex<Allocator>>> {
 }
 
 impl Gpu {
-    /// Makes what is missing of allocator and pipeline cache, and tests that the device can be trusted, if there is a queue to do it on.
+    /// Makes an allocator and a pipeline cache if the host provides none, and runs the self-test if there is a queue
+    /// for it.
     pub(super) fn on(foundation: Foundation, options: &GpuOptions) -> Result<Self> {
         let Foundation { instance, physical, device, report, .. } = &foundation;
         let requirements = &report.requirements;
@@ -99,7 +104,8 @@ impl Gpu {
         if requirements.sizes_vary() && !requirements.subgroup_size_control {
             let [least, usual, most] = requirements.subgroup_sizes;
             let name = &report.name;
-            // These run a kernel in as many lanes as suits it, and say all the same that there are as many as usual.
+            // Intel's drivers run a kernel with a subgroup size of their choice, and still report the usual size to the
+            // shader.
             if report.vendor == INTEL {
                 let text =
                     format!("{name}: subgroups of {least} to {most}; `subgroupSizeControl` and `computeFullSubgroups` must be enabled");
@@ -132,30 +138,31 @@ impl Gpu {
         Ok(gpu)
     }
 
-    /// What the device is.
+    /// Properties of the device.
     pub fn report(&self) -> &DeviceReport {
         &self.inner.foundation.report
     }
 
-    /// How kernels get their buffers.
+    /// How kernels receive their buffers.
     pub fn binding(&self) -> Binding {
         self.inner.binding
     }
 
-    /// Usage of every buffer that a host hands to kernels: [`super::USAGE`], and the flag for addresses where buffers go by them.
+    /// The usage flags that every buffer must have that a host passes to kernels: [`super::USAGE`], and the one for
+    /// device addresses where buffers are passed by address.
     pub fn usage(&self) -> vk::BufferUsageFlags {
         let addresses =
             if self.binding() == Binding::Address { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
         super::USAGE | addresses
     }
 
-    /// Shapes of the kernels.
+    /// Tuning parameters of the kernels.
     pub fn target(&self) -> &Target {
         &self.target
     }
 
-    /// The same device with other shapes of the kernels. What is made from either can be used with both, but scratch memory is carved and used
-    /// with the same shapes.
+    /// The same device with other tuning parameters of the kernels. Objects made from either handle can be used with
+    /// both, but scratch memory must be carved and used with the same parameters.
     ///
     /// # Errors
     /// [`Error::Invalid`] if they do not fit the device.
@@ -164,39 +171,41 @@ impl Gpu {
         Ok(Self { target: Arc::new(target), ..self.clone() })
     }
 
-    /// Whether both are handles of one opened device.
+    /// Whether both are handles of the same opened device.
     pub fn is_same_device(&self, other: &Self) -> bool {
         Arc::ptr_eq(&self.inner, &other.inner)
     }
 
-    /// The same device, where all buffers made from this handle and its clones take at most `bytes` together, transfers included: the next one is refused
-    /// with [`Error::Memory`]. The allocator takes memory from the driver in blocks of 16 MiB, or as large as a larger buffer. Nothing is kept
-    /// ([`Gpu::with_pool`]).
+    /// The same device with a memory limit: all buffers made from this handle and its clones, transfer buffers
+    /// included, may take at most `bytes` together; a buffer beyond that is refused with [`Error::Memory`]. The
+    /// allocator takes memory from the driver in blocks of 16 MiB, or of the buffer's size if that is larger. Memory of
+    /// dropped buffers is not kept ([`Gpu::with_pool`]).
     #[must_use]
     pub fn with_memory(&self, bytes: u64) -> Self {
         Self { ledger: Some(Arc::new(Ledger::new(bytes))), pool: None, ..self.clone() }
     }
 
-    /// The same device, where memory of large buffers made from this handle and its clones, up to `bytes` together, is kept when they are dropped, for
-    /// others of nearly the same size, until this handle, its clones and what was made from them are gone, or the device is full. For what is done again and
-    /// again: drivers clear fresh memory, which may take as long as the work on it.
+    /// The same device with a memory pool: when large buffers made from this handle and its clones are dropped, up to
+    /// `bytes` of their memory is kept for buffers of nearly the same size. It is freed when this handle, its clones
+    /// and everything made from them are gone, or when the device is full. Use it for repeated work: drivers clear
+    /// fresh memory, which may take as long as the work on it.
     #[must_use]
     pub fn with_pool(&self, bytes: u64) -> Self {
         let pool = Pool::new(self.device().clone(), self.allocator().clone(), bytes);
         Self { pool: Some(Arc::new(pool)), ledger: None, ..self.clone() }
     }
 
-    /// What [`Gpu::with_memory`] was told; all there are without a limit.
+    /// The limit set with [`Gpu::with_memory`]; `u64::MAX` without one.
     pub fn memory_limit(&self) -> u64 {
         self.ledger().map_or(u64::MAX, Ledger::limit)
     }
 
-    /// Bytes that buffers made from this handle may still take; all there are without a limit.
+    /// Bytes that buffers made from this handle may still take; `u64::MAX` without a limit.
     pub fn memory_left(&self) -> u64 {
         self.ledger().map_or(u64::MAX, Ledger::left)
     }
 
-    /// The most bytes that buffers made from this handle took at once; 0 without a limit.
+    /// The most bytes that buffers made from this handle took simultaneously; 0 without a limit.
     pub fn memory_peak(&self) -> u64 {
         self.ledger().map_or(0, Ledger::peak)
     }
@@ -209,7 +218,7 @@ impl Gpu {
         self.pool.as_deref()
     }
 
-    /// Tests that the device can be trusted with these shapes of the kernels, as opening it does.
+    /// Runs the self-test with these tuning parameters, as opening a device does.
     ///
     /// # Errors
     /// [`Error::SelfTest`].
@@ -217,14 +226,22 @@ impl Gpu {
         crate::primitives::self_test(self)
     }
 
-    /// Limits of the device.
+    /// The device's Vulkan limits.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.inner.limits
     }
 
     /// The device's memory allocator.
-    pub fn allocator(&self) -> &Arc<Mutex<Allocator>> {
+    pub(crate) fn allocator(&self) -> &Arc<Mutex<Allocator>> {
         self.inner.allocator.as_ref().unwrap_or_else(|| unreachable!("the allocator is taken in drop only"))
+    }
+
+    /// A report of the memory that the device's allocator holds, be it the host's or this crate's.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a panic has left its lock poisoned.
+    pub fn allocated(&self) -> Result<gpu_allocator::AllocatorReport> {
+        Ok(self.allocator().lock().map_err(|_| Error::Invalid("the allocator's lock is poisoned".into()))?.generate_report())
     }
 
     /// The logical device.
@@ -248,7 +265,8 @@ impl Gpu {
             .unwrap_or_default()
     }
 
-    /// Whether kernels read records of four words as two of 64 bits: processors, which fetch every component by itself.
+    /// Whether kernels read records of four words as two 64-bit words. This helps on processors, which load every
+    /// component separately.
     pub(super) fn reads_wide(&self) -> bool {
         self.report().requirements.shader_int64 && Row::of(self.report()) == Row::Cpu
     }
@@ -262,7 +280,7 @@ impl Gpu {
         self.inner.foundation.report.requirements.buffer_addresses
     }
 
-    /// Functions for acceleration structures and rays, where the device traces rays.
+    /// Functions for acceleration structures and rays, if the device supports ray tracing.
     pub(super) fn acceleration(&self) -> Option<&Acceleration> {
         self.inner.acceleration.as_ref()
     }
@@ -284,23 +302,20 @@ impl Gpu {
         self.inner.foundation.family
     }
 
+    pub(super) fn host_queue(&self) -> Option<&dyn HostQueue> {
+        self.inner.foundation.queue.as_deref()
+    }
+
     pub(crate) fn timestamp_bits(&self) -> u32 {
         self.inner.foundation.report.requirements.queue_family.map_or(0, |(_, bits)| bits)
     }
 
-    pub(crate) fn queue(&self) -> Result<MutexGuard<'_, vk::Queue>> {
-        let Some(queue) = &self.inner.foundation.queue else {
-            return Err(Error::Invalid("the host lent no queue: only the cmd_* functions can be used".into()));
-        };
-        queue.lock().map_err(|_| Error::Invalid("the queue's lock is poisoned by an earlier panic".into()))
-    }
-
-    /// A buffer whose first word is all ones.
+    /// A buffer whose first word is `u32::MAX`.
     pub(crate) fn unbounded(&self) -> BufferRef {
         self.inner.constants.unbounded()
     }
 
-    /// A buffer to name where a kernel's optional array is not there.
+    /// A buffer to bind in place of an optional array that is absent.
     pub(crate) fn nothing(&self) -> BufferRef {
         self.inner.constants.nothing()
     }
@@ -312,8 +327,9 @@ impl Drop for Inner {
         if pipeline_cache.is_none() {
             self.pipelines.save(device);
         }
-        // SAFETY: whoever uses the device holds an `Arc` of it, and a host has waited for what it recorded (see `from_raw`), so nothing is in
-        // use any more; children go before parents, and what is the host's stays.
+        // SAFETY: every user of the device holds an `Arc` of it, and a host has waited for what it recorded (see
+        // `from_raw`), so nothing is in use any more. Children are destroyed before parents, and the host's objects are
+        // left alone.
         unsafe {
             if ours.is_some() {
                 let _ = device.device_wait_idle();

@@ -1,4 +1,4 @@
-//! Names for tools, and the messages of validation layers.
+//! Names of objects for debugging tools, and the messages of validation layers.
 
 use ash::vk;
 use std::ffi::{CString, c_void};
@@ -7,11 +7,11 @@ use std::sync::Mutex;
 /// Messages of the validation layers, in order of arrival.
 pub(crate) type Messages = Mutex<Vec<String>>;
 
-/// Debug-utils functions, where the instance has the extension.
+/// Debug-utils functions, if the instance has the extension enabled.
 pub(crate) struct DebugUtils {
     pub instance: ash::ext::debug_utils::Instance,
     pub messenger: vk::DebugUtilsMessengerEXT,
-    /// Boxed, so that the address given to the messenger stays.
+    /// Boxed, so that the address given to the messenger stays valid.
     pub messages: Box<Messages>,
 }
 
@@ -26,7 +26,7 @@ unsafe extern "system" fn collect(
     // SAFETY: both are null or C strings for the duration of the call.
     let (id, text) = unsafe { (data.message_id_name_as_c_str(), data.message_as_c_str()) };
     let text = text.map(|t| t.to_string_lossy().into_owned()).unwrap_or_default();
-    // The loader talks about drivers it skipped; only the layers' findings matter here.
+    // The loader reports drivers that it skipped; only the layers' messages matter here.
     if id.is_some_and(|i| i.to_bytes() == b"Loader Message") {
         return vk::FALSE;
     }
@@ -53,7 +53,7 @@ impl DebugUtils {
     }
 }
 
-/// Names an object for debuggers and validation messages, where the device has debug-utils.
+/// Names an object for debuggers and validation messages, if the device has debug-utils.
 pub(crate) fn name<T: vk::Handle>(device: Option<&ash::ext::debug_utils::Device>, object: T, name: &str) {
     if let (Some(device), Ok(name)) = (device, CString::new(name)) {
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);

@@ -1,4 +1,4 @@
-//! Descriptor sets of recordings, where kernels get their buffers by descriptors.
+//! Descriptor sets for recordings, where kernels receive their buffers by descriptors.
 
 use super::buffer_ref::BufferRef;
 use super::context::Gpu;
@@ -6,7 +6,7 @@ use super::failed;
 use crate::error::{Error, Result};
 use ash::vk;
 
-/// How much room a recording needs in descriptor pools; nothing where buffers go by address.
+/// The descriptors that a recording takes; zero where buffers are passed by address.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct DescriptorRoom {
     /// Descriptor sets.
@@ -15,26 +15,32 @@ pub struct DescriptorRoom {
     pub buffers: u32,
 }
 
-/// What a pool holds that is made because the others are full.
+/// Size of a pool that is made when the others are full.
 const MORE: DescriptorRoom = DescriptorRoom { sets: 256, buffers: 2048 };
 
-/// Descriptor pools that recordings take their sets from. Kept by a host from frame to frame (one per frame in flight), so that recording creates nothing:
-/// [`DescriptorPools::reserve`] what a rehearsal counted, lend them to each [`super::Recorder`], reset them once its commands have been executed.
+/// Descriptor pools that recordings take their sets from. A host keeps them from frame to frame (one `DescriptorPools`
+/// per frame in flight), so that recording creates nothing: [`DescriptorPools::reserve`] what a rehearsal counted, pass
+/// them to each [`super::Recorder`], and reset them once its commands have been executed.
 #[derive(Debug)]
 pub struct DescriptorPools {
     gpu: Gpu,
     pools: Vec<vk::DescriptorPool>,
-    /// The pool that sets are taken from, those before it being full.
+    /// The pool that sets are taken from; those before it are full.
     current: usize,
 }
 
 impl DescriptorPools {
-    /// Without room; pools are made as sets are taken, and kept.
+    /// Starts without pools. They are made when sets are taken, and kept.
     pub fn new(gpu: &Gpu) -> Self {
         Self { gpu: gpu.clone(), pools: Vec::new(), current: 0 }
     }
 
-    /// Makes room for a recording like the one that counted (see [`super::Recorder::descriptor_room`]).
+    /// The device they belong to.
+    pub(super) fn gpu(&self) -> &Gpu {
+        &self.gpu
+    }
+
+    /// Makes a pool large enough for a recording that counted this room (see [`super::Recorder::descriptor_room`]).
     ///
     /// # Errors
     /// [`Error::Vulkan`] if there is no memory for a pool.
@@ -46,12 +52,12 @@ impl DescriptorPools {
         let info = vk::DescriptorPoolCreateInfo::default().max_sets(room.sets).pool_sizes(&sizes);
         // SAFETY: plain creation; `drop` destroys it.
         let pool = unsafe { self.gpu.device().create_descriptor_pool(&info, None) };
-        // In front, so that it is the one that is used if there are others.
+        // Inserted at the current place, so that it is used next even if there are others.
         self.pools.insert(self.current, pool.map_err(failed("vkCreateDescriptorPool"))?);
         Ok(())
     }
 
-    /// Takes all sets back, for the next recording.
+    /// Resets all pools, for the next recording.
     ///
     /// # Errors
     /// [`Error::Vulkan`] if the call fails.
@@ -60,7 +66,7 @@ impl DescriptorPools {
     /// Commands recorded with these pools have been executed, or never will be.
     pub unsafe fn reset(&mut self) -> Result<()> {
         for pool in &self.pools {
-            // SAFETY: no set of the pool is in use, as the caller vouches.
+            // SAFETY: the caller guarantees that no set of the pool is in use.
             unsafe { self.gpu.device().reset_descriptor_pool(*pool, vk::DescriptorPoolResetFlags::empty()) }
                 .map_err(failed("vkResetDescriptorPool"))?;
         }
@@ -68,7 +74,7 @@ impl DescriptorPools {
         Ok(())
     }
 
-    /// A set with these buffers.
+    /// Makes a set with these buffers.
     pub(super) fn set(
         &mut self,
         layout: vk::DescriptorSetLayout,
@@ -88,19 +94,21 @@ impl DescriptorPools {
             return Err(Error::Invalid(text));
         }
         let set = self.take(layout)?;
-        let infos: Vec<_> =
-            buffers.iter().map(|b| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size.max(16) }]).collect();
+        // A descriptor needs a buffer and a range even if the kernel does not access it.
+        let nothing = self.gpu.nothing();
+        let bound = buffers.iter().map(|b| if b.size == 0 { nothing } else { *b });
+        let infos: Vec<_> = bound.map(|b| [vk::DescriptorBufferInfo { buffer: b.buffer, offset: b.offset, range: b.size }]).collect();
         let mut writes = Vec::with_capacity(infos.len());
         for (i, info) in (0..).zip(&infos) {
             let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i);
             writes.push(write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info));
         }
-        // SAFETY: the set was just taken, so no command uses it; its buffers are the caller's of the recorder.
+        // SAFETY: the set was just allocated, so no command uses it; the caller of the recorder provides valid buffers.
         unsafe { self.gpu.device().update_descriptor_sets(&writes, &[]) };
         Ok(set)
     }
 
-    /// A fresh set, from a new pool if all are full.
+    /// Allocates a set, from a new pool if all others are full.
     fn take(&mut self, layout: vk::DescriptorSetLayout) -> Result<vk::DescriptorSet> {
         let layouts = [layout];
         loop {
@@ -122,7 +130,8 @@ impl DescriptorPools {
 impl Drop for DescriptorPools {
     fn drop(&mut self) {
         for pool in self.pools.drain(..) {
-            // SAFETY: the commands have been executed (see `Recorder::new` and `Recorder::with_pools`), so no set is in use.
+            // SAFETY: the commands have been executed (see `Recorder::new` and `Recorder::with_pools`), so no set is in
+            // use.
             unsafe { self.gpu.device().destroy_descriptor_pool(pool, None) };
         }
     }

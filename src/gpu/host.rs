@@ -1,31 +1,36 @@
-//! A device of the host's: what it must have enabled, and what it lends.
+//! A device that belongs to the host application: what it must have enabled, and what it provides.
 
 use super::context::{Gpu, GpuOptions};
 use super::foundation::Foundation;
+use super::queue::HostQueue;
 use super::requirements::{DeviceReport, RayTracing, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::vulkan::Allocator;
 use std::sync::{Arc, Mutex};
 
-/// What a host has enabled, of what [`super::Requirements`] lists. Nothing else of a device is used, whatever it could do.
+/// The features and extensions of [`super::Requirements`] that the host has enabled. Nothing else of the device is
+/// used, even if it is supported.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)]
 pub struct Enabled {
-    /// Feature `bufferDeviceAddress`; without it kernels get their buffers by descriptors.
+    /// Feature `bufferDeviceAddress`; without it kernels receive their buffers as descriptors.
     pub buffer_addresses: bool,
-    /// Feature `shaderInt64`, which only drivers for processors profit from.
+    /// Feature `shaderInt64`, which only helps drivers that run on a processor.
     pub shader_int64: bool,
-    /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Wanted where subgroup sizes vary: without it
-    /// the driver is trusted to run kernels with its usual size, which a warning in the log tells, and the self-test checks; Intel's are not.
+    /// `VK_EXT_subgroup_size_control` (or Vulkan 1.3) with `subgroupSizeControl` and `computeFullSubgroups`. Wanted
+    /// where subgroup sizes vary. Without it a warning is logged and the driver is trusted to run kernels with its
+    /// usual size, which the self-test checks; Intel's drivers are not trusted in this.
     pub subgroup_size_control: bool,
-    /// `VK_KHR_acceleration_structure`, and of `VK_KHR_ray_query` and `VK_KHR_ray_tracing_pipeline` those named, with their features: for a baseline only.
+    /// `VK_KHR_acceleration_structure`, and `VK_KHR_ray_query` and `VK_KHR_ray_tracing_pipeline` as set here, with
+    /// their features. Used by a baseline only.
     pub ray_tracing: RayTracing,
     /// Instance extension `VK_EXT_debug_utils`: objects are named and stages labelled.
     pub debug_utils: bool,
 }
 
-/// A Vulkan device that somebody else owns. Cheap handles and function tables; nothing of it is ever destroyed by us.
+/// A Vulkan device owned by the host. The fields are cheap handles and function tables; this crate never destroys any
+/// of them.
 #[derive(Clone)]
 pub struct HostDevice {
     /// The instance, of Vulkan 1.2 or later.
@@ -34,14 +39,15 @@ pub struct HostDevice {
     pub physical: vk::PhysicalDevice,
     /// The logical device.
     pub device: ash::Device,
-    /// Family of the queues that our commands go to: it needs compute, nothing else.
+    /// Family of the queues that the recorded commands are submitted to; it must support compute.
     pub family: u32,
-    /// A queue of that family behind the lock that the host takes for its own submissions, for the convenient layer and the start-up
-    /// self-test. `None`: only the `cmd_*` functions can be used.
-    pub queue: Option<Arc<Mutex<vk::Queue>>>,
-    /// The host's allocator, made with `buffer_device_address` if that is enabled. `None`: one of our own.
+    /// A queue of that family with the lock that the host also takes for its own submissions; used by the owning calls
+    /// and the start-up self-test. `None`: only the `cmd_*` functions can be used.
+    pub queue: Option<Arc<dyn HostQueue>>,
+    /// The host's allocator, made with `buffer_device_address` if that is enabled. `None`: this crate makes its own.
     pub allocator: Option<Arc<Mutex<Allocator>>>,
-    /// The host's pipeline cache. `None`: one of our own.
+    /// The host's pipeline cache, which must not require external synchronization, since several threads compile
+    /// simultaneously. `None`: this crate makes its own.
     pub pipeline_cache: Option<vk::PipelineCache>,
     /// What is enabled.
     pub enabled: Enabled,
@@ -54,17 +60,20 @@ impl std::fmt::Debug for HostDevice {
 }
 
 impl Gpu {
-    /// Works on a device of the host's. Of `options`, `device` means nothing here, and `pipeline_cache` only without the host's cache.
+    /// Uses a device of the host. Of `options`, `device` is ignored, and `pipeline_cache` is used only if the host
+    /// provides no cache.
     ///
-    /// Buffers are used by queues of `host.family` alone, with exclusive sharing: a host that reads or writes them on another family transfers
-    /// their ownership. One `Gpu` serves any number of threads; a [`super::Recorder`] belongs to one.
+    /// Buffers are used on queues of `host.family` only, with exclusive sharing: a host that reads or writes them on
+    /// another family must transfer their ownership. A `Gpu` can be used by any number of threads; a
+    /// [`super::Recorder`] by one.
     ///
     /// # Errors
     /// [`Error::NoDevice`] with what is missing, [`Error::SelfTest`], [`Error::Memory`].
     ///
     /// # Safety
-    /// The handles are valid and belong together; what `host.enabled` names is enabled, and `host.family` has compute. The device outlives every
-    /// clone of the `Gpu` and everything made from it. When the last is dropped, nothing recorded through it is being executed.
+    /// The handles are valid and belong together. Everything that `host.enabled` names is enabled, and `host.family`
+    /// supports compute. The device outlives every clone of the `Gpu` and everything made from it. When the last of
+    /// these is dropped, nothing recorded through it is being executed.
     pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
         let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;
         let mut requirements = Requirements::check(&instance, physical);

@@ -1,4 +1,4 @@
-//! What is known of a kernel at build time, and its pipelines.
+//! Properties of kernels known at build time, and their pipelines.
 
 use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
@@ -19,23 +19,23 @@ pub(crate) enum Access {
 pub(crate) struct BufferInfo {
     pub name: &'static str,
     pub access: Access,
-    /// What its address must be a multiple of.
+    /// Its address must be a multiple of this.
     pub alignment: u64,
 }
 
-/// A kernel as `build.rs` reflected it.
+/// A kernel as reflected by `build.rs`.
 #[derive(Debug)]
 pub(crate) struct KernelInfo {
     pub name: &'static str,
     pub address: &'static [u8],
-    /// By address too, with records of four words read as two of 64 bits.
+    /// SPIR-V with buffers by address, and records of four words read as two 64-bit words.
     pub wide: &'static [u8],
     pub descriptor: &'static [u8],
     pub buffers: &'static [BufferInfo],
     pub scalar_bytes: usize,
 }
 
-/// Specialization constants as (id, value).
+/// Specialization constants as pairs (id, value).
 pub(crate) trait Specialization: Copy + Default {
     fn values(&self) -> Vec<(u32, u32)>;
 }
@@ -45,12 +45,12 @@ pub(crate) trait Kernel {
     type Spec: Specialization;
     const INFO: &'static KernelInfo;
     fn buffers(&self) -> Vec<BufferRef>;
-    /// Writes the scalars into the push-constant bytes, which begin at `base`.
+    /// Writes the scalars into the push-constant bytes, from byte `base` on.
     fn scalars(&self, base: usize, out: &mut [u8]);
 }
 
 impl KernelInfo {
-    /// Bytes of push constants before the scalars.
+    /// Bytes of push constants that precede the scalars.
     pub(crate) fn scalar_base(&self, binding: Binding) -> usize {
         if binding == Binding::Address { 8 * self.buffers.len() } else { 0 }
     }
@@ -60,7 +60,7 @@ impl KernelInfo {
         self.scalar_base(binding) + self.scalar_bytes
     }
 
-    /// The module.
+    /// The SPIR-V words of a variant.
     pub(super) fn words(&self, binding: Binding, wide: bool) -> Vec<u32> {
         let code = match binding {
             Binding::Address if wide => self.wide,
@@ -71,14 +71,14 @@ impl KernelInfo {
     }
 }
 
-/// The push constants of a kernel: the addresses of its buffers, if they go by them, and its scalars. A host may have forgotten an address; a device that
-/// is given none follows it all the same.
+/// The push constants of a kernel: its scalars, preceded by the addresses of its buffers if they are passed by address.
+/// Addresses are checked, since a host may have omitted one and the device would access address 0.
 pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Result<Vec<u8>> {
     let mut push = vec![0u8; K::INFO.push_bytes(binding)];
     arguments.scalars(K::INFO.scalar_base(binding), &mut push);
     if binding == Binding::Address {
         for ((place, buffer), info) in push.chunks_exact_mut(8).zip(arguments.buffers()).zip(K::INFO.buffers) {
-            // Nothing is looked for in a buffer of no bytes.
+            // Kernels do not access an empty buffer.
             if buffer.size > 0 && (buffer.address == 0 || !buffer.address.is_multiple_of(info.alignment)) {
                 let fault = if buffer.address == 0 {
                     "has no device address".into()
@@ -93,7 +93,7 @@ pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Resu
     Ok(push)
 }
 
-/// The ranges that a kernel uses, and whether it writes them.
+/// The ranges that a kernel uses, and whether it writes each.
 pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
     arguments.buffers().into_iter().zip(K::INFO.buffers).map(|(b, i)| (b, i.access != Access::Read)).collect()
 }
@@ -115,13 +115,13 @@ fn create_pipeline(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)]) -> Re
     let mut made = Pipeline::default();
     let compiled = compile(gpu, info, constants, &mut made);
     if compiled.is_err() {
-        // SAFETY: nobody has got it.
+        // SAFETY: the pipeline has not been handed out.
         unsafe { made.destroy(gpu.device()) };
     }
     compiled.map(|()| made)
 }
 
-/// Makes one part of a pipeline after the other.
+/// Makes the parts of a pipeline, in order.
 fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pipeline) -> Result<()> {
     let device = gpu.device();
     let binding = gpu.binding();
@@ -141,7 +141,8 @@ fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pi
         .collect();
     let values: Vec<u8> = constants.iter().flat_map(|(_, v)| v.to_le_bytes()).collect();
     let specialization = vk::SpecializationInfo::default().map_entries(&entries).data(&values);
-    // SAFETY: all structs outlive the calls; objects belong to this device; the caller destroys what was made before a failure.
+    // SAFETY: all structs outlive the calls; objects belong to this device; on failure the caller destroys the parts
+    // that were made.
     unsafe {
         if binding == Binding::Descriptors {
             let info = vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings);
@@ -163,7 +164,8 @@ fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pi
             .specialization_info(&specialization);
         let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default().required_subgroup_size(gpu.subgroup_size());
         if gpu.requires_subgroup_size() {
-            // Where the driver may choose, `gl_SubgroupSize` and the lanes that run can differ: nail both down.
+            // Where the driver may choose the subgroup size, `gl_SubgroupSize` and the lanes that run can differ:
+            // require the size and full subgroups.
             stage = stage.push_next(&mut required).flags(vk::PipelineShaderStageCreateFlags::REQUIRE_FULL_SUBGROUPS);
         }
         let infos = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(made.layout)];

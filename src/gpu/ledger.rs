@@ -1,8 +1,8 @@
-//! How much memory buffers take, where that has a limit.
+//! Accounting of buffer memory against a limit.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// What the buffers of a [`super::Gpu`] take together, and how much that may be.
+/// The bytes that the buffers of a [`super::Gpu`] take together, and their limit.
 #[derive(Debug)]
 pub(super) struct Ledger {
     limit: u64,
@@ -27,7 +27,7 @@ impl Ledger {
         self.peak.load(Ordering::Relaxed)
     }
 
-    /// Counts so many bytes more, or says how many are in use.
+    /// Adds `bytes` to the total; if that would exceed the limit, returns the bytes in use as the error.
     pub(super) fn claim(&self, bytes: u64) -> Result<(), u64> {
         let more = |used: u64| used.checked_add(bytes).filter(|&sum| sum <= self.limit);
         let before = self.used.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more)?;
@@ -35,7 +35,7 @@ impl Ledger {
         Ok(())
     }
 
-    /// Counts so many bytes less.
+    /// Subtracts `bytes` from the total.
     pub(super) fn release(&self, bytes: u64) {
         self.used.fetch_sub(bytes, Ordering::Relaxed);
     }

@@ -1,4 +1,4 @@
-//! Buffers from gpu-allocator.
+//! Buffers, with memory from gpu-allocator.
 
 use super::buffer_ref::{BufferRef, USAGE};
 use super::context::Gpu;
@@ -9,13 +9,14 @@ use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
 
-/// Offsets of arrays within a buffer are multiples of this: enough for every device's storage-buffer offsets and 16-byte loads.
+/// Offsets of arrays within a buffer are multiples of this, which is enough for every device's storage-buffer offsets
+/// and for 16-byte loads.
 pub const ALIGNMENT: u64 = 256;
 
-/// Addresses of buffers are multiples of this, whatever the device asks for: kernels load 16 bytes at once.
+/// Addresses of buffers are multiples of this even if the device requires less: kernels load 16 bytes in one access.
 const LEAST_ALIGNMENT: u64 = 16;
 
-/// A buffer of `size` bytes in fresh memory, which takes so many as `claim` is told.
+/// Makes a buffer of `size` bytes in fresh memory. `claim` receives the bytes that it takes.
 fn allocate(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<Memory> {
     let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
     let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage);
@@ -31,7 +32,7 @@ fn allocate(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(
     }
 }
 
-/// Gives a buffer that has none its memory.
+/// Allocates memory for a new buffer and binds it.
 fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<()> {
     let (device, handle, location) = (gpu.device(), memory.handle, memory.kind.location);
     let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: memory.size, reason };
@@ -44,7 +45,7 @@ fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -
     let mut allocator = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
     let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
     drop(allocator);
-    // SAFETY: fresh memory of the right requirements, bound once.
+    // SAFETY: fresh memory that meets the requirements, bound once.
     let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
     memory.allocation = Some(allocation);
     bound.map_err(failed("vkBindBufferMemory"))?;
@@ -55,21 +56,21 @@ fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -
     Ok(())
 }
 
-/// A buffer with memory of its own, freed when dropped, or kept for the next ([`Gpu::with_pool`]).
+/// A buffer and its memory. When dropped, the memory is freed, or kept for another buffer ([`Gpu::with_pool`]).
 pub struct Buffer {
-    gpu: Gpu,
+    pub(super) gpu: Gpu,
     memory: Option<Memory>,
-    /// Bytes counted in the device's ledger.
+    /// Bytes counted in the ledger.
     claimed: u64,
     size: u64,
     name: String,
 }
 
 impl Buffer {
-    /// A device-local buffer of `size` bytes (at least 16 are allocated, so that an empty array has an address).
+    /// A device-local buffer of `size` bytes. At least 16 are allocated, so that an empty array has an address.
     ///
     /// # Errors
-    /// [`Error::Memory`] names the buffer and its size.
+    /// [`Error::Memory`] with the buffer's name and size.
     pub fn new(gpu: &Gpu, name: &str, size: u64) -> Result<Self> {
         Self::with_usage(gpu, name, size, MemoryLocation::GpuOnly, vk::BufferUsageFlags::empty())
     }
@@ -79,7 +80,7 @@ impl Buffer {
         Self::with_usage(gpu, name, size, location, vk::BufferUsageFlags::empty())
     }
 
-    /// A buffer with usage flags beside those of every buffer.
+    /// A buffer with usage flags in addition to those of every buffer.
     pub(super) fn with_usage(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation, more: vk::BufferUsageFlags) -> Result<Self> {
         let mut usage = USAGE | more;
         if gpu.has_addresses() {
@@ -101,7 +102,7 @@ impl Buffer {
         let mut fresh = || allocate(gpu, name, kind, size.max(16), &mut claim);
         let memory = match gpu.pool().and_then(|pool| pool.take(kind, size)) {
             Some(memory) => memory,
-            // What is kept may be what is missing.
+            // Memory kept by the pool may be what the device is short of.
             None => fresh().or_else(|e| if gpu.pool().is_some_and(Pool::clear) { fresh() } else { Err(e) })?,
         };
         debug::name(gpu.debug_device(), memory.handle, name);
@@ -119,7 +120,7 @@ impl Buffer {
         BufferRef { buffer: handle, offset: 0, size: self.size, address }
     }
 
-    /// Bytes asked for.
+    /// Requested size in bytes.
     pub fn size(&self) -> u64 {
         self.size
     }
@@ -129,23 +130,24 @@ impl Buffer {
         &self.name
     }
 
-    /// The allocation, if its memory has these properties besides being coherent.
+    /// The allocation, if its memory is host-coherent and has these properties.
     fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
         let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;
         self.memory().allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
     }
 
-    /// The bytes, where the host sees them as the device does: nothing here flushes a cache.
+    /// The bytes, if the memory is mapped and coherent: nothing here flushes a cache.
     pub(crate) fn mapped(&self) -> Option<&[u8]> {
         self.coherent(vk::MemoryPropertyFlags::empty())?.mapped_slice()?.get(..self.size as usize)
     }
 
-    /// As [`Buffer::mapped`], where the host reads it through its caches: without, it is faster to copy it to where it does.
+    /// The bytes as [`Buffer::mapped`], if the host reads the memory through its caches. Otherwise a copy to such
+    /// memory is faster.
     pub(crate) fn cached(&self) -> Option<&[u8]> {
         self.coherent(vk::MemoryPropertyFlags::HOST_CACHED)?.mapped_slice()?.get(..self.size as usize)
     }
 
-    /// As [`Buffer::mapped`], to write.
+    /// The bytes as [`Buffer::mapped`], for writing.
     pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
         self.coherent(vk::MemoryPropertyFlags::empty())?;
         self.memory.as_mut()?.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
@@ -153,7 +155,7 @@ impl Buffer {
 }
 
 impl Gpu {
-    /// A device-local buffer; see [`Buffer::new`].
+    /// A device-local buffer, see [`Buffer::new`].
     ///
     /// # Errors
     /// [`Error::Memory`].

@@ -1,4 +1,5 @@
-//! The Vulkan layer, the only folder with `unsafe` but for the border to C: device, memory, pipelines, and the recorder of commands.
+//! The Vulkan layer: device, memory, pipelines, and the recorder of commands. The only folder with `unsafe` code apart
+//! from the C interface.
 #![allow(unsafe_code)]
 
 mod acceleration;
@@ -15,13 +16,15 @@ mod memory;
 mod open;
 mod pipelines;
 mod pool;
+mod queue;
 mod ray_functions;
 mod ray_pipeline;
 mod recorder;
 mod requirements;
 mod submit;
 
-pub use acceleration::{AccelerationStructure, Triangles};
+pub use acceleration::AccelerationStructure;
+pub(crate) use acceleration::Triangles;
 pub use buffer_ref::{BufferRef, USAGE};
 pub use context::{Binding, Gpu, GpuOptions};
 pub use descriptors::{DescriptorPools, DescriptorRoom};
@@ -29,6 +32,7 @@ pub use host::{Enabled, HostDevice};
 pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer};
 pub use open::list_devices;
+pub use queue::HostQueue;
 pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;

@@ -1,16 +1,17 @@
-//! A device of our own: chosen, checked, opened.
+//! Choosing, checking and opening a device owned by this crate.
 
 use super::context::{Gpu, GpuOptions};
 use super::debug::DebugUtils;
 use super::failed;
 use super::foundation::{Foundation, Ours};
+use super::queue::HostQueue;
 use super::requirements::{DeviceReport, Requirements};
 use crate::error::{Error, Result};
 use ash::vk;
 use std::ffi::CStr;
 use std::sync::{Arc, Mutex};
 
-/// Why there is no device, and what helps.
+/// Reason and remedy if the loader finds no driver.
 const NO_DRIVER: &str = "the loader finds no driver; install one (mesa-vulkan-drivers runs on any processor)";
 
 struct Session {
@@ -19,9 +20,9 @@ struct Session {
     debug: bool,
 }
 
-/// Opens the loader and an instance.
+/// Loads the Vulkan loader and creates an instance.
 fn open_instance() -> Result<Session> {
-    // SAFETY: the loader is trusted as every Vulkan program trusts it.
+    // SAFETY: loading the Vulkan library runs its initialisation code, which every Vulkan program has to trust.
     let entry = unsafe { ash::Entry::load() }
         .map_err(|e| Error::NoVulkan(format!("its loader is missing ({e}); install libvulkan1 and a driver")))?;
     // SAFETY: plain enumeration.
@@ -35,11 +36,11 @@ fn open_instance() -> Result<Session> {
     }
     let mut flags = vk::InstanceCreateFlags::empty();
     if has(ash::khr::portability_enumeration::NAME) {
-        // MoltenVK shows itself only on request.
+        // MoltenVK is only listed on request.
         wanted.push(ash::khr::portability_enumeration::NAME.as_ptr());
         flags |= vk::InstanceCreateFlags::ENUMERATE_PORTABILITY_KHR;
     }
-    // What is used of 1.3 is asked for first; 1.2 does.
+    // Vulkan 1.3 is requested for the features that are used if present; a 1.2 device is enough.
     let application = vk::ApplicationInfo::default().application_name(c"olbvh").engine_name(c"olbvh").api_version(vk::API_VERSION_1_3);
     let info = vk::InstanceCreateInfo::default().application_info(&application).enabled_extension_names(&wanted).flags(flags);
     // SAFETY: all structs outlive the call.
@@ -50,7 +51,7 @@ fn open_instance() -> Result<Session> {
     Ok(Session { entry, instance, debug })
 }
 
-/// Every Vulkan device of this machine with what it lacks, if anything.
+/// All Vulkan devices of this machine, each with what it lacks, if anything.
 ///
 /// # Errors
 /// [`Error::NoVulkan`] if there is no loader or driver.
@@ -66,7 +67,7 @@ pub fn list_devices() -> Result<Vec<DeviceReport>> {
     reports
 }
 
-/// The device asked for, or the best one that qualifies.
+/// The requested device, or the best one that meets the requirements.
 fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceReport)> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
@@ -96,7 +97,7 @@ fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::Physica
 }
 
 impl Gpu {
-    /// Opens a device and tests that it can be trusted.
+    /// Opens a device and runs the self-test on it.
     ///
     /// # Errors
     /// [`Error::NoVulkan`], [`Error::NoDevice`] with what is missing, [`Error::SelfTest`].
@@ -114,17 +115,28 @@ impl Gpu {
         };
         let (family, _) = report.requirements.queue_family.unwrap_or_default();
         // SAFETY: the device was made with a queue of the family.
-        let queue = Some(Arc::new(Mutex::new(unsafe { device.get_device_queue(family, 0) })));
+        let queue: Arc<dyn HostQueue> = Arc::new(Mutex::new(unsafe { device.get_device_queue(family, 0) }));
         let ours = Some(Ours { debug: if debug { DebugUtils::new(&entry, &instance) } else { None }, _entry: entry });
         let (allocator, pipeline_cache) = (None, None);
         Self::on(
-            Foundation { instance, physical, device, report, family, queue, allocator, pipeline_cache, debug_utils: debug, ours },
+            Foundation {
+                instance,
+                physical,
+                device,
+                report,
+                family,
+                queue: Some(queue),
+                allocator,
+                pipeline_cache,
+                debug_utils: debug,
+                ours,
+            },
             options,
         )
     }
 }
 
-/// A device with everything enabled that is preferred and that it has.
+/// Creates a device with all preferred features and extensions that it supports.
 fn make_device(instance: &ash::Instance, physical: vk::PhysicalDevice, requirements: &Requirements) -> Result<ash::Device> {
     let (family, _) = requirements.queue_family.unwrap_or_default();
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];

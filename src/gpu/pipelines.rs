@@ -1,4 +1,4 @@
-//! The pipelines of a device, and the driver's cache of what it compiled for them.
+//! The pipelines of a device, and the Vulkan pipeline cache they are compiled with.
 
 use super::failed;
 use super::foundation::Foundation;
@@ -18,12 +18,13 @@ pub(crate) struct Pipeline {
 }
 
 impl Pipeline {
-    /// Destroys what there is of it.
+    /// Destroys the handles that exist.
     ///
     /// # Safety
-    /// It is of this device, and nothing uses it any more.
+    /// The handles belong to this device, and nothing uses them any more.
     pub(super) unsafe fn destroy(self, device: &ash::Device) {
-        // SAFETY: as the caller vouches; null handles are passed over.
+        // SAFETY: the caller guarantees that the handles belong to this device and are unused; null handles are
+        // ignored.
         unsafe {
             device.destroy_pipeline(self.handle, None);
             device.destroy_pipeline_layout(self.layout, None);
@@ -32,20 +33,20 @@ impl Pipeline {
     }
 }
 
-/// A kernel by name, and its specialization constants.
+/// The name of a kernel, and its specialization constants.
 pub(super) type PipelineKey = (&'static str, Vec<(u32, u32)>);
 
-/// What has been compiled.
+/// The pipelines compiled so far.
 pub(super) struct Pipelines {
     made: RwLock<HashMap<PipelineKey, Pipeline>>,
-    /// The host's, or one of our own.
+    /// The host's pipeline cache, or one owned by this crate.
     pub cache: vk::PipelineCache,
-    /// Where one of our own is kept.
+    /// The file that a cache owned by this crate is stored in.
     file: Option<PathBuf>,
 }
 
 impl Pipelines {
-    /// None yet; `file`: of the pipeline cache, if the host lends none.
+    /// Starts without pipelines. `file` is the file of the pipeline cache, used if the host provides no cache.
     pub fn new(foundation: &Foundation, file: Option<PathBuf>) -> Result<Self> {
         let cache = if let Some(cache) = foundation.pipeline_cache {
             cache
@@ -58,24 +59,25 @@ impl Pipelines {
         Ok(Self { made: RwLock::default(), cache, file })
     }
 
-    /// That of a key, if it has been made.
+    /// The pipeline of a key, if it has been made.
     pub fn find(&self, key: &PipelineKey) -> Option<Pipeline> {
         self.made.read().unwrap_or_else(PoisonError::into_inner).get(key).copied()
     }
 
-    /// Keeps a new one of this device that nobody else has got; the one to use.
+    /// Stores a new pipeline of this device that has not been handed out, and returns the one to use.
     pub fn keep(&self, device: &ash::Device, key: PipelineKey, made: Pipeline) -> Pipeline {
         match self.made.write().unwrap_or_else(PoisonError::into_inner).entry(key) {
             Entry::Vacant(place) => *place.insert(made),
             Entry::Occupied(first) => {
-                // SAFETY: another thread was first, and nobody has got this one.
+                // SAFETY: another thread stored its pipeline first, and this one has not been handed out.
                 unsafe { made.destroy(device) };
                 *first.get()
             }
         }
     }
 
-    /// Writes the pipeline cache beside its file and renames it, so that readers never see half of it.
+    /// Writes the pipeline cache to a temporary file beside its own and renames that, so that readers never see a
+    /// partial file.
     pub fn save(&self, device: &ash::Device) -> Option<()> {
         let file = self.file.as_ref()?;
         // SAFETY: the cache belongs to this device, which is alive.
@@ -89,13 +91,13 @@ impl Pipelines {
         std::fs::rename(&temporary, file).ok()
     }
 
-    /// Destroys the pipelines, and the cache if it is one of our own.
+    /// Destroys the pipelines, and the cache if this crate owns it.
     ///
     /// # Safety
     /// Nothing uses them any more.
     pub unsafe fn destroy(&mut self, foundation: &Foundation) {
         let Foundation { device, pipeline_cache, .. } = foundation;
-        // SAFETY: as the caller vouches.
+        // SAFETY: the caller guarantees that nothing uses them any more.
         unsafe {
             for p in self.made.get_mut().map(std::mem::take).unwrap_or_default().into_values() {
                 p.destroy(device);

@@ -1,21 +1,21 @@
-//! Memory of dropped buffers that waits for the next ones.
+//! A pool of memory of dropped buffers, for reuse by new buffers.
 
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, Allocator};
 use std::sync::{Arc, Mutex};
 
-/// Buffers below this are not worth keeping: the allocator has blocks for them.
+/// Smaller buffers are not kept: the allocator serves them from its blocks.
 const LEAST: u64 = 256 << 10;
 
-/// What a buffer was made for: another can only take its place if that is the same.
+/// The properties of a buffer; its memory can be reused only by a buffer with the same ones.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Kind {
     pub usage: vk::BufferUsageFlags,
     pub location: MemoryLocation,
 }
 
-/// A Vulkan buffer and what it lies in.
+/// A Vulkan buffer and its memory.
 pub(super) struct Memory {
     pub kind: Kind,
     /// Bytes of the Vulkan buffer.
@@ -26,9 +26,10 @@ pub(super) struct Memory {
 }
 
 impl Memory {
-    /// Gives it back to the driver.
+    /// Returns it to the driver.
     pub(super) fn free(self, device: &ash::Device, allocator: &Mutex<Allocator>) {
-        // SAFETY: work on the buffer has ended: submissions of the convenient layer are waited for before anything is dropped.
+        // SAFETY: work on the buffer has ended, since owning calls wait for their submissions before anything is
+        // dropped.
         unsafe { device.destroy_buffer(self.handle, None) };
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation, allocator.lock())
             && let Err(e) = allocator.free(allocation)
@@ -38,7 +39,7 @@ impl Memory {
     }
 }
 
-/// Memory of dropped buffers, the latest last. Gone before the device, see [`super::Gpu`].
+/// Memory of dropped buffers, the most recent last. It is destroyed before the device, see [`super::Gpu`].
 pub(super) struct Pool {
     device: ash::Device,
     allocator: Arc<Mutex<Allocator>>,
@@ -47,7 +48,7 @@ pub(super) struct Pool {
 }
 
 impl Pool {
-    /// Of at most so many bytes.
+    /// A pool of at most `most` bytes.
     pub(super) fn new(device: ash::Device, allocator: Arc<Mutex<Allocator>>, most: u64) -> Self {
         Self { device, allocator, most, kept: Mutex::default() }
     }
@@ -56,7 +57,7 @@ impl Pool {
         memory.free(&self.device, &self.allocator);
     }
 
-    /// The smallest that holds `size` bytes without much to spare.
+    /// Takes the smallest buffer that holds `size` bytes and is at most an eighth larger.
     pub(super) fn take(&self, kind: Kind, size: u64) -> Option<Memory> {
         let mut kept = self.kept.lock().ok()?;
         let fits = |m: &Memory| m.kind == kind && (size..=size + size / 8).contains(&m.size);
@@ -64,7 +65,8 @@ impl Pool {
         Some(kept.remove(i))
     }
 
-    /// Keeps memory, in place of what has waited longest where that is too much, or gives it back.
+    /// Keeps memory, and frees the oldest while the pool is too large. Memory that is too small or too large for the
+    /// pool is freed immediately.
     pub(super) fn keep(&self, memory: Memory) {
         let Ok(mut kept) = self.kept.lock() else { return self.free(memory) };
         if !(LEAST..=self.most).contains(&memory.size) {
@@ -76,7 +78,7 @@ impl Pool {
         }
     }
 
-    /// Gives all of it back to the driver; whether there was any.
+    /// Returns all memory to the driver, and whether there was any.
     pub(super) fn clear(&self) -> bool {
         let Ok(mut kept) = self.kept.lock() else { return false };
         let any = !kept.is_empty();

@@ -1,4 +1,4 @@
-//! Functions and limits of the extensions that trace rays.
+//! Functions and limits of the ray-tracing extensions.
 
 use ash::vk;
 
@@ -7,12 +7,12 @@ pub(super) struct Acceleration {
     pub functions: ash::khr::acceleration_structure::Device,
     pub scratch_alignment: u64,
     pub most_triangles: u64,
-    /// Those of ray-tracing pipelines, where they are enabled too.
+    /// Functions and limits of ray-tracing pipelines, if those are enabled too.
     pub pipelines: Option<RayFunctions>,
 }
 
 impl Acceleration {
-    /// Of a device that was made with the extension, and perhaps with ray-tracing pipelines.
+    /// Loads the functions of a device with the extension enabled; `pipelines`: ray-tracing pipelines are enabled too.
     pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device, pipelines: bool) -> Self {
         let mut limits = vk::PhysicalDeviceAccelerationStructurePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);
@@ -31,13 +31,13 @@ impl Acceleration {
 pub(super) struct RayFunctions {
     pub functions: ash::khr::ray_tracing_pipeline::Device,
     pub handle_bytes: u32,
-    /// Of the tables, a multiple of that of handles.
+    /// Required alignment of the shader binding tables, a multiple of the alignment of handles.
     pub alignment: u32,
     pub most_rays: u32,
 }
 
 impl RayFunctions {
-    /// Of a device that was made with the extension.
+    /// Loads the functions of a device with the extension enabled.
     pub(super) fn new(instance: &ash::Instance, physical: vk::PhysicalDevice, device: &ash::Device) -> Self {
         let mut limits = vk::PhysicalDeviceRayTracingPipelinePropertiesKHR::default();
         let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut limits);

@@ -1,5 +1,5 @@
-//! Ray-tracing pipelines (`VK_KHR_ray_tracing_pipeline`), for devices that trace rays no other way: one shader launches rays, one is told what they
-//! met, one that they met nothing. Buffers go by address, which every such device has.
+//! Ray-tracing pipelines (`VK_KHR_ray_tracing_pipeline`), for devices without ray queries: one shader launches rays,
+//! one receives the closest hits, one the misses. Buffers are passed by address, which every such device supports.
 
 use super::context::{Binding, Gpu};
 use super::kernel::{Kernel, KernelInfo, push_constants, uses};
@@ -19,19 +19,19 @@ fn extension(gpu: &Gpu) -> Result<&RayFunctions> {
     functions.ok_or_else(|| Error::Invalid(format!("{} has no ray-tracing pipelines", gpu.report().name)))
 }
 
-/// Shaders that are launched together, without specialization constants.
+/// A pipeline of three shaders, without specialization constants.
 pub(crate) struct RayPipeline {
     gpu: Gpu,
     info: &'static KernelInfo,
     handle: vk::Pipeline,
     layout: vk::PipelineLayout,
-    /// Where the driver finds launch, miss and hit shaders.
+    /// Shader binding tables of the launch, miss and hit shaders.
     tables: [vk::StridedDeviceAddressRegionKHR; 3],
     memory: Option<Buffer>,
 }
 
 impl RayPipeline {
-    /// Compiles the shader that launches rays, that for rays that miss, and that for the closest hit.
+    /// Compiles the shader that launches rays, the one for rays that miss, and the one for the closest hit.
     ///
     /// # Errors
     /// [`Error::Invalid`] without the extension, [`Error::Memory`], or a failed Vulkan call.
@@ -73,7 +73,7 @@ impl RayPipeline {
         Ok(made)
     }
 
-    /// Writes the handles of the shaders to memory.
+    /// Writes the shaders' handles to the shader binding tables.
     fn fill_tables(&mut self) -> Result<()> {
         let RayFunctions { functions, handle_bytes, alignment, .. } = extension(&self.gpu)?;
         // SAFETY: the pipeline has three groups.
@@ -95,11 +95,11 @@ impl RayPipeline {
         Ok(())
     }
 
-    /// Records the launch of `count` rays, in rows of 65,536. Reads what compute shaders and transfers wrote before; what it writes is visible to compute
-    /// shaders, transfers and the host behind it.
+    /// Records the launch of `count` rays, in rows of 65,536. Reads what compute shaders and transfers wrote before.
+    /// What it writes is visible to following compute shaders and transfers, and to the host.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] for more rays than the device launches at a time.
+    /// [`Error::TooLarge`] for more rays than the device can launch at once.
     pub(crate) fn record<Launch: Kernel>(&self, r: &mut Recorder<'_>, arguments: &Launch, count: u32) -> Result<()> {
         let RayFunctions { functions, most_rays, .. } = extension(&self.gpu)?;
         let (width, height) = (count.min(ROW), count.div_ceil(ROW));
@@ -117,8 +117,8 @@ impl RayPipeline {
         if !r.is_rehearsal() {
             let push = push_constants(arguments, Binding::Address)?;
             let ([launch, miss, hit], callable) = (&self.tables, vk::StridedDeviceAddressRegionKHR::default());
-            // SAFETY: pipeline and tables belong together and to this device; push constants fit the layout made from the same numbers; who made
-            // the recorder vouches for the command buffer.
+            // SAFETY: pipeline and tables belong together and to this device; the push constants fit the layout, which
+            // was made from the same numbers; the creator of the recorder guarantees a valid command buffer.
             unsafe {
                 let device = self.gpu.device();
                 device.cmd_bind_pipeline(r.commands, vk::PipelineBindPoint::RAY_TRACING_KHR, self.handle);
@@ -133,7 +133,7 @@ impl RayPipeline {
     }
 }
 
-/// Shader modules while a pipeline is made of them.
+/// Shader modules, which are needed while a pipeline is made from them.
 struct Modules<'a> {
     device: &'a ash::Device,
     made: Vec<vk::ShaderModule>,
@@ -143,7 +143,7 @@ impl Modules<'_> {
     fn add(&mut self, kernel: &KernelInfo) -> Result<()> {
         let words = kernel.words(Binding::Address, false);
         let info = vk::ShaderModuleCreateInfo::default().code(&words);
-        // SAFETY: the code is the shader compiler's.
+        // SAFETY: the code was produced by the shader compiler.
         self.made.push(unsafe { self.device.create_shader_module(&info, None) }.map_err(failed("vkCreateShaderModule"))?);
         Ok(())
     }
@@ -152,7 +152,7 @@ impl Modules<'_> {
 impl Drop for Modules<'_> {
     fn drop(&mut self) {
         for &module in &self.made {
-            // SAFETY: a pipeline keeps what it needs of its modules.
+            // SAFETY: a pipeline does not refer to its modules after its creation.
             unsafe { self.device.destroy_shader_module(module, None) };
         }
     }
@@ -160,7 +160,7 @@ impl Drop for Modules<'_> {
 
 impl Drop for RayPipeline {
     fn drop(&mut self) {
-        // SAFETY: work with the pipeline has ended: submissions of the convenient layer are waited for.
+        // SAFETY: work with the pipeline has ended, since owning calls wait for their submissions.
         unsafe {
             self.gpu.device().destroy_pipeline(self.handle, None);
             self.gpu.device().destroy_pipeline_layout(self.layout, None);

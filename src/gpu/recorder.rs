@@ -1,7 +1,9 @@
-//! Appends work to a command buffer: dispatches, named barriers, fills, copies, timestamps. Submits nothing, waits for nothing.
+//! Appends work to a command buffer: dispatches, named barriers, fills, copies, timestamps. Submits nothing and waits
+//! for nothing.
 //!
-//! The recorder knows from reflection which buffers each kernel reads and writes. It checks, as the work is recorded, that no dispatch
-//! meets an earlier one's writes (or writes what an earlier one reads) without a barrier between them.
+//! The recorder knows from reflection which buffers each kernel reads and writes. While recording it checks that no
+//! command reads or writes what an earlier one wrote, or writes what an earlier one read, without a barrier between
+//! them.
 
 use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
@@ -49,51 +51,64 @@ pub struct Recorder<'a> {
     uses: Vec<Use>,
     hazard: Option<String>,
     timestamps: Option<(vk::QueryPool, u32)>,
-    /// Names and begin/end slots of the timed stages so far.
+    /// Names of the timed stages so far, with the timestamp slots of start and end.
     pub(crate) stages: Vec<(String, u32, u32)>,
     next_slot: u32,
-    /// Used where buffers go by descriptor.
+    /// Used where buffers are bound by descriptors.
     pools: Pools<'a>,
     room: DescriptorRoom,
     barriers: Vec<&'static str>,
-    /// Leave out the n-th barrier, to see that its absence is noticed.
+    /// The barrier to leave out, for tests that its absence is detected.
     drop_barrier: Option<u32>,
 }
 
 impl<'a> Recorder<'a> {
-    /// A recorder for a command buffer in the recording state. `timestamps`: a reset query pool and its size.
+    /// A recorder for a command buffer in the recording state. `timestamps` is a reset query pool and its size.
     ///
-    /// Recording binds a compute pipeline, compute push constants, and with descriptors set 0 for compute; a host binds its own again after it.
-    /// Where the device binds by descriptors, the recorder must be kept until the commands have been executed, since it owns their sets, unless it is lent
-    /// pools (see [`Recorder::with_pools`]).
+    /// Recording binds a compute pipeline, sets push constants and, with descriptors, binds set 0 for compute; the host
+    /// must bind its own again afterwards. Where the device binds buffers by descriptors, the recorder must be kept
+    /// until the commands have been executed, since it owns their descriptor sets, unless it borrows pools (see
+    /// [`Recorder::with_pools`]).
     ///
     /// # Safety
-    /// `commands` is in the recording state, outside a render pass, of a family with compute, and belongs to `gpu`'s device. Until it has been executed live all
-    /// buffers whose parts are recorded; these are as large as the functions that take them say, and hold what they say: hints and orders that are
-    /// numbers of this mesh, a tree over this mesh.
+    /// `commands` is in the recording state, outside a render pass, from a command pool of a family with compute, and
+    /// belongs to `gpu`'s device. All buffers whose parts are recorded live until it has been executed. They are as
+    /// large as the recording functions require, and their contents are valid: hints and orders are numbers of this
+    /// mesh, and a tree is one over this mesh.
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
         let (pools, room) = (Pools::Own(DescriptorPools::new(gpu)), DescriptorRoom::default());
         let (uses, stages, barriers) = (Vec::new(), Vec::new(), Vec::new());
         Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, room, barriers, drop_barrier: None }
     }
 
-    /// Takes descriptor sets from pools of the caller's instead of its own. They are kept until the commands have been executed; the recorder need not be.
-    #[must_use]
-    pub fn with_pools(mut self, pools: &'a mut DescriptorPools) -> Self {
+    /// Takes descriptor sets from the caller's pools instead of the recorder's own. The pools must be kept until the
+    /// commands have been executed; the recorder need not be.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] for pools of another device, or if something was recorded before whose descriptor sets come
+    /// from the recorder's own pools.
+    pub fn with_pools(mut self, pools: &'a mut DescriptorPools) -> Result<Self> {
+        if !pools.gpu().is_same_device(self.gpu) {
+            return Err(Error::Invalid("descriptor pools of another device".into()));
+        }
+        if self.room != DescriptorRoom::default() {
+            return Err(Error::Invalid("descriptor pools are lent after something was recorded; lend them first".into()));
+        }
         self.pools = Pools::Lent(pools);
-        self
+        Ok(self)
     }
 
-    /// The room in descriptor pools that what was recorded takes, rehearsed or not.
+    /// The descriptors that everything recorded so far takes, also in a rehearsal.
     pub fn descriptor_room(&self) -> DescriptorRoom {
         self.room
     }
 
-    /// A recorder without a command buffer: what is recorded compiles the pipelines it needs and is checked for missing barriers, and that is
-    /// all. A host rehearses once what it will record every frame, so that nothing is created then; where the device binds by descriptors it also
-    /// reserves [`Recorder::descriptor_room`] in pools that it lends.
+    /// A recorder without a command buffer. Recording only compiles the pipelines that are needed, and checks for
+    /// missing barriers. A host rehearses once what it will record in every frame, so that nothing is created then.
+    /// Where the device binds buffers by descriptors, the host also reserves [`Recorder::descriptor_room`] in the pools
+    /// that it provides.
     pub fn rehearse(gpu: &'a Gpu) -> Self {
-        // SAFETY: nothing is recorded into a null command buffer, see `is_rehearsal`.
+        // SAFETY: with a null command buffer nothing is recorded, see `is_rehearsal`.
         unsafe { Self::new(gpu, vk::CommandBuffer::null(), None) }
     }
 
@@ -101,12 +116,13 @@ impl<'a> Recorder<'a> {
         self.commands == vk::CommandBuffer::null()
     }
 
-    /// The stages recorded so far that were timed: name, slot of the timestamp at the begin, slot of that at the end.
+    /// The timed stages recorded so far: name, slot of the timestamp at the start, slot of the timestamp at the end.
     pub fn timed_stages(&self) -> &[(String, u32, u32)] {
         &self.stages
     }
 
-    /// The command buffer, for commands of the host's own between ours. Of its barriers it tells by [`Recorder::host_barrier`].
+    /// The command buffer, into which the host may record its own commands in between. It reports its own barriers with
+    /// [`Recorder::host_barrier`].
     pub fn commands(&self) -> vk::CommandBuffer {
         self.commands
     }
@@ -116,19 +132,19 @@ impl<'a> Recorder<'a> {
         self.gpu
     }
 
-    /// Leaves out the n-th barrier from now on, for tests.
+    /// From now on leaves out the n-th barrier, for tests.
     #[doc(hidden)]
     pub fn drop_barrier(&mut self, n: Option<u32>) {
         self.drop_barrier = n;
     }
 
-    /// Labels of the barriers recorded, for tests.
+    /// Labels of the barriers recorded so far, for tests.
     #[doc(hidden)]
     pub fn barriers(&self) -> &[&'static str] {
         &self.barriers
     }
 
-    /// Runs a kernel.
+    /// Records a dispatch of a kernel.
     pub(crate) fn dispatch<K: Kernel>(&mut self, arguments: &K, spec: K::Spec, groups: Groups) -> Result<()> {
         let info = K::INFO;
         let pipeline = self.gpu.pipeline::<K>(spec)?;
@@ -150,8 +166,8 @@ impl<'a> Recorder<'a> {
         }
         let device = self.gpu.device();
         let push = push_constants(arguments, self.gpu.binding())?;
-        // SAFETY: pipeline, layouts and sets belong to this device; push constants fit the layout made from the same numbers; the
-        // caller of `new` vouches for the command buffer.
+        // SAFETY: pipeline, layouts and sets belong to this device; the push constants fit the layout, which was made
+        // from the same numbers; the caller of `new` guarantees a valid command buffer.
         unsafe {
             device.cmd_bind_pipeline(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.handle);
             if self.gpu.binding() == Binding::Descriptors && !buffers.is_empty() {
@@ -174,7 +190,7 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Makes everything written so far visible to everything after; `label` says by whom and for whom.
+    /// Makes everything written so far visible to everything that follows. `label` names the writer and the reader.
     pub fn barrier(&mut self, label: &'static str) {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;
@@ -182,13 +198,13 @@ impl<'a> Recorder<'a> {
         self.barrier_between(label, (stages, writes), (stages | vk::PipelineStageFlags::DRAW_INDIRECT, writes | reads));
     }
 
-    /// Says that the host recorded such a barrier into [`Recorder::commands`] itself, or one that does more: from writes (and reads) of compute shaders
-    /// and transfers to whatever comes next. Records nothing.
+    /// Notes that the host recorded such a barrier into [`Recorder::commands`] itself, or a stronger one: from writes
+    /// (and reads) of compute shaders and transfers to all following commands. Records nothing.
     pub fn host_barrier(&mut self, label: &'static str) {
         self.pass_barrier(label);
     }
 
-    /// What was used before a barrier can be used again; false if this one is to be left out.
+    /// Clears the uses noted before a barrier. Returns false if this barrier is to be left out.
     fn pass_barrier(&mut self, label: &'static str) -> bool {
         self.barriers.push(label);
         let passed = self.drop_barrier != Some(self.barriers.len() as u32 - 1);
@@ -198,7 +214,7 @@ impl<'a> Recorder<'a> {
         passed
     }
 
-    /// A barrier between these stages and accesses.
+    /// Records a barrier between these stages and accesses.
     pub(super) fn barrier_between(
         &mut self,
         label: &'static str,
@@ -210,13 +226,13 @@ impl<'a> Recorder<'a> {
         }
         let barrier = vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(used);
         self.label(label);
-        // SAFETY: the caller of `new` vouches for the command buffer.
+        // SAFETY: the caller of `new` guarantees a valid command buffer.
         unsafe {
             self.gpu.device().cmd_pipeline_barrier(self.commands, source, target, vk::DependencyFlags::empty(), &[barrier], &[], &[]);
         }
     }
 
-    /// Fills a range (a multiple of 4 bytes) with a word.
+    /// Fills a range, whose size is a multiple of 4 bytes, with a word.
     pub fn fill(&mut self, range: BufferRef, word: u32) {
         if range.size == 0 {
             return;
@@ -229,9 +245,13 @@ impl<'a> Recorder<'a> {
         unsafe { self.gpu.device().cmd_fill_buffer(self.commands, range.buffer, range.offset, range.size.next_multiple_of(4), word) };
     }
 
-    /// Copies the bytes of `from` to the beginning of `to`.
+    /// Copies the bytes of `from` to the start of `to`; a smaller `to` is an error of [`Recorder::finish`].
     pub fn copy(&mut self, from: BufferRef, to: BufferRef) {
         if from.size == 0 {
+            return;
+        }
+        if to.size < from.size {
+            self.hazard.get_or_insert_with(|| format!("copy of {} bytes to a place of {}", from.size, to.size));
             return;
         }
         self.touch(&[(from, false), (to.part(0, from.size), true)], "copy");
@@ -243,13 +263,13 @@ impl<'a> Recorder<'a> {
         unsafe { self.gpu.device().cmd_copy_buffer(self.commands, from.buffer, to.buffer, &region) };
     }
 
-    /// Records `work` as a stage of that name: labelled, and timed where there is room for its timestamps.
+    /// Records `work` as a named stage: labelled for debuggers, and timed while timestamp slots are left.
     pub fn stage<T>(&mut self, name: &str, work: impl FnOnce(&mut Self) -> Result<T>) -> Result<T> {
         if self.is_rehearsal() {
             return work(self);
         }
         if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(format!("olbvh.{name}"))) {
-            // SAFETY: labels are balanced by the end below.
+            // SAFETY: the label is ended below.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }
         let begin = self.timestamp(vk::PipelineStageFlags::TOP_OF_PIPE);
@@ -259,16 +279,17 @@ impl<'a> Recorder<'a> {
             self.stages.push((name.to_string(), begin, end));
         }
         if let Some(debug) = self.gpu.debug_device() {
-            // SAFETY: balances the begin above.
+            // SAFETY: ends the label begun above.
             unsafe { debug.cmd_end_debug_utils_label(self.commands) };
         }
         result
     }
 
-    /// Ends the recording's checks.
+    /// Ends the recording and reports the result of its checks.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names two dispatches that need a barrier between them.
+    /// [`Error::Invalid`] with two commands that need a barrier between them, or a copy that does not fit its
+    /// destination.
     pub fn finish(&mut self) -> Result<()> {
         self.hazard.take().map_or(Ok(()), |h| Err(Error::Invalid(h)))
     }
@@ -292,7 +313,7 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Notes the uses of one command and looks for earlier ones that they must not overlap.
+    /// Notes the ranges that one command uses, and checks them for conflicts with earlier commands.
     pub(super) fn touch(&mut self, ranges: &[(BufferRef, bool)], by: &'static str) {
         let before = self.uses.len();
         for &(range, writes) in ranges {

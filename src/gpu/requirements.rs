@@ -1,98 +1,100 @@
-//! What a device must offer, told before a device exists.
+//! Requirements on a physical device, checked before a logical device is created.
 
 use crate::kernels::WorkgroupLimits;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
-/// The vendor's number.
+/// Vendor id of Intel.
 pub(super) const INTEL: u32 = 0x8086;
 
-/// Extensions that are not for tracing rays. A device that is no whole Vulkan, such as MoltenVK's, must be told that this is known.
+/// Extensions that are not for ray tracing. The second must be enabled on a device that does not implement all of
+/// Vulkan, such as MoltenVK's.
 const WITHOUT_RAYS: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
 
-/// How a device traces rays; a baseline uses that, nothing else does.
+/// Ways in which a device supports ray tracing; only a baseline uses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RayTracing {
-    /// From any shader (`VK_KHR_ray_query`).
+    /// Ray queries in any shader (`VK_KHR_ray_query`).
     pub queries: bool,
-    /// By pipelines of their own (`VK_KHR_ray_tracing_pipeline`).
+    /// Ray-tracing pipelines (`VK_KHR_ray_tracing_pipeline`).
     pub pipelines: bool,
 }
 
 impl RayTracing {
-    /// Either way.
+    /// Whether either is supported.
     pub fn any(self) -> bool {
         self.queries || self.pipelines
     }
 }
 
-/// What the engine needs of a physical device, checked against one.
+/// The requirements, checked against a physical device.
 #[derive(Clone, Debug)]
 pub struct Requirements {
-    /// What the device lacks; empty if it qualifies.
+    /// What the device lacks; empty if it meets the requirements.
     pub missing: Vec<String>,
-    /// Device extensions to enable: those preferred that the device has.
+    /// Device extensions to enable: the preferred ones that the device supports.
     pub extensions: Vec<&'static CStr>,
-    /// The device can pass buffers by address; without it, descriptors serve.
+    /// Whether buffers can be passed by address; otherwise descriptors are used.
     pub buffer_addresses: bool,
-    /// Kernels can compute with 64-bit integers; a driver for processors then reads cells and vertices in half as many loads.
+    /// Whether kernels can compute with 64-bit integers; a driver that runs on a processor then reads cells and
+    /// vertices in half as many loads.
     pub shader_int64: bool,
-    /// Subgroup sizes can be required per pipeline, and full subgroups.
+    /// Whether a pipeline can require a subgroup size and full subgroups.
     pub subgroup_size_control: bool,
-    /// Whether and how the device traces rays.
+    /// Ways in which the device supports ray tracing.
     pub ray_tracing: RayTracing,
     /// Smallest, usual and largest subgroup size.
     pub subgroup_sizes: [u32; 3],
-    /// Most subgroups of a workgroup where sizes are required.
+    /// Most subgroups of a workgroup if a subgroup size is required.
     pub(crate) workgroup_subgroups: u32,
     /// A queue family with compute, and the number of valid bits of its timestamps.
     pub queue_family: Option<(u32, u32)>,
 }
 
-/// A Vulkan device as the `devices` command lists it.
+/// A Vulkan device as listed by the `devices` command.
 #[derive(Clone, Debug)]
 pub struct DeviceReport {
-    /// Name as the driver gives it.
+    /// Name reported by the driver.
     pub name: String,
     /// Driver name and version.
     pub driver: String,
     /// Highest API version.
     pub api: String,
-    /// Version of API and driver, to prefer the newer of two drivers of one device.
+    /// Versions of API and driver, used to prefer the newer of two drivers for one device.
     pub(crate) version: [u32; 2],
-    /// Subgroup size.
+    /// Subgroup size that kernels are compiled for.
     pub subgroup: u32,
-    /// What a workgroup may have.
+    /// Limits of a workgroup.
     pub room: WorkgroupLimits,
-    /// The vendor by its number: a PCI one, or one that Khronos gave.
+    /// Vendor id: a PCI id, or one assigned by Khronos.
     pub vendor: u32,
-    /// The driver by its number, `VkDriverId`.
+    /// Driver id, `VkDriverId`.
     pub driver_id: i32,
     /// Kind: discrete, integrated, virtual, cpu, other.
     pub kind: &'static str,
     /// Bytes of the largest device-local heap.
     pub memory: u64,
-    /// The requirements.
+    /// The requirements, checked against the device.
     pub requirements: Requirements,
 }
 
-/// Fixed-size C string of a properties struct.
+/// Text of a fixed-size C string in a properties struct.
 pub(crate) fn text(chars: &[c_char]) -> String {
     let bytes: Vec<u8> = chars.iter().map(|&c| c as u8).take_while(|&b| b != 0).collect();
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// What of a device decides whether it qualifies.
+/// The properties of a device that decide whether it meets the requirements.
 struct Offer {
     api: u32,
     invocations: u32,
     shared_bytes: u32,
-    /// Operations in compute shaders.
+    /// Subgroup operations supported in compute shaders.
     subgroup: vk::SubgroupFeatureFlags,
     compute_queue: bool,
 }
 
-/// What an offer lacks, in words.
+/// The requirements that an offer lacks, in words.
 fn missing(offer: &Offer) -> Vec<String> {
     let mut missing = Vec::new();
     let (major, minor) = (vk::api_version_major(offer.api), vk::api_version_minor(offer.api));
@@ -122,26 +124,28 @@ fn missing(offer: &Offer) -> Vec<String> {
     missing
 }
 
-/// The subgroup size that kernels are compiled for: the usual one. Intel's is the largest, 32, which leaves a lane 32 or 64 words of registers, too few for
-/// the queries; where sizes can be required, half of it has twice as many.
+/// The subgroup size that kernels are compiled for: the usual one. Intel's usual size is the largest, 32, which leaves
+/// each lane 32 or 64 words of registers, too few for the queries. Where sizes can be required, half that size gives
+/// each lane twice as many.
 fn subgroup_of(vendor: u32, [least, usual, most]: [u32; 3], control: bool) -> u32 {
     let size = if vendor == INTEL && control { usual.min(16).clamp(least, most) } else { usual };
     size.max(1)
 }
 
 impl Requirements {
-    /// Device extensions to enable where no rays are to be traced, which only a baseline does.
+    /// Device extensions to enable where no rays are traced, which only a baseline does.
     pub fn extensions_without_rays(&self) -> impl Iterator<Item = &'static CStr> {
         self.extensions.iter().copied().filter(|e| WITHOUT_RAYS.contains(e))
     }
 
-    /// A driver may choose the size of subgroups.
+    /// Whether the driver may choose the size of subgroups.
     pub(super) fn sizes_vary(&self) -> bool {
         self.subgroup_sizes[0] != self.subgroup_sizes[2]
     }
 
-    /// Checks a physical device: Vulkan 1.2, a compute queue, subgroup basic, vote, arithmetic and ballot in compute, 256 invocations per
-    /// workgroup. Buffer addresses are preferred, subgroup size control is wanted where sizes vary, ray tracing is optional.
+    /// Checks a physical device. Required are Vulkan 1.2, a compute queue, basic, vote, arithmetic and ballot subgroup
+    /// operations in compute shaders, 256 invocations per workgroup, and 16 KiB of shared memory. Buffer addresses are
+    /// preferred, subgroup size control is wanted where sizes vary, and ray tracing is optional.
     pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
@@ -168,9 +172,10 @@ impl Requirements {
         let has = |name: &CStr| listed.iter().any(|e| e.extension_name_as_c_str() == Ok(name));
         let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default();
         let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
-        // A part of Vulkan 1.3, which a driver need not list any more.
+        // Part of Vulkan 1.3, so a driver of that version need not list the extension.
         let can_control = properties.api_version >= vk::API_VERSION_1_3 || has(ash::ext::subgroup_size_control::NAME);
-        // SAFETY: as above; the struct of size control is chained only where the device knows it.
+        // SAFETY: the handle is one of this instance; the structs live until the call returns, and the one of size
+        // control is chained only if the device knows it.
         let core = unsafe {
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut addresses);
             if can_control {
@@ -186,7 +191,7 @@ impl Requirements {
             pipelines: can_trace && has(ash::khr::ray_tracing_pipeline::NAME),
         };
         let ray_tracing = traces_rays(instance, device, listed_ways);
-        // Metal chooses sizes by itself: MoltenVK has the features, but no stage takes a size that is required.
+        // Metal chooses subgroup sizes itself: MoltenVK reports the features, but no stage accepts a required size.
         let can_require = control.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE);
         let subgroup_size_control =
             can_control && can_require && size_control.subgroup_size_control != 0 && size_control.compute_full_subgroups != 0;
@@ -219,7 +224,7 @@ impl Requirements {
     }
 }
 
-/// Which of the ways of tracing rays, whose extensions the device lists, have their features.
+/// The listed ways of ray tracing whose features are supported as well.
 fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: RayTracing) -> RayTracing {
     let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
@@ -234,19 +239,20 @@ fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: Ray
     if listed.pipelines {
         features = features.push_next(&mut pipelines);
     }
-    // SAFETY: the handle is one of this instance; the structs live until the call returns, and are chained only where the extension exists.
+    // SAFETY: the handle is one of this instance; the structs live until the call returns, and are chained only where
+    // the extension exists.
     unsafe { instance.get_physical_device_features2(device, &mut features) };
     let structures = structures.acceleration_structure != 0;
     RayTracing { queries: structures && queries.ray_query != 0, pipelines: structures && pipelines.ray_tracing_pipeline != 0 }
 }
 
 impl DeviceReport {
-    /// Reads a device's properties and checks it.
+    /// Reads a device's properties and checks its requirements.
     pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         Self::of(instance, device, Requirements::check(instance, device))
     }
 
-    /// Reads a device's properties, for use with what is left of the requirements.
+    /// Reads a device's properties, with requirements that were reduced to what is enabled.
     pub(super) fn of(instance: &ash::Instance, device: vk::PhysicalDevice, requirements: Requirements) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
         // SAFETY: the handle is one of this instance; the structs live until the calls return.
@@ -257,7 +263,7 @@ impl DeviceReport {
         };
         let (version, limits) = (properties.api_version, properties.limits);
         let subgroup = subgroup_of(properties.vendor_id, requirements.subgroup_sizes, requirements.subgroup_size_control);
-        // Kernels have room for the sums of 128 subgroups.
+        // The kernels' shared arrays hold the sums of at most 128 subgroups.
         let subgroups = requirements.workgroup_subgroups.min(128);
         let of_subgroups = subgroup.saturating_mul(subgroups);
         let invocations = limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]).min(of_subgroups);

@@ -1,4 +1,4 @@
-//! The convenient side: record, submit, wait; move bytes to the device and back.
+//! Submission for the owning calls: record, submit, wait, and copy bytes to the device and back.
 
 use super::buffer_ref::BufferRef;
 use super::context::Gpu;
@@ -9,12 +9,15 @@ use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
+use std::time::Duration;
 
-/// Bytes that one staging buffer holds; larger transfers go in several.
+/// Size of a staging buffer in bytes; larger transfers are split.
 const STAGING: u64 = 32 << 20;
-/// Where memory is limited, one part in so many is for transfers.
+/// Where memory is limited, a staging buffer takes one part in this many of the limit.
 const STAGING_SHARE: u64 = 16;
-/// Timestamps of one submission.
+/// How often a failed wait is retried, 10 ms apart.
+const WAITS: u32 = 1000;
+/// Most timestamps of one submission.
 const TIMESTAMPS: u32 = 256;
 
 /// Device time of a recorded stage.
@@ -22,26 +25,26 @@ const TIMESTAMPS: u32 = 256;
 pub struct StageTime {
     /// Name of the stage.
     pub name: String,
-    /// Milliseconds between the timestamps at its begin and end.
+    /// Milliseconds between the timestamps at its start and end.
     pub milliseconds: f64,
 }
 
 impl StageTime {
-    /// Milliseconds of these stages together.
+    /// Sum of the milliseconds of these stages.
     pub fn sum<'a>(stages: impl IntoIterator<Item = &'a Self>) -> f64 {
         stages.into_iter().map(|s| s.milliseconds).sum()
     }
 }
 
-/// How long the stages of a submission took.
+/// Device times of the stages of a submission.
 #[derive(Clone, Debug, Default)]
 pub struct StageTimes {
-    /// Stages in the order in which they ended; empty where the queue has no timestamps.
+    /// Stages in the order in which they ended; empty if the queue does not support timestamps.
     pub stages: Vec<StageTime>,
 }
 
 impl StageTimes {
-    /// Milliseconds of all stages of that name.
+    /// Sum of the milliseconds of all stages with this name.
     pub fn milliseconds(&self, name: &str) -> f64 {
         StageTime::sum(self.stages.iter().filter(|s| s.name == name))
     }
@@ -58,7 +61,7 @@ struct Submission<'a> {
 impl Drop for Submission<'_> {
     fn drop(&mut self) {
         let device = self.gpu.device();
-        // SAFETY: either never submitted, or waited for.
+        // SAFETY: the submission was never submitted, or has been waited for.
         unsafe {
             device.destroy_query_pool(self.queries, None);
             device.destroy_fence(self.fence, None);
@@ -68,24 +71,25 @@ impl Drop for Submission<'_> {
 }
 
 impl Gpu {
-    /// Records work, submits it, and waits until it is done.
+    /// Records work, submits it, and waits until it has been executed.
     ///
     /// # Safety
-    /// Of recorded buffers, what [`Recorder::new`] asks.
+    /// The requirements of [`Recorder::new`] on recorded buffers.
     ///
     /// # Errors
-    /// Those of `record`, a missing barrier, or a failed Vulkan call.
+    /// The errors of `record`, a missing barrier, or a failed Vulkan call.
     pub unsafe fn run<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
         self.submit(label, record)
     }
 
-    /// The same for work of this crate: its buffers are made for what is recorded, and live where `record` is written.
+    /// Runs work of this crate as [`Gpu::run`] does. It is safe because this crate makes the recorded buffers to fit,
+    /// and keeps them alive for the duration of the call.
     pub(crate) fn submit<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
         let device = self.device();
         let timed = self.timestamp_bits() > 0;
         let mut submission =
             Submission { gpu: self, pool: vk::CommandPool::null(), fence: vk::Fence::null(), queries: vk::QueryPool::null() };
-        // SAFETY: objects are made, used and destroyed here, in order; the queue is locked while it is submitted to.
+        // SAFETY: objects are made, used and destroyed here, in order; the queue is locked during the submission.
         unsafe {
             let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.family()).flags(vk::CommandPoolCreateFlags::TRANSIENT);
             submission.pool = device.create_command_pool(&info, None).map_err(failed("vkCreateCommandPool"))?;
@@ -102,7 +106,7 @@ impl Gpu {
             let mut recorder = Recorder::new(self, commands, timed.then_some((submission.queries, TIMESTAMPS)));
             let value = record(&mut recorder)?;
             recorder.finish()?;
-            // What the host reads next.
+            // Makes the results visible to the host.
             let barrier = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
                 .dst_access_mask(vk::AccessFlags::HOST_READ)];
@@ -112,21 +116,44 @@ impl Gpu {
             submission.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
             let buffers = [commands];
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
-            {
-                let queue = self.queue()?;
-                device.queue_submit(*queue, &submit, submission.fence).map_err(failed("vkQueueSubmit"))?;
-            }
-            device.wait_for_fences(&[submission.fence], true, u64::MAX).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
+            self.submit_to_queue(&submit, submission.fence)?;
+            self.wait(submission.fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
             let stages = if timed { self.read_timestamps(submission.queries, &recorder.stages)? } else { Vec::new() };
             Ok((value, StageTimes { stages }))
         }
+    }
+
+    /// Submits under the queue's lock.
+    fn submit_to_queue(&self, submit: &[vk::SubmitInfo<'_>], fence: vk::Fence) -> Result<()> {
+        let Some(queue) = self.host_queue() else {
+            return Err(Error::Invalid("the host lent no queue: only the cmd_* functions can be used".into()));
+        };
+        let mut result = Err(vk::Result::ERROR_UNKNOWN);
+        // SAFETY: the submitted commands and the fence belong to this device; the lock of the queue is held.
+        queue.locked(&mut |queue| result = unsafe { self.device().queue_submit(queue, submit, fence) });
+        result.map_err(failed("vkQueueSubmit"))
+    }
+
+    /// Waits for a submitted fence. When out of memory, a driver may stop waiting while the work still runs, and the
+    /// buffers in use must not be freed then.
+    fn wait(&self, fence: vk::Fence) -> std::result::Result<(), vk::Result> {
+        let mut result = Err(vk::Result::ERROR_UNKNOWN);
+        for _ in 0..WAITS {
+            // SAFETY: the fence belongs to this device, and was submitted.
+            result = unsafe { self.device().wait_for_fences(&[fence], true, u64::MAX) };
+            if matches!(result, Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST)) {
+                break;
+            }
+            std::thread::sleep(Duration::from_millis(10));
+        }
+        result
     }
 
     fn read_timestamps(&self, queries: vk::QueryPool, stages: &[(String, u32, u32)]) -> Result<Vec<StageTime>> {
         let used = stages.iter().map(|s| s.2 + 1).max().unwrap_or(0);
         let mut ticks = vec![0u64; used as usize];
         if used > 0 {
-            // SAFETY: the queries up to `used` were written by the submission that has ended.
+            // SAFETY: the queries below `used` were written by the submission, which has ended.
             let read = unsafe { self.device().get_query_pool_results(queries, 0, &mut ticks, vk::QueryResultFlags::TYPE_64) };
             read.map_err(failed("vkGetQueryPoolResults"))?;
         }
@@ -149,12 +176,12 @@ impl Gpu {
         Ok(buffer)
     }
 
-    /// Bytes that one staging buffer holds here.
+    /// Size of a staging buffer of this handle in bytes.
     fn staging_bytes(&self) -> u64 {
         self.ledger().map_or(STAGING, |ledger| (ledger.limit() / STAGING_SHARE).clamp(1 << 16, STAGING))
     }
 
-    /// Writes data to a buffer, from byte `at` on.
+    /// Writes data to a buffer, starting at byte `at`.
     pub(crate) fn write<T: Pod>(&self, buffer: &mut Buffer, at: u64, data: &[T]) -> Result<()> {
         let bytes: &[u8] = bytemuck::cast_slice(data);
         if let Some(mapped) = buffer.mapped_mut() {
@@ -175,13 +202,14 @@ impl Gpu {
         Ok(())
     }
 
-    /// Reads a part of a buffer back.
+    /// Reads back a part of a buffer.
+    /// Writes by a command buffer of the host must be available to `HOST_READ`: mapped memory is read without a copy.
     ///
     /// # Errors
     /// [`Error::Invalid`] for a part of another buffer, a failed Vulkan call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
-        if part.buffer != buffer.all().buffer {
-            return Err(Error::Invalid(format!("a part to be read of another buffer than {}", buffer.name())));
+        if part.buffer != buffer.all().buffer || !self.is_same_device(&buffer.gpu) {
+            return Err(Error::Invalid(format!("a part to be read of another buffer or device than {}", buffer.name())));
         }
         let count = part.size as usize / size_of::<T>();
         let mut data = vec![T::zeroed(); count];
@@ -195,7 +223,7 @@ impl Gpu {
         Ok(data)
     }
 
-    /// Reads a range of any buffer back through staging memory.
+    /// Reads back a range of any buffer through staging memory.
     pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
         let most = self.staging_bytes();
         let staging = Buffer::staging(self, "olbvh.download.staging", most.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
@@ -212,7 +240,7 @@ impl Gpu {
     }
 }
 
-/// Says which submission was lost.
+/// Adds the submission's label to an error.
 fn named(error: Error, label: &str) -> Error {
     match error {
         Error::Vulkan { call, result, hint } => Error::Vulkan { call, result, hint: format!(" in {label}{hint}") },

@@ -1,4 +1,4 @@
-//! The kernels' Rust side, generated from `glsl/` by `build.rs`, and how they are tuned per device.
+//! The kernels' Rust side, generated from `glsl/` by `build.rs`, and their tuning per device.
 
 use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
 
@@ -19,7 +19,7 @@ mod generated {
 }
 pub(crate) use generated::*;
 
-/// Every kernel's name with those of its buffers, for tests.
+/// Every kernel's name with the names of its buffers, for tests.
 #[doc(hidden)]
 pub fn interfaces() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {
     ALL.iter().map(|k| (k.name, k.buffers.iter().map(|b| b.name).collect()))

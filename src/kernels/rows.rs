@@ -1,9 +1,10 @@
 //! The table of targets: one row per kind of device.
 //!
-//! Only `cpu` has been measured here. The sorts of the vendors' rows are those of published sorts of the same kind (subgroup ballots, tiles of a
-//! workgroup): Fuchsia's `radix_sort`, which Mesa uses in its AMD driver to build acceleration structures, for NVIDIA, AMD, Intel and Arm; `GPUSorting` and
-//! the WebGPU sorts, which found 256 × 15 good on Apple as well. Workgroups of the other kernels follow from what a core holds: small ones where
-//! registers are few or subgroups narrow. `olbvh tune` finds out what is better on the device at hand.
+//! Only `cpu` has been measured here. The sort parameters of the vendors' rows come from published sorts of the same
+//! kind (subgroup ballots, one tile per workgroup): Fuchsia's `radix_sort`, which Mesa uses in its AMD driver to build
+//! acceleration structures, for NVIDIA, AMD, Intel and Arm; `GPUSorting` and the WebGPU sorts, which found 256 × 15
+//! good on Apple as well. Workgroup sizes of the other kernels follow from the resources of a core: small where
+//! registers are few or subgroups narrow. `olbvh tune` finds better parameters for the device at hand.
 
 use super::target::{SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::gpu::DeviceReport;
@@ -14,9 +15,9 @@ use std::borrow::Cow;
 /// A kind of device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum Row {
-    /// Anything else with narrow cores.
+    /// Any other device with narrow cores.
     Portable,
-    /// A processor: a workgroup is one loop over a wide vector.
+    /// A processor, which runs a workgroup as a loop over a wide vector.
     Cpu,
     /// NVIDIA.
     Nvidia,
@@ -47,15 +48,15 @@ named!(
     ]
 );
 
-/// One row as numbers; workgroups are rounded up to whole subgroups.
+/// The parameters of a row; workgroup sizes are rounded up to whole subgroups.
 struct Numbers {
-    /// Workgroup and items per invocation of scans.
+    /// Workgroup size, and items per invocation, of scans.
     scan: (u32, u32),
     spine: u32,
-    /// Serial, workgroup, pairs per invocation, bits per digit.
+    /// Whether the sort is serial, workgroup size, pairs per invocation, bits per digit.
     sort: (bool, u32, u32, u32),
     each: u32,
-    /// Workgroup and entries per invocation of runs.
+    /// Workgroup size, and entries per invocation, of kernels over runs of entries.
     run: (u32, u32),
     query: u32,
 }
@@ -65,7 +66,7 @@ impl Row {
     fn numbers(self) -> Numbers {
         let (cpu, simt) = (true, false);
         match self {
-            // Few, long tiles and no barriers.
+            // Few long tiles, and no barriers.
             Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 256),   query: 64 },
             Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256 },
             Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128 },
@@ -77,7 +78,7 @@ impl Row {
         }
     }
 
-    /// The row's target on a device with this room.
+    /// The row's target, fitted to a device with these limits.
     pub fn target(self, room: &WorkgroupLimits) -> Target {
         let Numbers { scan, spine, sort, each, run, query } = self.numbers();
         let tiles = |(workgroup, rows)| TileTarget { workgroup, rows };
@@ -86,13 +87,13 @@ impl Row {
         Target { name: Cow::Borrowed(self.name()), scan: tiles(scan), spine, sort, each, run: tiles(run), query }.fit(room)
     }
 
-    /// The row for a device: by its driver where that says more than the vendor, or else by the vendor.
+    /// The row for a device: by its driver where that is more specific than the vendor, otherwise by the vendor.
     pub fn of(device: &DeviceReport) -> Self {
         Self::choose(device.kind == "cpu", DriverId::from_raw(device.driver_id), device.vendor)
     }
 
     fn choose(processor: bool, driver: DriverId, vendor: u32) -> Self {
-        // Mesa's driver for Apple's GPUs, newer than the names that `ash` has.
+        // Mesa's driver for Apple's GPUs, which `ash` has no name for.
         const HONEYKRISP: DriverId = DriverId::from_raw(26);
         match (driver, vendor) {
             _ if processor => Self::Cpu,

@@ -1,14 +1,16 @@
-//! How kernels are shaped: what can be chosen per device, and within which limits. The choices are data, see [`super::Row`].
+//! Targets: the tuning parameters of the kernels that can be chosen per device, and their limits. The choices are in a
+//! table, see [`super::Row`].
 
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 
-/// Most iterations of a loop in a kernel, which the self-test runs: some drivers silently end longer ones.
+/// Most iterations of a loop in a kernel. The self-test runs a loop of this length, since some drivers silently end
+/// longer ones.
 pub(crate) const LONGEST_LOOP: u32 = 32_768;
-/// Shared memory of the portable floor, of which rows of the table leave an eighth to the driver.
+/// Shared memory that every supported device has; rows of the table leave an eighth of it to the driver.
 const SHARED_BYTES: u32 = 16 << 10;
 
-/// What a workgroup may have on a device.
+/// Limits of a workgroup on a device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct WorkgroupLimits {
     /// Subgroup size that pipelines are compiled for.
@@ -20,7 +22,7 @@ pub struct WorkgroupLimits {
 }
 
 impl WorkgroupLimits {
-    /// What every device has that qualifies.
+    /// The limits that every supported device has.
     pub fn least(subgroup: u32) -> Self {
         Self { subgroup, invocations: 256, shared_bytes: SHARED_BYTES }
     }
@@ -43,11 +45,12 @@ impl TileTarget {
     }
 }
 
-/// Which radix sort, and its tile.
+/// The variant of the radix sort, and its tile size.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct SortTarget {
-    /// `true`: every invocation owns a serial tile of `rows` pairs. `false`: a tile is a workgroup's, ranked by ballots.
+    /// `true`: every invocation sorts its own tile of `rows` pairs serially. `false`: a workgroup sorts a tile, with
+    /// ranks from ballots.
     pub serial: bool,
     /// Invocations per workgroup.
     pub workgroup: u32,
@@ -74,13 +77,14 @@ impl SortTarget {
         (passes, bits.div_ceil(passes).max(1))
     }
 
-    /// Shared memory: a table of digits per subgroup, and one for the workgroup.
+    /// Bytes of shared memory: a table of digits per subgroup, and one for the workgroup.
     fn shared_bytes(self, subgroup: u32) -> u32 {
         let tables = if self.serial { 0 } else { self.workgroup / subgroup.max(1) + 1 };
         (4 * tables) << self.digit_bits
     }
 
-    /// Iterations of its longest invocation: digits and pairs, or per row the bits of a digit and the digits of all subgroups.
+    /// Loop iterations of the busiest invocation: digits and pairs if serial; otherwise, per row, the bits of a digit
+    /// and the digits of all subgroups.
     fn iterations(self, subgroup: u32) -> u32 {
         let digits = 1u32 << self.digit_bits;
         if self.serial {
@@ -91,28 +95,29 @@ impl SortTarget {
     }
 }
 
-/// How the kernels are shaped for a device: every specialization constant that changes the time and not the result.
+/// The tuning parameters of the kernels for a device: every specialization constant that changes the time but not the
+/// result.
 #[derive(Clone, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct Target {
     /// Name in reports.
     pub name: Cow<'static, str>,
-    /// Scans: tiles.
+    /// Tiles of scans.
     pub scan: TileTarget,
-    /// Scans: invocations of the one workgroup that scans the sums of the tiles.
+    /// Invocations of the single workgroup that scans the sums of the tiles.
     pub spine: u32,
     /// Radix sort.
     pub sort: SortTarget,
     /// Invocations per workgroup of construction kernels with one item per invocation.
     pub each: u32,
-    /// Construction kernels in which an invocation passes a run of consecutive entries.
+    /// Construction kernels in which an invocation processes a run of consecutive entries.
     pub run: TileTarget,
     /// Invocations per workgroup of queries: location, ray intervals, march, slices, overlap.
     pub query: u32,
 }
 
 impl Target {
-    /// The nearest that a workgroup has room for: workgroups of whole subgroups, digits that fit shared memory.
+    /// The nearest target that fits the limits: workgroups of whole subgroups, and digits that fit shared memory.
     pub(super) fn fit(mut self, room: &WorkgroupLimits) -> Self {
         let subgroup = room.subgroup.max(1);
         let most = (room.invocations / subgroup * subgroup).max(subgroup);
@@ -127,10 +132,10 @@ impl Target {
         self
     }
 
-    /// Whether kernels of these shapes run on a device.
+    /// Checks that kernels with these parameters run on a device.
     ///
     /// # Errors
-    /// [`Error::Invalid`] that names the first choice that does not fit, and what would.
+    /// [`Error::Invalid`] with the first parameter that does not fit, and the allowed values.
     pub fn check(&self, room: &WorkgroupLimits) -> Result<()> {
         let WorkgroupLimits { subgroup, invocations, shared_bytes } = *room;
         let wrong = |what: &str| Err(Error::Invalid(format!("target `{}`: {what}", self.name)));
@@ -166,11 +171,11 @@ impl Target {
         Ok(())
     }
 
-    /// Whether problems of every size can be solved with these shapes: tables of counts are indexed by 32 bits, and the sums of all tiles are
-    /// scanned by one workgroup.
+    /// Checks that problems of every size can be solved with these parameters: tables of counts are indexed by 32 bits,
+    /// and one workgroup scans the sums of all tiles.
     ///
     /// # Errors
-    /// [`Error::Invalid`] that names the first choice that is too small.
+    /// [`Error::Invalid`] with the first parameter that is too small.
     pub fn check_scale(&self) -> Result<()> {
         let digits = 1u32 << self.sort.digit_bits.min(31);
         let least = [

@@ -1,4 +1,4 @@
-//! Small procedural meshes that have gone wrong somewhere, or could: for tests and the conformance suite.
+//! Small procedural meshes that are degenerate, invalid or otherwise difficult, for tests and the conformance suite.
 
 use super::{Mesh, kuhn_jittered};
 use crate::error::Result;
@@ -14,10 +14,10 @@ pub struct Case {
 
 const UNIT: [[f32; 3]; 4] = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
 
-/// All cases, always the same.
+/// All cases; every call returns the same ones.
 ///
 /// # Errors
-/// None; the signature is that of the Kuhn grids.
+/// Those of [`kuhn_jittered`], which do not occur for these sizes.
 pub fn cases() -> Result<Vec<Case>> {
     let mut cases = degenerate();
     cases.extend(pairs());
@@ -101,7 +101,7 @@ fn grids() -> Result<Vec<Case>> {
         }
         Case { name, mesh }
     };
-    // Overlapping tetrahedra of all sizes, by a small linear congruence.
+    // Overlapping tetrahedra of all sizes, from a linear congruential generator.
     let mut state = 1u32;
     let mut random = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -6,8 +6,8 @@ use crate::error::{Error, Result};
 /// The six paths from corner 0 to corner 7 of a cube along its edges; bit 0 of a corner is x, bit 1 y, bit 2 z.
 const PATHS: [[usize; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
-/// The Kuhn grid of `cells` unit cubes, six tetrahedra each, with the analytic point field `jet`. The paper's *Jets* is
-/// `kuhn([127; 3])`, its *Bar* has as many cells as `kuhn([32, 32, 80])`.
+/// The Kuhn grid of `cells` unit cubes, with six tetrahedra each and the analytic point field `jet`. The paper's *Jets*
+/// is `kuhn([127; 3])`; its *Bar* has as many tetrahedra as `kuhn([32, 32, 80])`.
 ///
 /// # Errors
 /// [`Error::Invalid`] if an axis has no cell, [`Error::TooLarge`] if points or tetrahedra do not fit 32-bit indices.
@@ -15,11 +15,11 @@ pub fn kuhn(cells: [u32; 3]) -> Result<Mesh> {
     kuhn_jittered(cells, 0.0, 0)
 }
 
-/// As [`kuhn`], with every vertex that is not on the surface moved by up to `jitter` cells along each axis (below 0.5 the cubes stay
-/// in order, though single tetrahedra may turn over), reproducibly for a `seed`.
+/// The grid of [`kuhn`], with every inner vertex moved by up to `jitter` cube edges along each axis, reproducibly for a
+/// `seed`. Below 0.5 the cubes stay in order, though single tetrahedra may be inverted.
 ///
 /// # Errors
-/// As [`kuhn`].
+/// Those of [`kuhn`].
 pub fn kuhn_jittered(cells: [u32; 3], jitter: f32, seed: u32) -> Result<Mesh> {
     if cells.contains(&0) {
         return Err(Error::Invalid(format!("a Kuhn grid needs at least one cell per axis, not {cells:?}")));
@@ -65,7 +65,7 @@ pub fn kuhn_jittered(cells: [u32; 3], jitter: f32, seed: u32) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// A jet along x that widens and rolls up in vortices; in 0…1.
+/// A jet along x that widens and rolls up in vortices; values are in 0…1.
 fn jet_value(p: [f32; 3], cells: [u32; 3]) -> f32 {
     let [x, y, z] = [0, 1, 2].map(|c| p[c] / cells[c] as f32);
     let (dy, dz) = (y - 0.5 - 0.06 * (9.0 * x).sin() * x, z - 0.5 - 0.06 * (11.0 * x + 1.0).cos() * x);
@@ -76,7 +76,7 @@ fn jet_value(p: [f32; 3], cells: [u32; 3]) -> f32 {
     ((-radius * radius).exp() * (1.0 - 0.35 * x) + roll).clamp(0.0, 1.0)
 }
 
-/// A well-mixed 32-bit permutation (Wellons' lowbias32 construction).
+/// A well-mixing 32-bit permutation (Wellons' lowbias32).
 pub(crate) fn hash(mut h: u32) -> u32 {
     h ^= h >> 16;
     h = h.wrapping_mul(0x7feb_352d);

@@ -1,4 +1,4 @@
-//! Tetrahedral meshes in host memory: points, cells and scalar fields. Knows no Vulkan.
+//! Tetrahedral meshes in host memory: points, tetrahedra and scalar fields. Does not depend on Vulkan.
 
 pub mod cases;
 mod kuhn;
@@ -14,32 +14,33 @@ use crate::error::{Error, Result};
 pub struct Mesh {
     /// Vertex positions, relative to [`Mesh::origin`].
     pub points: Vec<[f32; 3]>,
-    /// Four indices into [`Mesh::points`] per tetrahedron; the order of the four, that is the sign of the cell, means nothing.
+    /// Four indices into [`Mesh::points`] per tetrahedron. Their order, and so the sign of the volume, has no meaning.
     pub tets: Vec<[u32; 4]>,
-    /// For each tetrahedron the id of the cell it came from (cells of a file count from 0, all types included; a hexahedron becomes several
-    /// tetrahedra with one id). `None`: tetrahedron `i` is cell `i`.
+    /// For each tetrahedron the id of the file cell it came from. File cells of all types are counted from 0; a
+    /// hexahedron becomes several tetrahedra with the same id. `None`: tetrahedron `i` is file cell `i`.
     pub cell_ids: Option<Vec<u32>>,
-    /// For each point its number in the source, where the order is another one. `None`: point `i` is point `i`.
+    /// For each point its number in the source, if the order differs. `None`: point `i` is point `i` of the source.
     pub point_ids: Option<Vec<u32>>,
-    /// Number of cells of the source, those that are no tetrahedra included; equals `tets.len()` without `cell_ids`.
+    /// Number of file cells, including those that have no tetrahedra; equals `tets.len()` without `cell_ids`.
     pub source_cells: u32,
     /// Scalar fields.
     pub fields: Vec<Field>,
-    /// Add this to a point to get the coordinates of the source. Zero unless single precision would have lost the shape (a small mesh far from 0).
+    /// The offset to add to a point to get the coordinates of the source. Zero unless single precision would have lost
+    /// the shape, as for a small mesh far from 0.
     pub origin: [f64; 3],
 }
 
-/// What a field's values belong to.
+/// Whether a field's values belong to points or tetrahedra.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum On {
-    /// One value per point, interpolated linearly in a cell.
+    /// One value per point, interpolated linearly in a tetrahedron.
     Points,
     /// One value per tetrahedron, constant in it.
     Cells,
 }
 
 impl On {
-    /// Refuses values that are not as many as a mesh has points, or tetrahedra.
+    /// Rejects values whose number differs from the mesh's number of points, or tetrahedra.
     pub(crate) fn check(self, values: &[f32], [points, tets]: [usize; 2]) -> Result<()> {
         let expected = if self == Self::Points { points } else { tets };
         if values.len() == expected {
@@ -55,14 +56,14 @@ impl On {
 pub struct Field {
     /// Name, as in the source.
     pub name: String,
-    /// Points or cells.
+    /// Whether the values belong to points or tetrahedra.
     pub on: On,
     /// One value per point or per tetrahedron of the mesh.
     pub values: Vec<f32>,
 }
 
 impl Field {
-    /// Smallest and largest finite value; `None` if there is none.
+    /// Smallest and largest finite value; `None` if no value is finite.
     pub fn range(&self) -> Option<[f32; 2]> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
         finite.fold(None, |range, v| match range {
@@ -73,23 +74,23 @@ impl Field {
 }
 
 impl Mesh {
-    /// A mesh from points and cells, without fields.
+    /// A mesh from points and tetrahedra, without fields.
     pub fn new(points: Vec<[f32; 3]>, tets: Vec<[u32; 4]>) -> Self {
         let source_cells = tets.len() as u32;
         Self { points, tets, source_cells, ..Self::default() }
     }
 
-    /// The id that the source gave the cell of tetrahedron `tet`.
+    /// The id of the file cell that tetrahedron `tet` came from.
     pub fn cell_id(&self, tet: u32) -> u32 {
         self.cell_ids.as_ref().map_or(tet, |ids| ids[tet as usize])
     }
 
-    /// The number that the source gave a point.
+    /// The number of a point in the source.
     pub fn point_id(&self, point: u32) -> u32 {
         self.point_ids.as_ref().map_or(point, |ids| ids[point as usize])
     }
 
-    /// The field of that name.
+    /// The field with this name.
     pub fn field(&self, name: &str) -> Option<&Field> {
         self.fields.iter().find(|f| f.name == name)
     }

@@ -1,17 +1,18 @@
-//! Procedural meshes of the kinds that are hard on a structure: cells of very different size, thin walls, bad shapes.
+//! Procedural meshes that are hard on a spatial data structure: tetrahedra of very different size, thin walls, bad
+//! shapes.
 
 use super::{Mesh, kuhn_jittered};
 use crate::error::{Error, Result};
 
-/// How much wider the last cells of [`graded`] are than the first, per axis.
+/// Ratio of the widths of the last and the first cubes of [`graded`], per axis.
 const GRADE: f32 = 100.0;
-/// Layers of cells in the wall of [`shell`].
+/// Layers of cubes in the wall of [`shell`].
 const LAYERS: u32 = 4;
 
-/// A unit cube of 6·n³ tetrahedra that grow from one corner to the opposite one: a volume ratio of some 10^6.
+/// A unit cube of 6·n³ tetrahedra that grow from one corner to the opposite one, with volume ratios of some 10^6.
 ///
 /// # Errors
-/// As [`super::kuhn`].
+/// Those of [`super::kuhn`].
 pub fn graded(n: u32) -> Result<Mesh> {
     let mut mesh = kuhn_jittered([n; 3], 0.2, 2)?;
     for x in mesh.points.iter_mut().flatten() {
@@ -20,10 +21,10 @@ pub fn graded(n: u32) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// A plate of 6·n³ squeezed and sheared tetrahedra, n × n × 0.06 n units: flat cells, some of them nearly without volume.
+/// A plate of 6·n³ squeezed and sheared tetrahedra, n × n × 0.06 n units: flat, and some of them nearly without volume.
 ///
 /// # Errors
-/// As [`super::kuhn`].
+/// Those of [`super::kuhn`].
 pub fn slivers(n: u32) -> Result<Mesh> {
     let mut mesh = kuhn_jittered([n; 3], 0.2, 3)?;
     for [x, y, z] in &mut mesh.points {
@@ -33,17 +34,17 @@ pub fn slivers(n: u32) -> Result<Mesh> {
     Ok(mesh)
 }
 
-/// A closed tube, bent to a ring, with a wall of four layers: 12·n² tetrahedra (n even), most of the bounds is empty.
+/// A closed tube, bent to a ring, with a wall of four layers: 12·n² tetrahedra for even n. Most of its bounds is empty.
 ///
 /// # Errors
-/// [`Error::Invalid`] below 8 cells around the ring, otherwise as [`super::kuhn`].
+/// [`Error::Invalid`] for fewer than 8 cubes around the ring, otherwise those of [`super::kuhn`].
 pub fn shell(n: u32) -> Result<Mesh> {
     if n < 8 {
         return Err(Error::Invalid(format!("a shell of {n} cells around; it needs 8")));
     }
     let size = [n, n / 2, LAYERS];
     let grid = kuhn_jittered(size, 0.0, 0)?;
-    // The grid's first and last points along the ring and around the tube become one.
+    // The grid's first and last points along the ring and around the tube are merged.
     let row = n + 1;
     let wrapped = |v: u32| (v % row % n) + n * ((v / row) % (n / 2 + 1) % (n / 2)) + n * (n / 2) * (v / row / (n / 2 + 1));
     let mut mesh = Mesh::new(vec![[0.0; 3]; (n * (n / 2) * (LAYERS + 1)) as usize], grid.tets);
@@ -55,7 +56,7 @@ pub fn shell(n: u32) -> Result<Mesh> {
         let radius = 0.36 + 0.04 * z / LAYERS as f32;
         let from_axis = 1.0 + radius * across.cos();
         let at = wrapped(v) as usize;
-        // Of points that became one, the first.
+        // Among merged points the first one counts.
         if mesh.points[at] == [0.0; 3] {
             mesh.points[at] = [from_axis * around.cos(), from_axis * around.sin(), radius * across.sin()];
             values[at] = field.as_ref().map_or(0.0, |f| f.values[v as usize]);

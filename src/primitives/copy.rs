@@ -1,13 +1,14 @@
-//! A copy by a kernel, to know how fast the device moves bytes.
+//! A copy by a kernel, to measure the device's memory bandwidth.
 
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{CopyVectors, CopyVectorsSpec};
 
-/// Vectors per invocation: enough loads in flight, few enough for a short last tile.
+/// Vectors per invocation: enough loads in flight, and few enough for a short last tile.
 const ROWS: u32 = 8;
 
-/// Copies `from` to `to`, both at multiples of 16 and of as many bytes, a multiple of 16 below 2^32 vectors. No barrier before or after.
+/// Copies `from` to `to`. Both lie at multiples of 16 bytes and have the same size, a multiple of 16 and below 2^32
+/// vectors. No barrier before or after.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.

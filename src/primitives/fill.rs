@@ -1,13 +1,15 @@
-//! A fill by a kernel. Drivers for processors do that of a transfer on one core, which shows where memory is touched for the first time.
+//! A fill by a kernel. Drivers for processors perform a transfer's fill on one core, which is slow where memory is
+//! touched for the first time.
 
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{Fill, FillSpec};
 
-/// Words per invocation: enough stores in flight, few enough for a short last tile.
+/// Words per invocation: enough stores in flight, and few enough for a short last tile.
 const ROWS: u32 = 16;
 
-/// Sets every word of `range` to `value`: for large ranges, below 2^32 words; [`Recorder::fill`] is for the rest. No barrier before or after.
+/// Sets every word of `range`, below 2^32 words, to `value`. For large ranges; [`Recorder::fill`] is for others. No
+/// barrier before or after.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.

@@ -20,14 +20,14 @@ use crate::error::{Error, Result};
 use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{DispatchArgs, DispatchArgsSpec};
 
-/// Number of items: an upper limit known to the host, and where given the true number in a word of device memory.
+/// A number of items: an upper limit known to the host, and optionally the true number in a word of device memory.
 #[derive(Clone, Copy, Debug)]
 pub struct Count {
-    /// No more items than this are touched, whatever the device says.
+    /// No more items than this are accessed, whatever the word holds.
     pub max: u32,
     /// The word with the true number.
     pub live: Option<BufferRef>,
-    /// Items of these that dispatches over them leave out.
+    /// Number of leading items that dispatches leave out.
     pub skip: u32,
 }
 
@@ -42,26 +42,26 @@ impl Count {
         Self { max, live: Some(live), skip: 0 }
     }
 
-    /// All but `skip` of them.
+    /// The items after the first `skip`.
     #[must_use]
     pub(crate) fn behind(self, skip: u32) -> Self {
         Self { skip, ..self }
     }
 
-    /// The word that kernels read.
+    /// The word that kernels read the number from.
     pub(crate) fn word(&self, gpu: &Gpu) -> BufferRef {
         self.live.unwrap_or_else(|| gpu.unbounded())
     }
 
-    /// Workgroups for `per_group` items each, behind a barrier with this label. Where the device knows the number, `arguments` (12 bytes)
-    /// receives them first, from a number that must be visible before.
+    /// Workgroups for `per_group` items each, followed by a barrier with this label. If the number is in device memory,
+    /// a kernel first writes the workgroups to `arguments` (12 bytes); the number must be visible before.
     pub(crate) fn groups(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef, label: &'static str) -> Result<Groups> {
         let groups = self.arguments(r, per_group, arguments)?;
         r.barrier(label);
         Ok(groups)
     }
 
-    /// As [`Count::groups`], and leaves the barrier to the caller.
+    /// Workgroups as [`Count::groups`] gives them; the caller records the barrier.
     pub(crate) fn arguments(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef) -> Result<Groups> {
         let Some(live) = self.live else { return Ok(Groups::Count(self.max.saturating_sub(self.skip).div_ceil(per_group))) };
         let words = arguments.part(0, 12);
@@ -71,7 +71,7 @@ impl Count {
     }
 }
 
-/// Hands out aligned parts of a buffer; without a buffer it only measures how many bytes are wanted.
+/// Hands out aligned parts of a buffer. Without a buffer it only measures the bytes needed.
 #[derive(Debug)]
 pub struct Arena {
     memory: Option<BufferRef>,
@@ -79,7 +79,7 @@ pub struct Arena {
 }
 
 impl Arena {
-    /// Parts of this memory.
+    /// An arena over this memory.
     pub fn new(memory: BufferRef) -> Self {
         Self { memory: Some(memory), used: 0 }
     }
@@ -91,10 +91,10 @@ impl Arena {
         Ok(arena.used)
     }
 
-    /// The next `bytes` bytes, aligned for every use.
+    /// Takes the next `bytes` bytes, aligned for every use.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the memory is too small, or lies in its buffer where parts cannot begin.
+    /// [`Error::Invalid`] if the memory is too small, or its offset in its buffer is not a multiple of [`ALIGNMENT`].
     pub fn take(&mut self, bytes: u64) -> Result<BufferRef> {
         let begin = self.used;
         self.used = (begin + bytes.max(16)).next_multiple_of(ALIGNMENT);
@@ -108,10 +108,10 @@ impl Arena {
         }
     }
 
-    /// The next `n` words.
+    /// Takes the next `n` words.
     ///
     /// # Errors
-    /// As [`Arena::take`].
+    /// Those of [`Arena::take`].
     pub fn words(&mut self, n: u64) -> Result<BufferRef> {
         self.take(4 * n)
     }

@@ -13,7 +13,7 @@ pub struct ScanScratch {
 }
 
 impl ScanScratch {
-    /// For up to `max` values.
+    /// Takes the scratch memory for up to `max` values.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -23,9 +23,11 @@ impl ScanScratch {
     }
 }
 
-/// Writes to `scanned[i]` the sum of `values[..i]` (modulo 2^32) and to the word `total` the sum of all. `scanned` may be `values`.
+/// Writes the sum of `values[..i]` (modulo 2^32) to `scanned[i]`, and the sum of all to the word `total`. `scanned` may
+/// be `values`.
 ///
-/// Begins with a barrier, so `values` need none before; a count in device memory must be visible already. Ends without one.
+/// Starts with a barrier, so `values` need none before. A count in device memory must be visible before. Ends without a
+/// barrier.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -40,12 +42,16 @@ pub fn cmd_exclusive_scan(
     let (live, target, spine) = (count.word(r.gpu()), r.gpu().target().scan, r.gpu().target().spine);
     let (workgroup, rows, sums) = (target.workgroup, target.rows, scratch.sums);
     let groups = count.groups(r, target.tile(), scratch.arguments, "values → scan.tiles")?;
-    // 1 — tiles: sum of each · 2 — spine: one workgroup scans the sums · 3 — apply: each tile again, from its sum.
+    // 1 (tiles): sum of each tile. 2 (spine): one workgroup scans the sums. 3 (apply): scans each tile from its sum on.
     r.dispatch(&ScanTiles { live, values, sums, count: count.max }, ScanTilesSpec { workgroup, rows }, groups)?;
     r.barrier("scan.tiles → scan.spine");
     let all = ScanSpine { live, sums, total, count: count.max, tile: target.tile() };
-    // One workgroup for all tiles: wide, so that no invocation loops for long.
+    // One workgroup for all tiles, wide enough to keep each invocation's loop short.
     r.dispatch(&all, ScanSpineSpec { workgroup: spine, rows }, Groups::Count(1))?;
     r.barrier("scan.spine → scan.apply");
-    r.dispatch(&ScanApply { live, sums, values, scanned, count: count.max }, ScanApplySpec { workgroup, rows }, groups)
+    r.dispatch(
+        &ScanApply { live, sums, values, scanned, count: count.max },
+        ScanApplySpec { workgroup, rows, in_place: u32::from(values == scanned) },
+        groups,
+    )
 }

@@ -1,11 +1,11 @@
-//! Known answers that a device must give before it is trusted (a few milliseconds).
+//! The self-test: computations with known answers that a device must pass before it is used (a few milliseconds).
 
 use super::{Arena, Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Groups};
 use crate::kernels::{LONGEST_LOOP, SelfTest, SelfTestSpec};
 
-/// Pairs of the sort, values of the scan: some tiles and a ragged end.
+/// Pairs to sort and values to scan: several tiles, the last one partial.
 const ITEMS: u32 = 9_001;
 
 fn wrong(device: &str, test: &'static str, at: usize, expected: u32, found: u32) -> Error {
@@ -19,7 +19,7 @@ fn compare(device: &str, test: &'static str, expected: &[u32], found: &[u32]) ->
     }
 }
 
-/// Runs the tests; the first wrong value is the error.
+/// Runs the tests; the error describes the first wrong value.
 pub(crate) fn self_test(gpu: &Gpu) -> Result<()> {
     let device = gpu.report().name.as_str();
     let keys: Vec<u32> = (0..ITEMS).map(|i| i.wrapping_mul(2_654_435_761) >> 19).collect();

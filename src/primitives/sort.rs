@@ -1,7 +1,7 @@
-//! Stable radix sort of u32 keys with u32 values, least significant digit first, over the low bits of the keys only.
+//! Stable radix sort of u32 keys with u32 values, least significant digit first, by the low bits of the keys only.
 
 use super::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{
     SortHistogramBallot, SortHistogramBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
@@ -21,15 +21,22 @@ pub struct SortScratch {
 }
 
 impl SortScratch {
-    /// For up to `max` pairs with keys of up to `bits` bits: a copy of the pairs, and the tables of counts.
+    /// Takes the scratch memory for up to `max` pairs with keys of up to `bits` bits: a copy of the pairs, and the
+    /// tables of counts.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`crate::Error::Invalid`] if the arena is too small, [`crate::Error::TooLarge`] for more counts than shaders can
+    /// number.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, max: u32, bits: u32) -> Result<Self> {
         let target = gpu.target().sort;
-        // Fewer bits may mean wider digits, so every width up to `bits` counts.
+        // Fewer bits may need wider digits, so every number of bits up to `bits` is considered.
         let widest = (1..=bits.max(1)).map(|b| target.passes(b).1).max().unwrap_or(1);
         let table = (u64::from(max.div_ceil(target.tile())) | 1) << widest;
+        if table > i32::MAX as u64 {
+            let message =
+                format!("{max} pairs in tiles of {}; shaders number {} counts at most: larger tiles make fewer", target.tile(), i32::MAX);
+            return Err(Error::TooLarge(message));
+        }
         Ok(Self {
             keys: arena.words(u64::from(max))?,
             values: arena.words(u64::from(max))?,
@@ -42,10 +49,12 @@ impl SortScratch {
     }
 }
 
-/// Sorts `keys` and `values` in place by the low `bits` bits of the keys; pairs with equal keys keep their order. What lies behind the true
-/// number of pairs, up to `count.max`, is left undefined.
+/// Sorts `keys` and `values` in place by the low `bits` bits of the keys; pairs with equal keys keep their order. The
+/// contents after the true number of pairs, up to `count.max`, become undefined.
 ///
-/// Begins with a barrier, so `keys` and `values` need none before; a count in device memory must be visible already. Ends without one.
+/// Starts with a barrier, so `keys` and `values` need none before, unless there is nothing to sort (fewer than two
+/// pairs, or no bits). A count in device memory must be visible before. Ends without a barrier; the last writes are
+/// those of compute shaders or, after an odd number of passes, transfers.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -63,7 +72,7 @@ pub fn cmd_sort_pairs(
     let (gpu, target) = (r.gpu(), r.gpu().target().sort);
     let (live, (passes, digit_bits)) = (count.word(gpu), target.passes(bits));
     let groups = if count.live.is_some() {
-        // Plan: how many tiles there are, hence how long the table of counts is.
+        // Plan: the number of tiles, and from it the length of the table of counts.
         let plan = SortPlan {
             live,
             groups: scratch.arguments,
@@ -85,7 +94,7 @@ pub fn cmd_sort_pairs(
     let (mut from, mut to) = ((keys, values), (scratch.keys, scratch.values));
     for pass in 0..passes {
         r.barrier("keys → sort.histogram");
-        // 1 — histogram: counts[digit][tile] · 2 — scan: places · 3 — scatter.
+        // 1 (histogram): counts[digit][tile]. 2 (scan): places. 3 (scatter): moves the pairs.
         let shift = pass * digit_bits;
         let mask = (1 << digit_bits.min(bits - shift)) - 1;
         let (counts, n) = (scratch.table, count.max);

@@ -1,29 +1,30 @@
-//! Every tetrahedron that contains a point (SPEC 3.1): counted, then written within what memory there is.
+//! Every tetrahedron that contains a point (SPEC 3.1): counted first, then written into the memory available.
 
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
-use super::{Scene, list_parts};
+use super::{Scene, capacity_of, list_parts};
 use crate::build::{DeviceMesh, Tree};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::reference::locate::CHUNK;
 
-/// Answers and scratch memory of all owners: 28 bytes per point, and what a scan takes.
+/// Answers and scratch memory for all owners: 28 bytes per point, and the scratch memory of a scan.
 #[derive(Clone, Copy, Debug)]
 pub struct OwnersMemory {
     /// The owner of each point and its barycentric coordinates, as [`cmd_locate`] writes them.
     pub located: LocateOutput,
-    /// A word per point: where its owners end; they begin where those of the point before end, the first at 0.
+    /// One word per point: after [`cmd_list_owners`], the end of its owners in `found`. They start where those of the
+    /// point before end; the first point's start at 0.
     pub ends: BufferRef,
-    /// A word: how many owners all points have together, whether or not there was room for them.
+    /// One word: the number of owners of all points together, whether or not there was room for them.
     pub total: BufferRef,
     counts: BufferRef,
     scan: ScanScratch,
 }
 
 impl OwnersMemory {
-    /// For `count` points.
+    /// Carves the memory for `count` points.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -39,11 +40,12 @@ impl OwnersMemory {
     }
 }
 
-/// Records how many tetrahedra contain each point: the owner alone where none does, if there is one. Nothing is submitted, waited for, allocated or
-/// read back; [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete behind it.
+/// Records how many tetrahedra contain each point. A point that no tetrahedron contains counts its owner within the
+/// tolerance, if there is one. This call only records: nothing is submitted, waited for, allocated or read back.
+/// [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete once these commands have been executed.
 ///
-/// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier
-/// before or after.
+/// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: transfer writes. Last use: compute
+/// reads and writes; no barrier before or after.
 ///
 /// # Errors
 /// As [`cmd_locate`].
@@ -61,10 +63,11 @@ pub fn cmd_count_owners(
     cmd_exclusive_scan(r, memory.counts, memory.ends, memory.total, Count::host(input.count), &memory.scan)
 }
 
-/// Records the owners themselves, behind [`cmd_count_owners`] with the same points: a word each in `found`, those of a point ascending, point by
-/// point. As many are written as `found` holds; [`OwnersMemory::ends`] and [`OwnersMemory::total`] are right in any case.
+/// Records the owners themselves, after [`cmd_count_owners`] with the same points: one word each in `found`, point by
+/// point, ascending within a point. As many are written as `found` holds; [`OwnersMemory::ends`] and
+/// [`OwnersMemory::total`] are right in any case.
 ///
-/// Begins with a barrier. Last use: compute reads and writes; no barrier after.
+/// Starts with a barrier. Last use: compute reads and writes; no barrier after.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if the pipeline cannot be made.
@@ -73,7 +76,7 @@ pub fn cmd_list_owners(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, 
     cmd_walk_lists(r, scene, input, memory, Some(found))
 }
 
-/// Walks the lists in parts: counts, or writes to `found`.
+/// Searches the lists part by part, and either counts owners or writes them to `found`.
 fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memory: &OwnersMemory, found: Option<BufferRef>) -> Result<()> {
     let (tree, mesh) = (&scene.tree, &scene.mesh);
     let workgroup = r.gpu().target().query;
@@ -104,7 +107,7 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
                 count: input.count,
                 stride: input.stride,
                 part,
-                capacity: u32::try_from(found.size / 4).unwrap_or(u32::MAX),
+                capacity: capacity_of(found, 4),
             };
             r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup)))?;
         }
@@ -112,10 +115,11 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
     })
 }
 
-/// Every tetrahedron that contains each point, ascending; where none does, the owner alone, if there is one within the tolerance.
+/// Every tetrahedron that contains each point, ascending; for a point that none contains, the owner within the
+/// tolerance alone, if there is one.
 ///
 /// # Errors
-/// As [`super::locate`].
+/// As [`super::locate`]; and [`Error::TooLarge`] for 2^31 owners and more in one chunk of points.
 pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: &dyn Fn(u64, u64)) -> Result<Vec<Vec<u32>>> {
     let gpu = tree.gpu();
     let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
@@ -129,6 +133,12 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
         let memory = carve(&mut Arena::new(buffer.all()))?;
         gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
         let total = gpu.download::<u32>(&buffer, memory.total.part(0, 4))?.first().copied().unwrap_or(0);
+        if total > i32::MAX.cast_unsigned() {
+            return Err(Error::TooLarge(format!(
+                "{total} owners of {count} points; shaders number {} at most: ask for fewer points",
+                i32::MAX
+            )));
+        }
         let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
         gpu.submit("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
         let ends: Vec<u32> = gpu.download(&buffer, memory.ends.part(0, 4 * u64::from(count)))?;

@@ -1,4 +1,4 @@
-//! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, values of fields.
+//! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, and values of fields there.
 
 use super::order::{PointOrder, cmd_sort_points};
 use super::{Scene, list_parts};
@@ -9,28 +9,37 @@ use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, Lo
 use crate::mesh::On;
 use crate::options::{POINT_RUN, TOLERANCE};
 use crate::primitives::Arena;
+use crate::reference::grid::MAX_LEVEL;
 use crate::reference::locate::CHUNK;
 
-/// How the leaf of a point is found.
+/// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
+const MAX_STACK: u32 = 7 * MAX_LEVEL + 1;
+
+/// How the owner of a point is searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Path {
-    /// By descent over child masks.
+    /// Finds the point's leaf by descent over child masks.
     #[default]
     Descent,
-    /// By runs of [`POINT_RUN`] points, each looked for first around the owner of the one before, up to a few cells away; where it is not there, by descent. For
-    /// points of which each is near to the one before. In a mesh whose cells do not overlap, the owners are those of [`Path::Descent`].
+    /// Takes points in runs of [`POINT_RUN`]. Each point is first searched for around the owner of the one before it,
+    /// up to a few tetrahedra away, and found by descent if it is not there. Suits points that are each near the one
+    /// before. In a mesh whose tetrahedra do not overlap, the owners are those of [`Path::Descent`].
     Runs,
-    /// The same along [`PointInput::order`], such as that of [`super::cmd_sort_points`]; [`locate`] makes it itself. For points in no order.
+    /// As [`Path::Runs`], but in the order given by [`PointInput::order`], for example that of
+    /// [`super::cmd_sort_points`]; [`locate`] computes this order itself. Suits points in no particular order.
     Sorted,
-    /// By the paper's traversal with a short stack of that many nodes (at least 1); lists beyond 32,000 entries are cut.
+    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (brought into 1…71). Only the
+    /// first 32,000 entries of a list are searched.
+    /// 71. Only the first 32,000 entries of a list are searched.
     Traversal(u32),
 }
 
 impl Path {
-    /// The fastest for so many points in a tree with seeds over so many tetrahedra ([`crate::options::Lists::Boundary`]); `in_order`: each point lies near
-    /// the one before.
+    /// The fastest path for this many points in a tree with seeds ([`crate::options::Lists::Boundary`]) over this many
+    /// tetrahedra. `in_order` states that each point lies near the one before it.
     ///
-    /// Looking round the last owner pays from about one point to four tetrahedra on. In 1.5 million tetrahedra (lavapipe, Mesa 25) a point takes, in ns:
+    /// Searching around the last owner pays from about one point per four tetrahedra. In a mesh of 1.5 million
+    /// tetrahedra (lavapipe, Mesa 25) a point takes, in nanoseconds:
     ///
     /// | | 262,144 points | 524,288 points | 1,048,576 points |
     /// |---|---|---|---|
@@ -39,7 +48,7 @@ impl Path {
     /// | along a Z curve, [`Path::Descent`] | 114–137 | 110–127 | 90–100 |
     /// | along a Z curve, [`Path::Runs`] | 130–141 | 93–107 | 72–75 |
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
-        // Only what is sorted together gets nearer.
+        // Only points that are sorted together get nearer to each other.
         let together = if in_order { points } else { points.min(CHUNK) };
         match (together.saturating_mul(4) < tets, in_order) {
             (true, _) => Self::Descent,
@@ -54,7 +63,7 @@ impl Path {
 pub struct LocateOptions {
     /// How far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
     pub tolerance: f32,
-    /// How the leaf is found.
+    /// How owners are searched for.
     pub path: Path,
 }
 
@@ -67,28 +76,31 @@ impl Default for LocateOptions {
 /// Points in device memory.
 #[derive(Clone, Copy, Debug)]
 pub struct PointInput {
-    /// 32-bit floats; point i begins at float `i * stride`.
+    /// 32-bit floats; point i starts at float `i * stride`.
     pub points: BufferRef,
     /// Floats from one point to the next, at least 3.
     pub stride: u32,
     /// Number of points.
     pub count: u32,
-    /// A tetrahedron per point (or all ones) to begin with, such as the last owner, for [`Path::Descent`]. Valid tetrahedra of this mesh only.
+    /// For [`Path::Descent`]: one tetrahedron per point from which its search starts, such as its last owner, or
+    /// `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed.
     pub hints: Option<BufferRef>,
-    /// Which point is located at each place, a word each, every point once, for [`Path::Sorted`]. Answers stand where the points do.
+    /// For [`Path::Sorted`]: one word per place, the point that is located there; every point occurs once. Answers are
+    /// stored by point, not by place.
     pub order: Option<BufferRef>,
 }
 
-/// Where answers go.
+/// Where [`cmd_locate`] writes its answers.
 #[derive(Clone, Copy, Debug)]
 pub struct LocateOutput {
-    /// One word per point: the owner, or all ones.
+    /// One word per point: the owner, or `u32::MAX`.
     pub owners: BufferRef,
-    /// 16 bytes per point at a multiple of 16: barycentric coordinates in the order of the cell's vertices, zeroes without owner.
+    /// 16 bytes per point, aligned to 16: barycentric coordinates in the order of the tetrahedron's vertices; zeros
+    /// without an owner.
     pub barycentrics: BufferRef,
 }
 
-/// What the kernel is given besides the points.
+/// What the kernel's buffer of guides holds.
 #[derive(Clone, Copy)]
 enum Guide {
     Nothing,
@@ -96,10 +108,12 @@ enum Guide {
     Order,
 }
 
-/// Records point location. Reads mesh, tree and points in compute shaders, writes `output` in compute shaders; no barrier before or after.
+/// Records point location. Compute shaders read mesh, tree and points and write `output`; there is no barrier before or
+/// after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without order; [`Error::TooLarge`] for points of more than 2^31 floats.
+/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without an order; [`Error::TooLarge`] for points of
+/// more than 2^31 floats.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
@@ -136,7 +150,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             };
             return r.dispatch(
                 &arguments,
-                LocateByTraversalSpec { workgroup, stack: stack.max(1), lists, ..Default::default() },
+                LocateByTraversalSpec { workgroup, stack: stack.clamp(1, MAX_STACK), lists, ..Default::default() },
                 groups(1),
             );
         }
@@ -168,7 +182,8 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 last,
                 tolerance,
             };
-            // What runs have left to later parts is located point by point.
+            // Runs are for the first part only; the points that it leaves undecided are located one by one in later
+            // parts.
             let (run, guide) = if part == 0 { (run, guide) } else { (1, 0) };
             let spec = LocateSpec { workgroup, guide, part_length: length, lists, run, ..Default::default() };
             r.dispatch(&arguments, spec, groups(run))?;
@@ -177,8 +192,9 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     })
 }
 
-/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float each, NaN without owner. Reads `located`, the
-/// field and the cells in compute shaders, writes `values` in compute shaders; no barrier before or after: one from `cmd_locate` to this is yours.
+/// Records the values of a field (one float per point of the mesh or per tetrahedron) at located points: one float for
+/// each point, NaN without an owner. Compute shaders read `located`, the field and the mesh and write `values`. There
+/// is no barrier before or after: the caller records one between `cmd_locate` and this function.
 ///
 /// # Errors
 /// [`Error::Vulkan`] if the pipeline cannot be made.
@@ -201,20 +217,22 @@ pub fn cmd_interpolate(
 /// Answers in host memory.
 #[derive(Clone, Debug, Default)]
 pub struct Located {
-    /// Owner of each point, or all ones.
+    /// Owner of each point, or `u32::MAX`.
     pub owners: Vec<u32>,
-    /// Barycentric coordinates in the order of the cell's vertices.
+    /// Barycentric coordinates in the order of the tetrahedron's vertices.
     pub barycentrics: Vec<[f32; 4]>,
-    /// Values of the field asked for; empty without one.
+    /// Values of the given field; empty if none was given.
     pub values: Vec<f32>,
     /// Device time per stage.
     pub stages: Vec<StageTime>,
 }
 
-/// Locates points (relative to the mesh's origin); `field`: values and what they belong to; `report` is told how many points are done.
+/// Locates points, whose coordinates are relative to the mesh's origin. `field` has values and says whether they belong
+/// to points or tetrahedra. `report` receives the number of points done and their total.
 ///
 /// # Errors
-/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
+/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length or the tree was
+/// built over another mesh.
 pub fn locate(
     mesh: &DeviceMesh,
     tree: &Tree,

@@ -1,4 +1,4 @@
-//! Questions to a tree on the device: point location (SPEC 3.1, 3.2), volume rendering (3.3), slicing (3.4), overlap (3.5).
+//! Queries on the device: point location (SPEC 3.1, 3.2), volume rendering (3.3), slicing (3.4) and mesh overlap (3.5).
 
 mod all_owners;
 mod locate;
@@ -23,18 +23,18 @@ use crate::error::Result;
 use crate::gpu::{BufferRef, Groups};
 use crate::reference::locate::LIST_PART;
 
-/// A binary tree in device memory: what the LBVH baseline is to the queries.
+/// A binary tree in device memory: the structure that queries search for the LBVH baseline.
 #[derive(Clone, Copy, Debug)]
 pub struct BinaryTree {
     /// [`crate::layout::LbvhNode`] per internal node.
     pub nodes: BufferRef,
-    /// A word: the reference to the root, or all ones.
+    /// One word: the reference to the root, or `u32::MAX` if there are no valid tetrahedra.
     pub root: BufferRef,
-    /// Tetrahedron at each place.
+    /// The tetrahedron at each place of the sorted order.
     pub ids: BufferRef,
 }
 
-/// What finds the cells of a mesh: the octree, or the baseline that it is compared with.
+/// The structure that a query searches: the octree, or the baseline that it is compared with.
 #[derive(Clone, Copy, Debug)]
 pub enum Structure {
     /// The octree.
@@ -43,7 +43,7 @@ pub enum Structure {
     Binary(BinaryTree),
 }
 
-/// How many invocations a kernel needs: as many as items, or the workgroups that the device knows.
+/// The workgroups that a kernel needs: computed from a number of items, or given, for example by a count on the device.
 pub(crate) trait Items {
     fn groups(self, workgroup: u32) -> Groups;
 }
@@ -60,8 +60,9 @@ impl Items for Groups {
     }
 }
 
-/// Dispatches the kernel for the octree, with `extra` arguments and constants of its `kind`, or its twin for the binary tree, one invocation per item;
-/// both take the structure and the arguments that follow.
+/// Dispatches the octree kernel (with its `extra` arguments and the constants of its `kind`) or the corresponding
+/// binary-tree kernel, one invocation per item. Both take the buffers of the structure and the arguments and constants
+/// that follow.
 macro_rules! dispatch {
     ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
      { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
@@ -83,49 +84,50 @@ macro_rules! dispatch {
 }
 use dispatch;
 
-/// How far one recording goes with work that takes as many dispatches as it takes: each looks at so many candidates per item and no more, so that no
-/// device is kept busy for seconds. What is finished is passed over.
+/// How many dispatches one recording spends on work of unknown length. Each dispatch tests a limited number of
+/// candidates per item, so that no dispatch keeps the device busy for seconds. Later dispatches skip items that are
+/// finished.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
-    /// Dispatches recorded, one after the other.
+    /// Number of dispatches recorded, one after the other.
     pub count: u32,
-    /// Goes on where an earlier recording ended.
+    /// Continues where an earlier recording stopped.
     pub resume: bool,
 }
 
 impl Rounds {
-    /// That many, from the beginning.
+    /// `count` dispatches, from the beginning of the work.
     pub fn begin(count: u32) -> Self {
         Self { count, resume: false }
     }
 
-    /// That many more.
+    /// `count` more dispatches, after those of an earlier recording.
     pub fn resume(count: u32) -> Self {
         Self { count, resume: true }
     }
 }
 
-/// A mesh and what finds its cells.
+/// A mesh and the structure over it.
 #[derive(Clone, Copy, Debug)]
 pub struct StructureView {
     /// The mesh.
     pub mesh: MeshView,
-    /// What finds its cells.
+    /// The structure over it.
     pub structure: Structure,
 }
 
 impl StructureView {
-    /// A mesh in memory of our own, and what was built over it.
+    /// A mesh in memory owned by this crate, and the structure that was built over it.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if that was built over another mesh.
+    /// [`crate::Error::Invalid`] if the structure was built over another mesh.
     pub fn new(mesh: &DeviceMesh, built: &dyn Built) -> Result<Self> {
         let searched = built.searched();
         mesh.check(&searched.mesh)?;
         Ok(searched)
     }
 
-    /// The same with other flags for the nodes of an octree.
+    /// Replaces the flags of the nodes if the structure is an octree.
     fn with_flags(mut self, to: BufferRef) -> Self {
         if let Structure::Octree(TreeMemory { flags, .. }) = &mut self.structure {
             *flags = to;
@@ -133,20 +135,21 @@ impl StructureView {
         self
     }
 
-    /// Which lists an octree keeps, for its kernels.
+    /// The octree's [`crate::options::Lists`] as the kernels take it; 0 for the binary tree.
     fn lists(&self) -> u32 {
         if let Structure::Octree(tree) = self.structure { tree.lists as u32 } else { 0 }
     }
 }
 
-/// What owning calls find cells with: a tree or an LBVH, there as long as the call, which a [`StructureView`] or a [`Scene`] alone does not see to.
+/// A structure that owning calls can search: a [`Tree`] or an LBVH. The borrow keeps it alive during the call, which a
+/// [`StructureView`] or a [`Scene`] alone cannot guarantee.
 pub trait Built: sealed::Sealed {
-    /// It and its mesh, as recorded functions take them.
+    /// This structure and its mesh, in the form that recording functions take.
     fn searched(&self) -> StructureView;
 }
 
 pub(crate) mod sealed {
-    /// No others are known to be there.
+    /// Limits [`super::Built`] to the structures of this crate, which keep their memory alive.
     pub trait Sealed {}
 }
 
@@ -164,29 +167,37 @@ impl From<&Scene> for StructureView {
     }
 }
 
-/// A mesh and its tree, as queries get them.
+/// A mesh and its tree, as queries take them.
 #[derive(Clone, Copy, Debug)]
 pub struct Scene {
     /// The mesh.
     pub mesh: MeshView,
     /// The tree over it.
     pub tree: TreeMemory,
-    /// Entries of the longest leaf: lists are searched slice by slice, up to there, so a smaller number loses points. A host that does not read
-    /// [`crate::layout::BuildStatus::longest_leaf`] back gives the number of tetrahedra, which no list exceeds; that costs up to [`MAX_LIST_PARTS`] dispatches.
+    /// Number of entries of the longest leaf. Lists are searched in parts, up to this length, so too small a number
+    /// loses points. A host that does not read back [`crate::layout::BuildStatus::longest_leaf`] gives the number of
+    /// tetrahedra, which no list exceeds; that costs up to [`MAX_LIST_PARTS`] dispatches.
     pub longest_leaf: u32,
 }
 
-/// Dispatches that the longest list takes: slices are longer than [`LIST_PART`] rather than more.
+/// Most dispatches for one search of the lists. For long lists the parts get longer than [`LIST_PART`] instead of more
+/// numerous.
 pub const MAX_LIST_PARTS: u32 = 16;
 
-/// Entries of a list that one dispatch searches, and how many dispatches that makes of the longest.
+/// Number of items of `bytes` bytes that `found` holds, as far as shaders number them: an index is a signed word.
+fn capacity_of(found: BufferRef, bytes: u64) -> u32 {
+    (found.size() / bytes).min(i32::MAX as u64) as u32
+}
+
+/// The number of entries of a list that one dispatch searches, and the number of dispatches that the longest list
+/// takes.
 fn list_parts(longest: u32) -> (u32, u32) {
     let part = LIST_PART.max(longest.div_ceil(MAX_LIST_PARTS).next_power_of_two());
     (part, longest.div_ceil(part).max(1))
 }
 
 impl Scene {
-    /// A mesh and its tree in memory of our own.
+    /// A mesh and its tree, both in memory owned by this crate.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the tree was built over another mesh.

@@ -8,17 +8,17 @@ use crate::kernels::{PointCodes, PointCodesSpec};
 use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
 use crate::reference::locate::CODE_BITS;
 
-/// An order of points, and scratch memory of the sort: 16 bytes per point, and its tables of counts.
+/// An order of points, and the scratch memory of the sort: 16 bytes per point, and the sort's tables of counts.
 #[derive(Clone, Copy, Debug)]
 pub struct PointOrder {
-    /// A word per place: the point located there.
+    /// One word per place: the point that is located there.
     pub order: BufferRef,
     codes: BufferRef,
     sort: SortScratch,
 }
 
 impl PointOrder {
-    /// For up to `count` points.
+    /// Carves the memory for up to `count` points.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -28,15 +28,17 @@ impl PointOrder {
     }
 }
 
-/// Records the sorting of points along the Morton curve over a mesh's `grid` ([`crate::build::MeshArrays::grid`]): [`PointOrder::order`] is what
-/// [`PointInput::order`] takes. Points of one cell keep their order; those that are far outside or not finite come last. Nothing is submitted, waited for,
+/// Records the sorting of points along the Morton curve over a mesh's `grid` ([`crate::build::MeshArrays::grid`]);
+/// [`PointOrder::order`] is then what [`PointInput::order`] takes. Points with equal codes keep their order. Points
+/// that are far outside the bounds or not finite come last. This call only records: nothing is submitted, waited for,
 /// allocated or read back.
 ///
-/// Entry: grid and points are read by compute shaders. First use of `memory`: compute writes. Last use: compute and transfer writes; no barrier before or
-/// after.
+/// Entry: grid and points are read by compute shaders. First use of `memory`: compute writes. Last use: compute and
+/// transfer writes; no barrier before or after.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if a pipeline cannot be made; [`crate::Error::Invalid`] and [`crate::Error::TooLarge`] as [`super::cmd_locate`].
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made; [`crate::Error::Invalid`] and [`crate::Error::TooLarge`] as
+/// [`super::cmd_locate`].
 pub fn cmd_sort_points(r: &mut Recorder<'_>, grid: BufferRef, input: &PointInput, memory: &PointOrder) -> Result<()> {
     let PointInput { points, stride, count, .. } = *input;
     let PointOrder { order, codes, ref sort } = *memory;

@@ -1,14 +1,16 @@
-//! Mesh overlap on the device (SPEC 3.5): both directions in one submission, unless a primitive needs more work than a dispatch may do.
+//! Mesh overlap on the device (SPEC 3.5): both directions in one submission, unless a tetrahedron needs more work than
+//! a dispatch may do.
 //!
 //! ```text
-//! frames    both trees in one frame
-//! used      points that valid tetrahedra use
-//! places    vertices that lie in the other mesh; tetrahedra of the other mesh around them
-//! collect   primitives decided by their vertices; the others whose box meets the other bounds wait
-//! search    those that wait: non-boundary nodes of the other tree, then the lists of its boundary leaves   (the narrow phase)
-//! pairs     all that touch, counted, then written
+//! frames    brings both trees into one frame
+//! used      marks the points that valid tetrahedra use
+//! places    finds the vertices that lie in the other mesh, and the tetrahedra of the other mesh around them
+//! collect   decides tetrahedra by their vertices; of the rest, those whose box meets the other bounds wait
+//! search    searches for those: non-boundary nodes of the other tree, then lists of its boundary leaves (narrow phase)
+//! pairs     counts all pairs that touch, then writes them
 //! ```
-//! [`cmd_overlap`], [`cmd_count_pairs`] and [`cmd_list_pairs`] record that; [`overlap`] submits them until all is done.
+//! [`cmd_overlap`], [`cmd_count_pairs`] and [`cmd_list_pairs`] record these steps; [`overlap`] submits them until
+//! everything is done.
 
 mod frames;
 mod pairs;
@@ -25,7 +27,7 @@ use crate::primitives::Arena;
 use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{Effort, Overlap, members};
 
-/// Rounds of the search in one submission.
+/// Rounds of the search per submission.
 const ROUNDS: u32 = 3;
 
 /// A mesh and its tree.
@@ -37,24 +39,24 @@ pub struct OverlapInput<'a> {
     pub tree: &'a Tree,
 }
 
-/// Overlap of two meshes, and what it took.
+/// Overlap of two meshes, and what it cost.
 #[derive(Clone, Debug, Default)]
 pub struct Overlapped {
-    /// What intersects what.
+    /// Which tetrahedra intersect the other mesh, or which pairs intersect.
     pub overlap: Overlap,
     /// Device time per stage.
     pub stages: Vec<StageTime>,
-    /// Submissions.
+    /// Number of submissions.
     pub submissions: u32,
 }
 
-/// What a direction took.
+/// The effort of one direction.
 fn effort(status: &OverlapStatus) -> Effort {
     let OverlapStatus { by_vertex, by_node, waiting: searched, located, narrow, .. } = *status;
     Effort { by_vertex, by_node, searched, located, narrow: wide(narrow) }
 }
 
-/// Two meshes on one device, and how far their overlap is.
+/// Two meshes on one device, and the state of their overlap computation.
 struct Job<'a> {
     gpu: &'a Gpu,
     scenes: [Scene; 2],
@@ -63,7 +65,7 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Submits and waits; the counters after it.
+    /// Submits what `record` records, waits for it, and returns the counters.
     fn submit(
         &mut self,
         memory: &Buffer,
@@ -122,8 +124,8 @@ impl Job<'_> {
             }
         };
         self.done.overlap.effort[0] = effort(&status);
-        if status.pairs[1] != 0 {
-            return Err(Error::TooLarge(format!("{} intersecting pairs; 32 bits count {} at most", wide(status.pairs), u32::MAX)));
+        if wide(status.pairs) > i32::MAX as u64 {
+            return Err(Error::TooLarge(format!("{} intersecting pairs; shaders number {} at most", wide(status.pairs), i32::MAX)));
         }
         let found = self.gpu.buffer("olbvh.query.overlap_found", 8 * u64::from(status.pairs[0]))?;
         let mut rounds = Rounds::begin(1);
@@ -136,7 +138,8 @@ impl Job<'_> {
             }
         }
         let mut pairs: Vec<[u32; 2]> = self.gpu.download(&found, found.all())?;
-        // Ascending by A already; within one of A in the order of the leaves, and with the filtered assignments more than once.
+        // Pairs are ascending by A already. Within a tetrahedron of A they are in the order of B's leaves, and with
+        // filtered assignments a pair may occur more than once.
         pairs.chunk_by_mut(|x, y| x[0] == y[0]).for_each(<[_]>::sort_unstable);
         pairs.dedup();
         (self.done.overlap.a, self.done.overlap.b) = members(&pairs);
@@ -145,12 +148,13 @@ impl Job<'_> {
     }
 }
 
-/// Overlap of A and B, whose points lie in one space, on one device; with all pairs if `pairs`, else the sets alone. `report` is told how many of the
-/// primitives that need a search are done.
+/// Overlap of A and B, whose points lie in one space, on one device: all pairs if `pairs` is true, else the two sets
+/// alone. `report` receives how many of the tetrahedra that need a search are done, and how many there are.
 ///
 /// # Errors
-/// [`Error::Memory`], [`Error::TooLarge`] for more pairs than 32 bits count, a failed Vulkan call, or [`Error::Invalid`] for pairs in a tree without
-/// the lists that they are found by.
+/// [`Error::Memory`], [`Error::TooLarge`] for 2^31 pairs and more, a failed Vulkan call, or [`Error::Invalid`] for
+/// meshes on different devices, a tree of another mesh, or pairs in a tree over B without the lists that pairs are
+/// found by.
 pub fn overlap(a: OverlapInput<'_>, b: OverlapInput<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
     b.mesh.check_device(a.mesh.gpu())?;
     let scenes = [Scene::new(a.mesh, a.tree)?, Scene::new(b.mesh, b.tree)?];

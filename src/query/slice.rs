@@ -1,11 +1,12 @@
-//! Conservative slicing on the device (SPEC 3.4): rows of voxels at a time, so that memory does not grow with the number of layers.
+//! Conservative slicing on the device (SPEC 3.4). A call slices some rows of voxels, so memory does not grow with the
+//! number of layers.
 //!
 //! ```text
-//! plan      the voxels as the kernels need them, over bounds that the device knows
-//! locate    centres, in runs down the rows, and the field there                       a round: locate, collect, touch
-//! collect   the voxels whose boxes must be looked at
-//! touch     their boxes
-//! values    their kinds, and the field there
+//! plan      prepares the voxels for the kernels, from bounds that only the device knows
+//! locate    locates centres, in runs down the rows, and reads the field there        a round: locate, collect, touch
+//! collect   lists the voxels whose boxes must be tested
+//! touch     tests their boxes
+//! values    settles their kinds, and the field there
 //! ```
 
 mod stack;
@@ -27,24 +28,26 @@ use crate::reference::vertices::CellRange;
 use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 
-/// Candidates that a run of voxels may test in one dispatch.
+/// Entries, nodes and steps of walks that one run of voxels may test in one dispatch, roughly.
 const LOCATE_BUDGET: u32 = 8192;
-/// Nodes and candidates that a voxel may test in one dispatch.
+/// Nodes and entries that one voxel may test in one dispatch.
 const TOUCH_BUDGET: u32 = 1024;
 
-/// What is sliced.
+/// What a call slices.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceInput<'a> {
     /// The whole stack.
     pub voxels: &'a VoxelGrid,
-    /// The rows of it that are sliced now. Those of [`crate::slicing::bands`] have the same owners as in the whole stack where cells overlap, too.
+    /// The rows of the stack that this call slices. Rows as [`crate::slicing::bands`] yields them get the same owners
+    /// as in the whole stack, also where tetrahedra overlap.
     pub rows: Rows,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
     pub field: Option<(BufferRef, On)>,
-    /// What a touched voxel gets.
+    /// The value that a touched voxel gets.
     pub extrapolate: Extrapolate,
-    /// Cells of the finest grid, whole leaves of an octree: nothing else is looked at, since the mesh is a block of another one. A voxel is inside then if its
-    /// centre lies in these cells, and touched by what their leaves list. `None`: the whole mesh.
+    /// If given, the mesh is a block of another one, and only these cells of the finest grid, whole leaves of an
+    /// octree, are searched. A voxel is then inside if its centre lies in these cells and has an owner, and it is
+    /// touched by what the leaves among them list. `None`: the whole mesh.
     pub part: Option<CellRange>,
 }
 
@@ -54,20 +57,21 @@ impl SliceInput<'_> {
         self.rows.count * self.voxels.size[0]
     }
 
-    /// Number of runs, one below the other and side by side.
+    /// Number of runs, in all columns together.
     fn runs(&self) -> u32 {
         self.rows.runs(self.voxels.size[1]) * self.voxels.size[0]
     }
 }
 
-/// Answers and scratch memory of some rows of voxels: 29 bytes per voxel, and 32 per run.
+/// Answers and scratch memory for some rows of voxels: 28 bytes per voxel, and 32 per run.
 #[derive(Clone, Copy, Debug)]
 pub struct SliceMemory {
-    /// Per voxel, row by row: the owner, plus 2^31 if the voxel is merely touched; all ones: empty.
+    /// Per voxel, row by row: the owner, plus 2^31 if the mesh merely touches the voxel; `u32::MAX` if the voxel is
+    /// empty.
     pub answers: BufferRef,
-    /// Per voxel: the value of the field, NaN where empty. Not written without a field.
+    /// Per voxel: the value of the field, NaN if the voxel is empty. Not written without a field.
     pub values: BufferRef,
-    /// [`SliceStatus`]: voxels by kind, and whether any are left to do.
+    /// [`SliceStatus`]: numbers of voxels by kind, and how much work is left.
     pub status: BufferRef,
     plan: BufferRef,
     runs: BufferRef,
@@ -76,13 +80,13 @@ pub struct SliceMemory {
 }
 
 impl SliceMemory {
-    /// For up to `rows` rows of `width` voxels in layers of `height` rows.
+    /// Carves the memory for up to `rows` rows of `width` voxels, in layers of `height` rows.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the arena is too small, or without voxels.
+    /// [`Error::Invalid`] if the arena is too small, or for no voxels or more than 2^31.
     pub fn carve(arena: &mut Arena, [width, height]: [u32; 2], rows: u32) -> Result<Self> {
-        if width.checked_mul(rows).is_none_or(|n| n == 0) {
-            return Err(Error::Invalid(format!("{rows} rows of {width} voxels at a time; at least one, and at most 2^32 in all")));
+        if width.checked_mul(rows).is_none_or(|n| n == 0 || n > 1 << 31) {
+            return Err(Error::Invalid(format!("{rows} rows of {width} voxels at a time; at least one, and at most 2^31 in all")));
         }
         let runs = u64::from(Rows { layer: 0, first: 0, count: rows }.runs(height));
         let (width, rows) = (u64::from(width), u64::from(rows));
@@ -98,19 +102,21 @@ impl SliceMemory {
     }
 }
 
-/// Records the slicing of some rows. Nothing is submitted, waited for, allocated or read back.
+/// Records the slicing of some rows. This call only records: nothing is submitted, waited for, allocated or read back.
 ///
-/// A dispatch looks at so many candidates and no more. One round is enough but where lists are thousands long; after the recorded rounds
-/// [`SliceStatus::locating`] and [`SliceStatus::touching`] say what is left, and while there is any, answers are not to be used and values not
-/// written. Recorded again with [`Rounds::resume`] (same input, same memory) it goes on.
+/// Each round tests a limited number of candidates per run and voxel. One round suffices unless lists have thousands of
+/// entries. After the recorded rounds [`SliceStatus::locating`] and [`SliceStatus::touching`] say how much is left;
+/// while there is any, answers must not be used, and values are incomplete. Recording again with [`Rounds::resume`]
+/// (same input, same memory) continues the work.
 ///
-/// Entry: mesh, structure and field are read by compute shaders. First use of `memory`: transfer and compute writes. Last use: compute reads and
-/// writes; no barrier before or after, so a host puts one from compute shader writes (and transfer writes of the status) to whatever reads the
-/// answers.
+/// Entry: mesh, structure and field are read by compute shaders. First use of `memory`: transfer and compute writes.
+/// Last use: compute reads and writes. There is no barrier before or after, so the caller records one from compute
+/// shader writes (and transfer writes of the status) to whatever reads the answers.
 ///
 /// # Errors
-/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, or for memory of fewer voxels or of narrower rows. Boxes that are flat or too large for the mesh,
-/// which the device alone knows, are told by [`SliceStatus::refused`].
+/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, or
+/// for a part of a binary tree. Only the device knows whether boxes are flat or too large for the mesh;
+/// [`SliceStatus::refused`] reports that.
 pub fn cmd_slice(
     r: &mut Recorder<'_>,
     searched: &StructureView,
@@ -140,11 +146,11 @@ pub fn cmd_slice(
         r.barrier("slice.clear → slice.locate");
         cmd_locate_voxels(r, searched, memory, input, fresh)?;
         r.barrier("slice.locate → slice.collect");
-        // Nothing is listed as long as centres wait to be located.
+        // Voxels are listed only once all centres are located.
         cmd_touch_voxels(r, searched, memory, input)?;
         r.barrier("slice.touch → next");
     }
-    cmd_values(r, searched, memory, input)
+    if rounds.count == 0 { Ok(()) } else { cmd_values(r, searched, memory, input) }
 }
 
 fn cmd_plan(r: &mut Recorder<'_>, searched: &StructureView, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
@@ -184,7 +190,8 @@ fn cmd_locate_voxels(
     })
 }
 
-/// The field, and for the kernels: whether there is one, and whether it has a value per cell.
+/// The field's buffer, and two flags for the kernels: whether there is a field, and whether it has a value per
+/// tetrahedron.
 fn of_field(r: &Recorder<'_>, input: &SliceInput<'_>) -> (BufferRef, u32, u32) {
     let (buffer, on) = input.field.unwrap_or((r.gpu().nothing(), On::Points));
     (buffer, u32::from(input.field.is_some()), u32::from(on == On::Cells))
@@ -232,6 +239,6 @@ fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemo
     };
     let linear = u32::from(part.extrapolate == Extrapolate::Linear);
     let spec = SliceValuesSpec { workgroup: r.gpu().target().query, on_cells, linear, field, ..Default::default() };
-    // As many workgroups as looked at boxes.
+    // Uses the same number of workgroups as the test of the boxes.
     r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Indirect(groups)))
 }

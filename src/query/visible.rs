@@ -1,18 +1,20 @@
-//! Nodes that have something to see: those that rays need not be followed in are skipped.
+//! Marks the nodes in which something is visible; rays skip all others.
 
 use crate::build::TreeMemory;
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{Visible, VisibleSpec};
 
-/// Bytes of the marks of so many nodes: one bit each, as the boundary flags.
+/// Bytes of the marks of this many nodes: one bit each, as for the boundary flags.
 pub fn visible_bytes(nodes: u32) -> u64 {
     4 * u64::from(nodes.div_ceil(32))
 }
 
-/// Records which nodes of a tree have a value within one of the ranges `drawn` (two floats each, ascending and apart, as [`crate::render::Plan::drawn`]
-/// has them), into `marks`: [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are those that [`crate::build::cmd_ranges`] records. All is
-/// read and written by compute shaders; no barrier stands before or behind.
+/// Records into `marks` which nodes of a tree have a value within one of the ranges `drawn` (two floats each, ascending
+/// and disjoint, as in [`crate::render::Plan::drawn`]). `drawn` consists of the ranges and their number. `marks` has
+/// [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are the nodes' ranges as
+/// [`crate::build::cmd_ranges`] records them. Compute shaders read and write everything; there is no barrier before or
+/// after.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if the pipeline cannot be made.

@@ -1,10 +1,11 @@
-//! Direct volume rendering on the device (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of bounded work.
+//! Direct volume rendering on the device (SPEC 3.3): ray intervals over boundary nodes, then marching in dispatches of
+//! bounded work.
 //!
 //! ```text
-//! visible     nodes that have something to see, where the host wants the others skipped
-//! plan        view and transfer function as the kernels need them, over bounds that the device knows
-//! intervals   the first and the last sample of each ray
-//! march       samples, front to back                                                              a round
+//! visible     marks the nodes in which something is visible, if the caller wants the others skipped
+//! plan        prepares view and transfer function for the kernels, from bounds that only the device knows
+//! intervals   finds the first and the last sample of each ray
+//! march       takes samples, front to back                                                    a round
 //! ```
 
 mod picture;
@@ -26,71 +27,77 @@ use crate::reference::vertices::CellRange;
 use crate::render::TABLE_SIZE;
 use std::mem::offset_of;
 
-/// Candidates that a ray may test in one dispatch.
+/// Entries, nodes and steps of walks that one ray may test in one dispatch, roughly.
 const BUDGET: u32 = 1024;
 /// Nodes on the short stack of the traversal.
 const STACK: u32 = 8;
-/// A picture is drawn in blocks of so many pixels along a side.
+/// Side, in pixels, of the square blocks that a picture is drawn in.
 const BLOCK: u32 = 8;
 
-/// What is drawn. All parts are the host's, begin at multiples of [`crate::gpu::ALIGNMENT`], and are read by the device, so new contents need no new recording.
+/// What is drawn. All buffers belong to the caller, start at multiples of [`crate::gpu::ALIGNMENT`], and are read when
+/// the device executes the commands, so new contents need no new recording.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderInput {
     /// Width and height in pixels.
     pub size: [u32; 2],
-    /// [`RenderView`]: rays, light, step, range of values, as [`crate::render::Plan::view`] makes it.
+    /// [`RenderView`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
     pub view: BufferRef,
-    /// Iso-surfaces, of the values that the view has, instead of the volume.
+    /// Draws iso-surfaces, for the values that the view has, instead of the volume.
     pub iso: bool,
-    /// The transfer function, [`TABLE_SIZE`] times four floats, as [`crate::render::Plan::table`] has it.
+    /// The transfer function: [`TABLE_SIZE`] times four floats, as in [`crate::render::Plan::table`].
     pub table: BufferRef,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
     pub field: (BufferRef, On),
-    /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes them; without normals nothing is lit.
+    /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes
+    /// them. Without normals, samples are not lit.
     pub normals: Option<BufferRef>,
-    /// What need not be looked at; `None`: every sample in the mesh is taken. The picture is the same. A binary tree skips nothing.
+    /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
+    /// picture is the same either way. With a binary tree nothing is skipped.
     pub shown: Option<Shown>,
-    /// The mesh is a block of another one, and other blocks draw their part of the picture.
+    /// Given if the mesh is a block of another one, and other blocks draw their parts of the picture.
     pub part: Option<RenderPart>,
 }
 
-/// A part of a picture, drawn by one block of a mesh. Blocks draw one after the other, so that whatever ray meets two of them meets the first one first. Colours and
-/// rays of [`RenderMemory`] are not begun but gone on with: before the first block, colours are 0, and so are rays but for [`RayState::last`], which
-/// is all ones.
+/// A part of a picture, drawn by one block of a mesh. Blocks draw one after the other, in an order in which every ray
+/// that meets two of them meets the earlier one first. Each block continues the colours and rays in [`RenderMemory`]
+/// instead of starting new ones. Before the first block, colours must be 0, and rays must be 0 except for
+/// [`RayState::last`], which must be `u32::MAX`.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderPart {
-    /// Samples in these cells of the finest grid, whole leaves of an octree, are taken.
+    /// Only samples in these cells of the finest grid, whole leaves of an octree, are taken.
     pub cells: CellRange,
-    /// Which row of the view is the first one here.
+    /// The row of the view that is row 0 of this part.
     pub row: u32,
 }
 
-/// Values that are to be seen: nodes of an octree without any are skipped.
+/// The values that are visible; nodes of an octree without any of them are skipped.
 #[derive(Clone, Copy, Debug)]
 pub struct Shown {
-    /// The field's values in every node, as [`crate::build::cmd_ranges`] records them.
+    /// The range of the field's values in every node, as [`crate::build::cmd_ranges`] records them.
     pub ranges: BufferRef,
-    /// Ranges outside of which the transfer function is transparent, two floats each, ascending and apart, as [`crate::render::Plan::drawn`] has them.
+    /// Ranges outside of which the transfer function is transparent: two floats each, ascending and disjoint, as in
+    /// [`crate::render::Plan::drawn`].
     pub drawn: BufferRef,
-    /// How many there are. `[∞, ∞]` shows nothing, so a host whose transfer function changes fills up with it.
+    /// Number of these ranges. `[∞, ∞]` shows nothing, so a caller whose transfer function changes can pad the ranges
+    /// to a fixed number with it.
     pub count: u32,
 }
 
-/// The picture, and scratch memory: 48 bytes per pixel and two bits per node.
+/// The picture and scratch memory: 48 bytes per pixel, and two bits per node of a tree whose nodes are skipped.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderMemory {
-    /// Per pixel, row 0 on top, four floats: premultiplied colour and opacity.
+    /// Per pixel four floats: premultiplied colour and opacity. Row 0 is on top.
     pub colors: BufferRef,
-    /// [`RenderStatus`]: samples, and whether any rays are left to do.
+    /// [`RenderStatus`]: numbers of samples, and how many rays are unfinished.
     pub status: BufferRef,
     /// [`RenderView`], [`RenderPlan`], and the transfer function.
     pub frame: BufferRef,
-    /// [`RayState`] per ray, in blocks of 8×8 pixels, each along a Z curve.
+    /// [`RayState`] per ray, in blocks of 8×8 pixels, the rays of a block along a Z curve.
     pub rays: BufferRef,
     visible: Option<Visible>,
 }
 
-/// The boundary flags of a tree, and behind them the marks of its visible nodes.
+/// A copy of the boundary flags of a tree, followed by the marks of its visible nodes.
 #[derive(Clone, Copy, Debug)]
 struct Visible {
     flags: BufferRef,
@@ -105,7 +112,8 @@ impl Visible {
 }
 
 impl RenderMemory {
-    /// For pictures of up to this width and height. `skipping`: the capacity of the tree whose nodes may be skipped.
+    /// Carves the memory for pictures of up to this width and height. `skipping` is the capacity of the tree whose
+    /// nodes may be skipped.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small, [`Error::TooLarge`] for 2^31 pixels and more.
@@ -123,26 +131,29 @@ impl RenderMemory {
     }
 }
 
-/// Rays of a picture, in whole blocks.
+/// Number of rays of a picture, in whole blocks.
 fn rays([width, height]: [u32; 2]) -> Result<u32> {
     let rays = u64::from(width.div_ceil(BLOCK)) * u64::from(height.div_ceil(BLOCK)) * u64::from(BLOCK * BLOCK);
     let rays = u32::try_from(rays).ok().filter(|&n| n < 1 << 31);
     rays.ok_or_else(|| Error::TooLarge(format!("a picture of {width}×{height} pixels; draw it in parts")))
 }
 
-/// Records the drawing of a picture. Nothing is submitted, waited for, allocated or read back.
+/// Records the drawing of a picture. This call only records: nothing is submitted, waited for, allocated or read back.
 ///
-/// A round takes so many samples of each ray and no more (1,024, fewer where lists are searched); what is finished is passed over. After the recorded
-/// rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture holds what has been gathered so far. Recorded again with
-/// [`Rounds::resume`] (same input, same memory) it goes on. No round from the beginning merely prepares, and leaves all rays unfinished.
+/// Each round takes a limited number of samples of each ray (1,024, fewer if lists are searched) and skips rays that
+/// are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture
+/// holds what has been gathered so far. Recording again with [`Rounds::resume`] (same input, same memory) continues the
+/// work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished.
 ///
-/// Entry: mesh, structure and input are read by compute shaders, of a structure whose nodes are skipped the flags by transfers as well. First use of
-/// `memory`: transfer and compute writes; of memory that is resumed, a transfer write of the status, and compute reads and writes. Last use: compute
-/// reads and writes; no barrier before or after, so a host puts one from compute shader writes to whatever reads colours and status, and before it resumes
-/// one to transfers and compute shaders.
+/// Entry: mesh, structure and input are read by compute shaders; the flags of a structure whose nodes are skipped are
+/// also read by transfers. First use of `memory`: transfer and compute writes; when resumed, a transfer write of the
+/// status, and compute reads and writes. Last use: compute reads and writes. There is no barrier before or after, so
+/// the caller records one from compute shader writes to whatever reads colours and status, and, before resuming, one to
+/// transfers and compute shaders.
 ///
 /// # Errors
-/// [`Error::Invalid`] for memory of fewer pixels, or without room for what is to be skipped; [`Error::TooLarge`] as [`RenderMemory::carve`].
+/// [`Error::Invalid`] for memory of fewer pixels, or without room for the nodes to be skipped; [`Error::TooLarge`] as
+/// [`RenderMemory::carve`].
 pub fn cmd_render(
     r: &mut Recorder<'_>,
     searched: &StructureView,
@@ -162,7 +173,9 @@ pub fn cmd_render(
         r.fill(unfinished, width * height);
         cmd_plan(r, searched, input, memory, visible)?;
         r.barrier("render.plan → render.intervals");
-        // Between surfaces that are not to be seen a field may jump where the mesh has a crack: that is looked at, whatever the tree.
+        // With iso-surfaces the intervals use the boundary flags, not the marks: where the mesh has a crack, the field
+        // may jump across an iso-value between nodes of which none is visible. These places must be sampled whatever
+        // the tree.
         cmd_intervals(r, searched, rays, input, memory, visible.filter(|_| !input.iso))?;
     }
     for round in 0..rounds.count {
@@ -176,7 +189,7 @@ pub fn cmd_render(
     Ok(())
 }
 
-/// Where the marks of the nodes lie that are not skipped, if any are.
+/// The flags and marks in `memory` if nodes are to be skipped.
 fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
     let (Some(_), Structure::Octree(tree)) = (input.shown, searched.structure) else { return Ok(None) };
     let bits = visible_bytes(tree.capacity.nodes);
@@ -186,7 +199,7 @@ fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory)
     }
 }
 
-/// The view as the kernels need it, and which nodes are to be seen.
+/// Records the preparation of the view for the kernels, and the marks of the visible nodes.
 fn cmd_plan(
     r: &mut Recorder<'_>,
     searched: &StructureView,

@@ -1,29 +1,32 @@
-//! Does a tetrahedron touch a cell? The filters behind the assignments `Planes` and `Exact` (SPEC 2.2). Twin of
-//! `glsl/shared/assign.glsl`: the same operations in the same order.
+//! Tests whether a tetrahedron touches an octree cell: the filters of the assignments `Planes` and `Exact` (SPEC 2.2).
+//! Twin of `glsl/shared/assign.glsl`: the same operations in the same order.
 //!
-//! Separating axes in normalised coordinates: the four face planes, and for `Exact` the crosses of six edges and three axes. (The
-//! three box faces are the candidate range itself.) Two promises, in floating point as on paper:
-//! 1. a candidate cell that the closed tetrahedron touches is kept;
-//! 2. a candidate cell that holds a point p with `Tet::weights(p).inside` is kept.
+//! The separating axes, in normalised coordinates, are the normals of the four face planes, and for `Exact` also the
+//! crosses of the six edges with the three coordinate axes. (The range of candidates itself accounts for the three face
+//! normals of the box.) The test guarantees two properties, in floating point too:
+//! 1. It keeps every candidate that the closed tetrahedron touches.
+//! 2. It keeps every candidate that contains a point p with `Tet::weights(p).inside`.
 //!
-//! **Box of cell k** on axis c: `h = extent_c·2^-(l+1)`, or `extent_c/2` on an axis that is flat to the quantization (`inv_c = 0`: cell 0
-//! stands for all of it). Centre `floor(((2k+1)·h)·2^42)·2^-42`: like every vertex a multiple of 2^-42, so that no product below is
-//! denormal. Half size `h + (extent_c·2^-20 + 2^-41)`: quantization is off by at most four roundings (2^-22 of the extent), the
-//! centre by 2^-42.
+//! **Box of cell k** on axis c: `h = extent_c·2^-(l+1)`, or `extent_c/2` on an axis that is flat to the quantization
+//! (`inv_c = 0`: cell 0 stands for all of it). The centre is `floor(((2k+1)·h)·2^42)·2^-42`, a multiple of 2^-42 like
+//! every vertex, so that no product below is denormal. The half size is `h + (extent_c·2^-20 + 2^-41)`, because
+//! quantization is off by at most four roundings (2^-22 of the extent), and the centre by 2^-42.
 //!
-//! **Slack.** A candidate's centre is nowhere farther from a vertex than `reach_c = E_c + 2·half_c`, E being the size of the
-//! tetrahedron's bounding box. A determinant of this length is off by less than 2^-21·Σ|products|; the tests allow 2^-18, that is
-//! `slack_c = reach_c·2^-18 + 2^-42` per unit of |product of edges|, and it is part of the limits that are computed once per tetrahedron.
+//! **Slack.** On axis c, a candidate's centre is at most `reach_c = E_c + 2·half_c` away from a vertex, where E is the
+//! size of the tetrahedron's bounding box. A determinant over such lengths is off by less than 2^-21·Σ|products|. The
+//! tests allow 2^-18, that is, `slack_c = reach_c·2^-18 + 2^-42` per unit of |product of edges|; this is part of the
+//! limits that are computed once per tetrahedron.
 //!
-//! **Spread.** Promise 2 for edges needs more: a point that is inside within the rounding ε ≤ 2^-21·6B of the four determinants (B = volume
-//! of the bounding box) may lie outside an edge's shadow by 3ε/|V| of its width, V being six times the volume. So the limits of edges
-//! get `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
+//! **Spread.** For edges, property 2 needs more. Let B be the volume of the bounding box, and V six times the volume of
+//! the tetrahedron. A point may be inside only by virtue of the rounding ε ≤ 2^-21·6B of the four determinants; such a
+//! point may lie outside an edge's shadow by 3ε/|V| of the shadow's width. The limits of edges therefore get
+//! `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
 
 use super::grid::{Grid, reciprocal, two_to};
 use super::tet::{EDGES, FACES, Tet, Vec3, abs, cross, cross_bound, dot, sub};
 use crate::options::Assign;
 
-/// A face plane: a box is outside if `dot(normal, centre − at) > limit`.
+/// A face plane. A box is outside if `dot(normal, centre − at) > limit`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Face {
     normal: Vec3,
@@ -31,7 +34,8 @@ struct Face {
     limit: f32,
 }
 
-/// The cross of an edge and an axis: a box is outside if `u_i·along_j − u_j·along_i` with `u = centre − at` is below `lo` or above `hi`.
+/// The cross of an edge and a coordinate axis. A box is outside if `u_i·along_j − u_j·along_i`, with `u = centre − at`,
+/// is below `lo` or above `hi`.
 #[derive(Clone, Copy, Debug, Default)]
 struct Shadow {
     lo: f32,
@@ -50,13 +54,13 @@ pub struct Filter {
     shadows: [[Shadow; 3]; 6],
 }
 
-/// Half a cell of `level` per axis in normalised coordinates, not inflated.
+/// Half the size of a cell of `level` per axis in normalised coordinates, without allowance for rounding.
 pub fn half_cell(grid: &Grid, level: u32) -> Vec3 {
     let scale = two_to(-1 - level as i32);
     [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { grid.extent[c] * 0.5 } else { grid.extent[c] * scale })
 }
 
-/// Half size of a cell's box with the allowance for rounding.
+/// Half the size of a cell's box, with the allowance for rounding.
 pub fn inflated(grid: &Grid, h: Vec3) -> Vec3 {
     [0, 1, 2].map(|c| h[c] + (grid.extent[c] * two_to(-20) + two_to(-41)))
 }
@@ -90,7 +94,7 @@ impl Filter {
         });
         let slack = [0, 1, 2].map(|c| (size[c] + 2.0 * half[c]) * two_to(-18) + two_to(-42));
         let volume = tet.volume();
-        // The outward normal, by the sign that `Tet::weights` uses.
+        // The normal points outward according to the sign of the volume that `Tet::weights` uses.
         let s = if volume < 0.0 { -1.0 } else { 1.0 };
         for (i, [p, q, r]) in FACES.into_iter().enumerate() {
             let (a, b) = (sub(v[q], v[p]), sub(v[r], v[p]));
@@ -123,7 +127,7 @@ impl Filter {
         filter
     }
 
-    /// Whether the tetrahedron's entry in candidate `cell` (one of its bounding box) is kept.
+    /// Whether the tetrahedron's entry in the candidate `cell` (one in its quantized bounding box) is kept.
     pub fn touches(&self, cell: [u32; 3]) -> bool {
         if self.assign == Assign::Aabb {
             return true;

@@ -1,4 +1,5 @@
-//! Topology of a mesh: bad cells, neighbours across faces, boundary primitives, bounds (SPEC 2.3). Twin of `glsl/build/0*`.
+//! Topology of a mesh: bad tetrahedra, neighbours across faces, boundary tetrahedra, bounds (SPEC 2.3). Twin of
+//! `glsl/build/0*`.
 
 use super::grid::{COORDINATE_LIMIT, Grid, canonical};
 use super::tet::Tet;
@@ -7,32 +8,32 @@ use crate::mesh::Mesh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// "No neighbour", "no owner".
+/// No tetrahedron: no neighbour, no owner.
 pub const NONE: u32 = u32::MAX;
 
-/// Cells of a mesh by kind.
+/// Numbers of tetrahedra of a mesh by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Counts {
-    /// All tetrahedra, bad ones included.
+    /// All tetrahedra, including bad ones.
     pub cells: u32,
-    /// Left out of every structure: see [`Fault`].
+    /// Bad tetrahedra, which are left out of every structure; see [`Fault`].
     pub bad: u32,
-    /// Marked as boundary: no partner across a face, flat, or at a fold.
+    /// Boundary tetrahedra: flat, without neighbour across a face, or at a fold.
     pub boundary: u32,
-    /// Negative signed volume in the caller's order of vertices.
+    /// Tetrahedra of negative signed volume in the caller's order of vertices.
     pub negative: u32,
-    /// Zero volume.
+    /// Tetrahedra of zero volume.
     pub flat: u32,
 }
 
-/// Why a cell is bad.
+/// Why a tetrahedron is bad.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// A vertex index (given) is not below the number of points.
+    /// This vertex index is not below the number of points.
     Index(u32),
-    /// A vertex index (given) occurs twice.
+    /// This vertex occurs twice.
     Repeated(u32),
-    /// A vertex (given) has a coordinate that is NaN, infinite, or too large to compute with.
+    /// This vertex has a coordinate that is NaN, infinite, or too large to compute with.
     Coordinate(u32),
 }
 
@@ -46,30 +47,30 @@ impl std::fmt::Display for Fault {
     }
 }
 
-/// What a mesh is like before any tree is built over it.
+/// Topology of a mesh, computed before any tree is built over it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topology {
-    /// Per tetrahedron, the neighbour across the face opposite to each vertex in the caller's order; [`NONE`] where not exactly two valid
-    /// tetrahedra share the face.
+    /// For each tetrahedron, the neighbour across the face opposite to each vertex in the caller's order; [`NONE`]
+    /// unless exactly two valid tetrahedra share the face.
     pub neighbours: Vec<[u32; 4]>,
-    /// One bit per tetrahedron (bit t % 32 of word t / 32): boundary primitive.
+    /// One bit per tetrahedron (bit t % 32 of word t / 32), set for boundary tetrahedra.
     pub boundary: Vec<u32>,
-    /// One bit per tetrahedron: not bad.
+    /// One bit per tetrahedron, set for those that are not bad.
     pub valid: Vec<u32>,
-    /// Grid over the bounds of the vertices used by valid cells, at the finest level.
+    /// Grid over the bounds of the vertices that valid tetrahedra use, at the finest level.
     pub grid: Grid,
-    /// Cells by kind.
+    /// Numbers of tetrahedra by kind.
     pub counts: Counts,
-    /// The bad cells in ascending order, with the first reason found.
+    /// The bad tetrahedra in ascending order, each with the first fault found.
     pub bad: Vec<(u32, Fault)>,
 }
 
-/// Bit `i` of packed words; false past the end.
+/// Bit `i` of packed words; false beyond their end.
 pub fn bit(words: &[u32], i: u32) -> bool {
     words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
 }
 
-/// Numbers of the bits of packed words that are set, ascending.
+/// Indices of the set bits of packed words, ascending.
 pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
     let of_word = |(w, mut bits): (u32, u32)| {
         std::iter::from_fn(move || {
@@ -82,7 +83,7 @@ pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
 }
 
 impl Topology {
-    /// Bad cells, bounds and their grid alone: no neighbours, nothing marked as boundary.
+    /// Determines bad tetrahedra, bounds and grid only: no neighbours, no boundary.
     ///
     /// # Errors
     /// As [`topology`].
@@ -98,23 +99,23 @@ impl Topology {
         Ok(Self { neighbours: Vec::new(), boundary: Vec::new(), valid, grid: Grid::new(lo, hi), counts, bad })
     }
 
-    /// Whether tetrahedron `tet` is part of the structure.
+    /// Whether tetrahedron `tet` is valid, that is, part of every structure.
     pub fn is_valid(&self, tet: u32) -> bool {
         bit(&self.valid, tet)
     }
 
-    /// Whether tetrahedron `tet` is a boundary primitive.
+    /// Whether `tet` is a boundary tetrahedron.
     pub fn is_boundary(&self, tet: u32) -> bool {
         bit(&self.boundary, tet)
     }
 
-    /// Number of cells in the structure.
+    /// Number of valid tetrahedra.
     pub fn valid_cells(&self) -> u32 {
         self.counts.cells - self.counts.bad
     }
 }
 
-/// Computes the topology of `mesh`. Bad cells are counted and listed, never an error.
+/// Computes the topology of `mesh`. Bad tetrahedra are counted and listed; they are never an error.
 ///
 /// # Errors
 /// [`Error::TooLarge`] if the faces of the mesh, or its points, do not fit 32-bit indices.
@@ -141,18 +142,18 @@ fn words(n: usize, answer: &(dyn Fn(u32) -> bool + Sync)) -> Vec<u32> {
     (0..n.div_ceil(32)).into_par_iter().map(word).collect()
 }
 
-/// The grid over the vertices that valid cells use, at the finest level: that of the [`Topology`].
+/// The grid over the vertices that valid tetrahedra use, at the finest level: [`Topology::grid`].
 pub fn valid_grid(mesh: &Mesh) -> Grid {
     let (lo, hi) = bounds(mesh, &words(mesh.tets.len(), &|t| fault_of(mesh, t).is_none()));
     Grid::new(lo, hi)
 }
 
-/// Whether a point can be computed with.
+/// Whether all coordinates of a point are finite and small enough to compute with.
 pub fn is_usable(p: [f32; 3]) -> bool {
     p.iter().all(|x| x.abs() < COORDINATE_LIMIT)
 }
 
-/// Why a tetrahedron is bad, with vertices as the source numbers them; `None` if it is not.
+/// Why a tetrahedron is bad, with vertices numbered as in the source; `None` if it is valid.
 pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
     let ids = mesh.tets.get(tet as usize)?;
     let repeated = |i: usize| ids[..i].contains(&ids[i]);
@@ -181,7 +182,8 @@ fn face(ids: [u32; 4], i: usize) -> [u32; 3] {
     face
 }
 
-/// Faces are bucketed by their smallest vertex, and equal ones found within a bucket.
+/// The neighbours across faces. Faces are bucketed by their smallest vertex, and equal faces are matched within a
+/// bucket.
 pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
     let faces_of = |t: usize| (0..4).map(move |i| (4 * t + i, face(mesh.tets[t], i)[0] as usize));
     let valid_tets = || (0..mesh.tets.len()).filter(|&t| bit(valid, t as u32));
@@ -219,13 +221,13 @@ pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
     partner.into_par_iter().map(|p| p.map(AtomicU32::into_inner)).collect()
 }
 
-/// Signs of a cell's volume; all 0 for bad cells.
+/// Signs of a tetrahedron's volume; 0 for bad tetrahedra.
 #[derive(Clone, Copy)]
 struct Signs {
     valid: bool,
-    /// With the vertices in ascending index.
+    /// Sign with the vertices in ascending order of index.
     sorted: i8,
-    /// With the vertices in the caller's order: `sorted` times the parity of the order.
+    /// Sign with the vertices in the caller's order: `sorted` times the parity of that order.
     caller: i8,
 }
 
@@ -242,11 +244,14 @@ impl Signs {
     }
 }
 
-/// The side of a face, its vertices ascending, on which the vertex of rank `rank` opposite to it lies; 0 for flat cells.
+/// The side of a face (with its vertices ascending) on which the opposite vertex, of rank `rank`, lies; 0 for flat
+/// tetrahedra.
 fn side(signs: Signs, rank: usize) -> i8 {
     if rank % 2 == 1 { signs.sorted } else { -signs.sorted }
 }
 
+/// Whether a valid tetrahedron is boundary: flat, without neighbour across a face, or on the same side of a face as its
+/// neighbour (a fold).
 fn on_boundary(mesh: &Mesh, neighbours: &[[u32; 4]], signs: &[Signs], t: u32) -> bool {
     let ids = mesh.tets[t as usize];
     let mine = signs[t as usize];
@@ -260,7 +265,7 @@ fn on_boundary(mesh: &Mesh, neighbours: &[[u32; 4]], signs: &[Signs], t: u32) ->
             let theirs = mesh.tets[n as usize];
             let shared = face(ids, i);
             let opposite = theirs.into_iter().find(|v| !shared.contains(v)).unwrap_or(NONE);
-            // A flat neighbour has no side; it is boundary itself.
+            // A flat neighbour has side 0, so it never equals this side; it is boundary itself.
             side(mine, rank(ids, ids[i])) == side(signs[n as usize], rank(theirs, opposite))
         })
 }

@@ -1,4 +1,4 @@
-//! The whole construction, as section 3.2 of the paper tells it. Twin of `src/build`.
+//! The whole construction, as described in section 3.2 of the paper. Twin of `src/build`.
 
 use super::boundary::Topology;
 use super::codes::Stage;
@@ -11,21 +11,21 @@ use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;
 
-/// A tree, and what no array of it tells of its making.
+/// A tree, and the intermediate results that its arrays do not contain.
 #[derive(Clone, Debug)]
 pub struct Construction {
-    /// Morton codes of the entries, sorted; [`TreeArrays::p`] holds their primitives.
+    /// Morton codes of the entries, sorted; [`TreeArrays::p`] holds their tetrahedra.
     pub codes: Vec<u32>,
     /// The tree.
     pub tree: TreeArrays,
 }
 
-/// Builds the tree over the valid cells of `mesh`, whose topology is `topology` (see [`super::boundary::topology`], which is stage 0: bounds and
-/// boundary marking).
+/// Builds the tree over the valid tetrahedra of `mesh`. `topology` is that of the mesh, computed by stage 0 (bounds and
+/// boundary marking, see [`super::boundary::topology`]).
 ///
 /// # Errors
-/// [`Error::Invalid`] if α is not in 0…10 or the topology is that of another mesh; [`Error::TooLarge`] if the entries do not fit the capacity
-/// even in a single node, or 32 bits where there is no capacity.
+/// [`Error::Invalid`] if α is not in 0…10 or the topology is that of another mesh; [`Error::TooLarge`] if the entries
+/// do not fit the capacity or the budget even in a single node, or 32 bits cannot count them.
 pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result<TreeArrays> {
     if topology.neighbours.len() != mesh.tets.len() {
         let (of, is) = (topology.neighbours.len(), mesh.tets.len());
@@ -48,14 +48,14 @@ pub fn build(mesh: &Mesh, topology: &Topology, options: &BuildOptions) -> Result
     Ok(tree)
 }
 
-/// Stages 2 to 4: the tree whose leaves are cells of `level`, whatever α and limits `options` has.
+/// Stages 2 to 4: builds the tree whose leaves are cells of `level`, regardless of α and the limits in `options`.
 ///
 /// # Errors
 /// [`Error::TooLarge`] if 32 bits cannot count the entries.
 pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u32, options: &BuildOptions) -> Result<Construction> {
     let grid = Grid { level, ids: quarters::id_mask(options.lists, mesh.tets.len()), ..topology.grid };
 
-    // Stage 2: calculate and sort the Morton codes of the primitives.
+    // Stage 2: calculate and sort the Morton codes of the entries.
     let all = Stage { mesh, topology, vertices, grid: &grid, assign: options.assign, marks: None };
     let marks = (options.lists == Lists::Boundary).then(|| Marks::new(&all));
     let stage = Stage { marks: marks.as_ref(), ..all };

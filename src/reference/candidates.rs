@@ -1,18 +1,18 @@
-//! Candidates for the owner of a point (SPEC 3.1). Twin of `glsl/shared/candidates.glsl`.
+//! Choice of the owner of a point among candidate tetrahedra (SPEC 3.1). Twin of `glsl/shared/candidates.glsl`.
 
 use super::boundary::NONE;
 use super::tet::{Tet, Weights};
 
-/// The best of the candidates so far.
+/// The best candidate so far.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Best {
-    /// Its id, or [`NONE`].
+    /// Number of the tetrahedron, or [`NONE`].
     pub owner: u32,
-    /// Whether it contains the point.
+    /// Whether the tetrahedron contains the point.
     pub inside: bool,
-    /// Whether its box does.
+    /// Whether its bounding box contains the point.
     pub in_box: bool,
-    /// Its smallest barycentric coordinate, unless it contains the point.
+    /// Its smallest barycentric coordinate; 0 if it contains the point.
     pub smallest: f32,
 }
 
@@ -23,16 +23,17 @@ impl Default for Best {
 }
 
 impl Best {
-    /// None yet.
+    /// No candidate yet.
     pub const NONE: Self = Self { owner: NONE, inside: false, in_box: false, smallest: f32::MIN };
 
-    /// The candidate that contains the point.
+    /// A candidate that contains the point.
     pub fn inside(owner: u32) -> Self {
         Self { owner, inside: true, in_box: true, smallest: 0.0 }
     }
 
-    /// Takes candidate `t` if it is better: one that contains the point before others, of those the lowest id; then one whose box does, then the
-    /// largest smallest barycentric coordinate, then the lowest id. Flat cells never.
+    /// Takes candidate `t` if it is better than the best so far. Candidates that contain the point come first, of those
+    /// the lowest id. Then come candidates whose box contains it, then the largest smallest barycentric coordinate,
+    /// then the lowest id. A flat tetrahedron that does not contain the point is never taken.
     pub fn consider(&mut self, t: u32, tet: &Tet, weights: &Weights) {
         if weights.inside {
             if !self.inside || t < self.owner {

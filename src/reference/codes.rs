@@ -1,4 +1,5 @@
-//! Stage 2: which cells a primitive lies in, as Morton codes, and their order (SPEC 2.2, the paper's Eq. 6). Twin of `glsl/build/2*`.
+//! Stage 2: the cells that list each tetrahedron, as Morton codes, and their order (SPEC 2.2, the paper's Eq. 6). Twin
+//! of `glsl/build/2*`.
 
 use super::assign::{Filter, cell_centre, half_cell};
 use super::boundary::Topology;
@@ -13,15 +14,15 @@ use crate::options::Assign;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Primitives per task.
+/// Tetrahedra per task.
 const CHUNK: usize = 1 << 14;
 
-/// Entries: a code and a primitive each, in one order.
+/// Entries, each a code and a tetrahedron, in one order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Entries {
-    /// Morton code of the cell, at the level of the leaves.
+    /// Morton code of each entry's cell, at the level of the leaves.
     pub codes: Vec<u32>,
-    /// Primitive that lies in it.
+    /// Tetrahedron of each entry.
     pub primitives: Vec<u32>,
 }
 
@@ -38,12 +39,12 @@ pub struct Stage<'a> {
     pub grid: &'a Grid,
     /// The assignment.
     pub assign: Assign,
-    /// Under `Lists::Boundary`, the cells that the boundary touches.
+    /// With `Lists::Boundary`, the cells that the boundary touches.
     pub marks: Option<&'a Marks>,
 }
 
 impl Stage<'_> {
-    /// The cells of primitive `tet` in candidate order; none if it is bad.
+    /// Visits the cells that list tetrahedron `tet`, in the order of its candidates; none if it is bad.
     pub fn each_cell(&self, tet: u32, visit: impl FnMut([u32; 3])) {
         if !self.topology.is_valid(tet) {
             return;
@@ -57,12 +58,12 @@ impl Stage<'_> {
         }
     }
 
-    /// Whether every cell of a primitive's box lists it.
+    /// Whether every candidate of a tetrahedron lists it.
     fn boxes(&self) -> bool {
         self.assign == Assign::Aabb && self.marks.is_none()
     }
 
-    /// Which of the cells of its box list the valid primitive `tet`.
+    /// A predicate on the candidates of the valid tetrahedron `tet`: whether they list it.
     pub fn lists(&self, tet: u32) -> impl Fn([u32; 3]) -> bool {
         let primitive = self.vertices.tet(self.mesh.tets[tet as usize]);
         let filter = Filter::new(&primitive, self.grid, self.grid.level, self.assign);
@@ -75,7 +76,7 @@ impl Stage<'_> {
         }
     }
 
-    /// Number of entries of each primitive.
+    /// Number of entries of each tetrahedron.
     pub fn count(&self) -> Vec<u32> {
         let count = |tet: usize| {
             let mut n = 0;
@@ -89,7 +90,8 @@ impl Stage<'_> {
         (0..self.mesh.tets.len()).into_par_iter().map(count).collect()
     }
 
-    /// Writes all entries, in primitive order and candidate order within a primitive; `counts` as [`Stage::count`] gave them.
+    /// Writes all entries, by tetrahedron and for one tetrahedron in the order of its candidates. `counts` is the
+    /// result of [`Stage::count`].
     ///
     /// # Errors
     /// [`Error::TooLarge`] if 32 bits cannot count them.
@@ -123,7 +125,7 @@ impl Stage<'_> {
 }
 
 impl Marks {
-    /// Marks the cells of the boundary primitives of a stage.
+    /// Marks the cells that boundary tetrahedra of a stage touch.
     pub fn new(stage: &Stage<'_>) -> Self {
         let words: Vec<AtomicU32> = (0..(1usize << (3 * stage.grid.level)).div_ceil(32)).map(|_| AtomicU32::new(0)).collect();
         let all = Stage { marks: None, ..*stage };
@@ -138,7 +140,8 @@ impl Marks {
 }
 
 impl Entries {
-    /// The entries by code, those of a code by primitive (the sort is stable and they come in primitive order).
+    /// Sorts the entries by code, and those of one code by tetrahedron (the sort is stable, and the entries come in
+    /// order of tetrahedra).
     #[must_use]
     pub fn sorted(self, level: u32) -> Self {
         let (codes, primitives) = sort_pairs(self.codes, self.primitives, 3 * level);

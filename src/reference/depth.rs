@@ -1,4 +1,5 @@
-//! Stage 1: the depth of the tree from the size of the primitives (SPEC 2.4, the paper's Eq. 11–12). Twin of `glsl/build/1*`.
+//! Stage 1: the depth of the tree, derived from the sizes of the tetrahedra (SPEC 2.4, the paper's Eq. 11–12). Twin of
+//! `glsl/build/1*`.
 
 use super::boundary::Topology;
 use super::grid::{Grid, MAX_LEVEL, canonical};
@@ -12,16 +13,17 @@ use rayon::prelude::*;
 /// Number of levels, and of values of `α_P`.
 const LEVELS: usize = MAX_LEVEL as usize + 1;
 
-/// What one pass over the primitives gathers: enough to choose a level, and to know the size of the tree at every level.
+/// What one pass over the tetrahedra gathers: enough to choose a level, and to bound the size of the tree at every
+/// level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Sizes {
-    /// How many primitives have `α_P` = 0…10.
+    /// Numbers of tetrahedra with `α_P` = 0…10.
     pub histogram: [u64; LEVELS],
-    /// `n_m(l)`: entries of the assignment `Aabb` at each level; an upper bound for the others.
+    /// `n_m(l)`: number of entries of the assignment `Aabb` at each level; an upper bound for the other assignments.
     pub entries: [u64; LEVELS],
 }
 
-/// `α_P`: integer log2 of the longest side of the bounding box in finest cells (Eq. 11), 0 for 0.
+/// `α_P`: integer log2 of the longest side of the bounding box in finest cells (Eq. 11); 0 for a length of 0.
 pub fn log_extent(points: [[f32; 3]; 4], grid: &Grid) -> u32 {
     let side = |c: usize| {
         let x = points.map(|p| canonical(p[c]));
@@ -31,7 +33,7 @@ pub fn log_extent(points: [[f32; 3]; 4], grid: &Grid) -> u32 {
     side(0).max(side(1)).max(side(2)).checked_ilog2().unwrap_or(0)
 }
 
-/// Measures all valid primitives.
+/// Measures all valid tetrahedra.
 pub fn measure(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Sizes {
     let add = |mut sizes: Sizes, (t, &ids): (usize, &[u32; 4])| {
         if topology.is_valid(t as u32) {
@@ -58,7 +60,8 @@ impl Sizes {
         self
     }
 
-    /// Eq. 12 for α in units of 1/65536, by integer comparisons: `l ≥ k ⟺ Σα_P·65536 ≤ N·((10.5 − k)·65536 − α)`.
+    /// The level by Eq. 12 for α in units of 1/65536, using integer comparisons only:
+    /// `l ≥ k ⟺ Σα_P·65536 ≤ N·((10.5 − k)·65536 − α)`.
     pub fn heuristic(&self, alpha: u32) -> u32 {
         let count = self.histogram.iter().sum::<u64>() as i64;
         let sum = (0..).zip(self.histogram).map(|(a, n)| a * n as i64).sum::<i64>();
@@ -66,7 +69,8 @@ impl Sizes {
         if count == 0 { 0 } else { (1..=MAX_LEVEL).rev().find(reached).unwrap_or(0) }
     }
 
-    /// The level to build: the one asked for or the heuristic's, or the next coarser one that keeps to the capacity and the budget.
+    /// The level to build: the requested one or the heuristic's, or else the finest coarser one within the capacity and
+    /// the budget.
     ///
     /// # Errors
     /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits.
@@ -83,13 +87,14 @@ impl Sizes {
     }
 }
 
-/// The options of a finer tree than the one of that level that these options came to, if it suits better ([`crate::options::Fineness`]). `candidates`: as
-/// [`Sizes::entries`], on the first level valid tetrahedra.
+/// The options of a finer tree, if one suits [`crate::options::Fineness`] better than the tree of level `built` that
+/// these options led to. `entries` and `leaves` are the numbers of that tree; `candidates` is [`Sizes::entries`], whose
+/// first value is the number of valid tetrahedra.
 pub(crate) fn finer(options: &BuildOptions, built: u32, entries: u64, leaves: u64, candidates: &[u64; LEVELS]) -> Option<BuildOptions> {
     let (longest, anyway) = options.fineness.limits()?;
     let (mut mean, mut level) = (entries / leaves.max(1), built);
     while mean > longest {
-        // A surface meets four times as many cells of a level more.
+        // One level finer, a surface meets four times as many cells.
         (mean, level) = (mean / 4, level + 1);
     }
     let finest = |most: u64| (built + 1..=MAX_LEVEL).rev().find(|&l| candidates[l as usize] <= most);
@@ -106,7 +111,7 @@ pub(crate) fn finer(options: &BuildOptions, built: u32, entries: u64, leaves: u6
     Some(BuildOptions { level: Some(level), ..*options })
 }
 
-/// Why there is no tree, `entries` being those of every level.
+/// The error for a mesh without tree, `entries` being [`Sizes::entries`].
 pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
     let root = entries[0];
     Error::TooLarge(match (options.capacity, options.budget) {

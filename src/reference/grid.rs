@@ -1,7 +1,7 @@
 //! Quantization and Morton codes (SPEC 2.1, the paper's Eq. 1–6). Twin of `glsl/shared/grid.glsl`.
 //!
-//! Every operation here is an integer one or a correctly rounded subtraction, multiplication or floor, in the same order as in
-//! the kernel, so results are bit-equal on every device.
+//! Every operation here is an integer operation or a correctly rounded subtraction, multiplication or floor, in the
+//! same order as in the kernels, so results are equal bit for bit on every device.
 
 pub use crate::layout::Grid;
 
@@ -10,24 +10,25 @@ pub(crate) const fn two_to(n: i32) -> f32 {
     f32::from_bits(((n + 127) as u32) << 23)
 }
 
-/// Bits per axis of the finest grid (32-bit codes).
+/// Level of the finest grid, which is also the number of bits per axis of its 32-bit Morton codes.
 pub const MAX_LEVEL: u32 = 10;
-/// Coordinates of this magnitude and beyond count as infinite: differences and scales stay in the range of normal numbers.
+/// Coordinates of this magnitude and beyond count as infinite, so that differences and scales stay in the range of
+/// normal numbers.
 pub const COORDINATE_LIMIT: f32 = two_to(125);
-/// An axis shorter than this (2^-103) is flat.
+/// An axis whose extent is shorter than this (2^-103) is flat.
 pub const MIN_EXTENT: f32 = two_to(-103);
-/// Normalised coordinates are multiples of 2^-42 and below 2^41, so that products of three differences neither overflow nor become
-/// denormal (devices may flush those).
+/// Normalised coordinates are multiples of 2^-42 and below 2^41, so that products of three differences neither overflow
+/// nor become denormal (which devices may flush to zero).
 const GRID_UP: f32 = two_to(82);
 const GRID_DOWN: f32 = two_to(-42);
 
-/// `x` without denormals.
+/// `x`, with 0 in place of denormals and −0.
 pub fn canonical(x: f32) -> f32 {
     if x.to_bits() & 0x7f80_0000 == 0 { 0.0 } else { x }
 }
 
 impl Grid {
-    /// The grid over the closed box `[lo, hi]`, at the finest level; an empty box (`lo > hi`) gives a flat grid at 0.
+    /// The grid over the closed box `[lo, hi]`, at the finest level. An empty box (`lo > hi`) gives a flat grid at 0.
     pub fn new(lo: [f32; 3], hi: [f32; 3]) -> Self {
         let empty = (0..3).any(|c| lo[c] > hi[c]);
         let (lo, hi) = if empty { ([0.0; 3], [0.0; 3]) } else { (lo.map(canonical), hi.map(canonical)) };
@@ -42,7 +43,7 @@ impl Grid {
         grid
     }
 
-    /// Cell of the finest grid that holds `x`, clamped into the grid.
+    /// The cell of the finest grid that contains `x`; points outside the grid are clamped to it.
     pub fn quantize(&self, x: [f32; 3]) -> [u32; 3] {
         [0, 1, 2].map(|c| {
             let q = (canonical(canonical(x[c]) - self.lo[c]) * self.inv[c]).floor();
@@ -50,7 +51,8 @@ impl Grid {
         })
     }
 
-    /// `x` in normalised coordinates: the box's lower corner at 0, its largest extent in [2^40, 2^41).
+    /// `x` in normalised coordinates, in which the lower corner of the bounds is at 0 and the largest extent is in
+    /// [2^40, 2^41).
     pub fn normalise(&self, x: [f32; 3]) -> [f32; 3] {
         [0, 1, 2].map(|c| {
             let unit = canonical(canonical(canonical(x[c]) - self.lo[c]) * self.scale);
@@ -73,7 +75,7 @@ pub fn unmorton(code: u32) -> [u32; 3] {
     [gather(code >> 2), gather(code >> 1), gather(code)]
 }
 
-/// Two zero bits between any two of the low ten bits of `v`.
+/// Inserts two zero bits between neighbouring bits of the low ten bits of `v`.
 fn spread(v: u32) -> u32 {
     let v = (v | v << 16) & 0x0300_00ff;
     let v = (v | v << 8) & 0x0300_f00f;
@@ -90,8 +92,9 @@ fn gather(v: u32) -> u32 {
     (v | v >> 16) & 0x0000_03ff
 }
 
-/// Deterministic reciprocal of a normal `x`: a bit-trick guess and four Newton steps of correctly rounded operations, because
-/// Vulkan's division is not correctly rounded. Relative error below 2^-22; infinity of 0.
+/// Deterministic reciprocal of a normal `x`. It takes an estimate from the bits of `x` and refines it by four Newton
+/// steps of correctly rounded operations, because Vulkan's division is not correctly rounded. The relative error is
+/// below 2^-22; the reciprocal of 0 is infinity.
 pub fn reciprocal(x: f32) -> f32 {
     let mut r = f32::from_bits(0x7ef3_11c7u32.wrapping_sub(x.to_bits() & 0x7fff_ffff));
     let a = x.abs();

@@ -1,13 +1,13 @@
-//! The leaves of a tree in Morton order, below the nodes that a predicate lets through; it can be left and taken up again at any code. Twin of
-//! `glsl/shared/leaf_walk.glsl`.
+//! Visits the leaves of a tree in Morton order, below the nodes that a predicate accepts. The kernels' version can be
+//! interrupted and resumed at any Morton code. Twin of `glsl/shared/leaf_walk.glsl`.
 
 use super::grid::{Grid, MAX_LEVEL, canonical, unmorton};
 use super::traverse::Node;
 use super::vertices::CellRange;
 use crate::tree::TreeArrays;
 
-/// Calls `leaf` for every leaf that `enters` (asked for all nodes on the way, the root and the leaf included) lets through, in Morton order, until it
-/// returns true.
+/// Calls `leaf` for every leaf that `enters` accepts, in Morton order, until `leaf` returns true. `enters` decides for
+/// every node on the way, including the root and the leaf, whether to go on below it.
 pub fn walk_leaves(tree: &TreeArrays, mut enters: impl FnMut(Node) -> bool, mut leaf: impl FnMut(Node) -> bool) {
     let mut path = vec![Node { index: 0, level: 0, code: 0 }];
     while let Some(node) = path.pop() {
@@ -28,15 +28,15 @@ pub fn walk_leaves(tree: &TreeArrays, mut enters: impl FnMut(Node) -> bool, mut 
     }
 }
 
-/// Whether the cell of a node meets a range of cells of the finest grid.
+/// Whether the cell of a node overlaps a range of cells of the finest grid.
 pub fn meets(node: Node, range: &CellRange) -> bool {
     let cell = unmorton(node.code);
     let shift = MAX_LEVEL - node.level;
     (0..3).all(|c| range.lo[c] >> shift <= cell[c] && cell[c] <= range.hi[c] >> shift)
 }
 
-/// The cells of the finest grid that the box around `centre` with the half extent `reach` meets; `None`: it lies outside of the bounds.
-/// Quantization is monotone, so every point of the box has its cell there.
+/// The cells of the finest grid that the box around `centre` with the half extent `reach` meets; `None` if it lies
+/// outside of the bounds. Quantization is monotone, so the cell of every point of the box is in this range.
 pub fn reached_cells(grid: &Grid, centre: [f32; 3], reach: [f32; 3]) -> Option<CellRange> {
     let mut range = CellRange { lo: [0; 3], hi: [0; 3] };
     for c in 0..3 {

@@ -1,5 +1,5 @@
-//! Stage 4, first part: boundary flags and boxes of the leaves (the paper's Alg. 1). Twin of `glsl/build/40_flag_leaves` and
-//! `41_finish_leaves`.
+//! Stage 4, first part: boundary flags, masks of octants, and boxes of the leaves (the paper's Alg. 1). Twin of
+//! `glsl/build/40_flag_leaves` and `41_finish_leaves`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{Topology, bit};
@@ -14,12 +14,13 @@ use crate::options::Lists;
 use rayon::prelude::*;
 use std::ops::Range;
 
-/// A box as `[lo, hi]`, x y z each.
+/// A box as `[lo, hi]`, with x, y and z of each corner.
 pub type Box6 = [f32; 6];
 
-/// The box of the cell with Morton code `code` at `level`, in the units of the mesh: per axis from `lo + extent·(k·2^-l)` to
-/// `lo + extent·((k+1)·2^-l)` without denormals, where `extent = hi − lo`. The far side of the last cell is `hi` to the bit. On an axis that is
-/// flat to the quantization (`inv = 0`) cell 0 stands for everything: `[lo, hi]`.
+/// The box of the cell with Morton code `code` at `level`, in the units of the mesh. On each axis it reaches from
+/// `lo + extent·(k·2^-l)` to `lo + extent·((k+1)·2^-l)`, without denormals, where `extent = hi − lo`. The upper side of
+/// the last cell equals `hi` bit for bit. On an axis that is flat to the quantization (`inv = 0`) cell 0 stands for all
+/// of it: `[lo, hi]`.
 pub fn cell_box(grid: &Grid, level: u32, code: u32) -> Box6 {
     let [x, y, z] = unmorton(code);
     let at = |c: usize, k: u32| cell_side(grid, c, level, k);
@@ -38,13 +39,15 @@ pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
     }
 }
 
-/// Entries of a leaf without boundary primitives that are asked whether they touch its cell.
+/// Number of entries of a leaf without boundary tetrahedra that are tested for touching its cell.
 pub const MAX_TOUCH_TESTS: usize = 16;
 
-/// Boundary flag of a leaf: set if one of its primitives is one; also if none of the first [`MAX_TOUCH_TESTS`] primitives touches the cell. The bounding box
-/// of an inner primitive can reach out of the mesh into cells where no boundary primitive is listed, and those are outside as a whole. A cell that
-/// is touched and holds no part of the surface is full of mesh, and only such a leaf's flag is 0 (SPEC 2.3). Under `Lists::Boundary` cells outside
-/// are not listed: only the owners of their centres would be.
+/// Boundary flag of a leaf. It is 0 only if the cell lies entirely within the mesh (SPEC 2.3). It is set if the leaf
+/// lists a boundary tetrahedron. It is also set if none of the first [`MAX_TOUCH_TESTS`] tetrahedra touches the cell:
+/// the bounding box of an inner tetrahedron can reach out of the mesh into cells where no boundary tetrahedron is
+/// listed, and such a cell lies entirely outside. A cell that is touched and contains no part of the surface lies
+/// entirely within the mesh. With `Lists::Boundary` cells outside have no entries, since unmarked cells list only the
+/// owners of their centres, so that test is not needed.
 pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Topology, vertices: &Vertices, grid: &Grid) -> bool {
     let boundary = listed.iter().any(|&p| bit(&topology.boundary, p));
     if boundary || lists == Lists::Boundary {
@@ -57,11 +60,13 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
     !listed.is_empty() && !listed.iter().take(MAX_TOUCH_TESTS).any(touches)
 }
 
-/// Lists longer than this are not asked for their octants.
+/// Leaves with longer lists than this get a mask of all octants.
 pub const MAX_LIST_FOR_OCTANTS: usize = 16_384;
 
-/// The mask of a leaf with entries `listed`: bit d says that one of them is near to the octant of its cell with the 3-bit Morton digit d. All octants of
-/// leaves without boundary primitives, of long lists, and where entries have no quarters. In the others no point has an owner (tolerances below 2^-12).
+/// The mask of a leaf with entries `listed`. Bit d says that one of the entries is near the octant of its cell with the
+/// 3-bit Morton digit d. In the other octants no point has an owner (for tolerances below 2^-12). The mask has all
+/// octants if the leaf has no boundary tetrahedra, if its list is long, or if entries have no quarters; it is 0 without
+/// entries.
 pub fn octants(listed: Range<usize>, boundary: bool, quarters: &[u16], grid: &Grid) -> u32 {
     if !boundary || quarters.is_empty() || listed.len() > MAX_LIST_FOR_OCTANTS {
         return if listed.is_empty() { 0 } else { ALL_OCTANTS };

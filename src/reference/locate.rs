@@ -1,4 +1,4 @@
-//! Point location over lists and by walking: every point has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
+//! Point location by lists and by walks: every point of the mesh has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{NONE, Topology};
@@ -15,16 +15,17 @@ use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Entries of a list that one dispatch searches.
+/// Number of entries of a list that one dispatch searches.
 pub const LIST_PART: u32 = 16_384;
 
-/// Points that are sorted and located together where there are more.
+/// Most points that are sorted and located together.
 pub const CHUNK: usize = 1 << 20;
 
-/// Bits of the Morton code that points are sorted by: two passes over them.
+/// Number of leading bits of the Morton code that points are sorted by; the sort takes two passes over them.
 pub const CODE_BITS: u32 = 22;
 
-/// Points along the Morton curve, those where no mesh can be last: the order of [`crate::query::cmd_sort_points`].
+/// The order of points along the Morton curve, as [`crate::query::cmd_sort_points`] computes it. Points too far outside
+/// the bounds for any mesh come last.
 pub fn order_of(grid: &Grid, points: &[[f32; 3]]) -> Vec<u32> {
     let code = |p: [f32; 3]| place(grid, p).map_or(NONE, |(cell, _)| morton(cell)) >> (3 * MAX_LEVEL - CODE_BITS) & ((1 << CODE_BITS) - 1);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
@@ -32,10 +33,10 @@ pub fn order_of(grid: &Grid, points: &[[f32; 3]]) -> Vec<u32> {
     order
 }
 
-/// Where a point lies.
+/// The owner of a point, and the point's place in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Location {
-    /// Primitive that owns the point, or [`NONE`].
+    /// The tetrahedron that owns the point, or [`NONE`].
     pub owner: u32,
     /// Barycentric coordinates in the caller's order of the owner's vertices; all 0 without an owner.
     pub barycentric: [f32; 4],
@@ -51,8 +52,9 @@ impl Location {
     }
 }
 
-/// The finest cell of a point and its normalised coordinates, or `None` where no mesh can be: a coordinate is NaN or infinite, or
-/// `(p − lo)·scale` is not in [−1, 3] (the bounds reach from 0 to less than 2). Points just outside the bounds belong to the nearest cell.
+/// The finest cell of a point and its normalised coordinates. `None` if no mesh can be there: a coordinate is NaN or
+/// infinite, or `(p − lo)·scale` is not in [−1, 3] (the bounds reach from 0 to less than 2). Points just outside the
+/// bounds belong to the nearest cell.
 pub fn place(grid: &Grid, p: [f32; 3]) -> Option<([u32; 3], Vec3)> {
     let near = |c: usize| (-1.0..=3.0).contains(&(canonical(canonical(p[c]) - grid.lo[c]) * grid.scale));
     (near(0) && near(1) && near(2)).then(|| (grid.quantize(p), grid.normalise(p)))
@@ -74,38 +76,41 @@ impl<'a> Locator<'a> {
         Self { mesh, tree, neighbours: &topology.neighbours, vertices: Vertices::new(mesh, &tree.grid), tolerance: TOLERANCE }
     }
 
-    /// The same with another tolerance (see [`TOLERANCE`]).
+    /// Replaces the tolerance (see [`TOLERANCE`]).
     #[must_use]
     pub fn with_tolerance(self, tolerance: f32) -> Self {
         Self { tolerance, ..self }
     }
 
-    /// The owner of `p`: of the primitives listed in the point's leaf, the lowest id that contains it. If none does, the nearest: one whose box
-    /// holds the point before others, then the largest smallest barycentric coordinate, then the lowest id, flat cells never; in a boundary
-    /// leaf only if that coordinate reaches −tolerance. In a leaf without list (SPEC 2.6) a walk finds the same.
+    /// The owner of `p`: of the tetrahedra listed in the point's leaf, the lowest id that contains it. If none does,
+    /// the nearest one owns it: preferably one whose box contains the point, then the one with the largest smallest
+    /// barycentric coordinate, then the lowest id, but never a flat tetrahedron; in a boundary leaf only if that
+    /// coordinate is at least −tolerance. In a leaf without list (SPEC 2.6) a walk finds the same owner.
     pub fn locate(&self, p: [f32; 3]) -> Location {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
         self.tree.find_leaf(cell).map_or(Location::NOWHERE, |leaf| self.in_leaf(leaf, cell, x))
     }
 
-    /// As [`Locator::locate`], but first goes a few steps from `hint` (any number, such as the owner of the last point) towards the point, and takes the cell
-    /// that holds it clearly, or one of two beside a face: in a mesh whose cells do not overlap it is the owner that [`Locator::locate`] finds.
+    /// As [`Locator::locate`], but first takes a few steps from `hint` (any number, such as the owner of the last
+    /// point) towards the point. If they reach a tetrahedron that clearly contains the point, or one of two that share
+    /// a face near the point, that one is the result. In a mesh whose tetrahedra do not overlap it is the owner that
+    /// [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
         let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.mesh.points.len() && !t[..i].contains(&v));
         let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };
         self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
     }
 
-    /// Points in runs of [`POINT_RUN`] along `order`, each with the owner of the one before as its hint. Where that one was looked for in a list longer than
-    /// [`LIST_PART`], there is none.
+    /// Locates points in runs of [`POINT_RUN`] along `order`, each with the owner of the one before as its hint. There
+    /// is no hint if that owner was searched for in a list longer than [`LIST_PART`].
     pub fn locate_in_runs(&self, points: &[[f32; 3]], order: &[u32]) -> Vec<Location> {
         let run = |places: &[u32]| {
             let mut hint = NONE;
             let next = |&i: &u32| {
                 let p = points[i as usize];
-                let stride_from_middle = self.stride_to(p, hint, HINTED);
-                let location = stride_from_middle.unwrap_or_else(|| self.locate(p));
-                hint = if stride_from_middle.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
+                let near = self.stride_to(p, hint, HINTED);
+                let location = near.unwrap_or_else(|| self.locate(p));
+                hint = if near.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
                 (i, location)
             };
             places.iter().map(next).collect::<Vec<_>>()
@@ -117,7 +122,7 @@ impl<'a> Locator<'a> {
         located
     }
 
-    /// Whether [`Locator::locate`] looks for a point in a list that takes more than one dispatch.
+    /// Whether [`Locator::locate`] searches for a point in a list that takes more than one dispatch.
     fn searches_long_list(&self, p: [f32; 3]) -> bool {
         let leaf = place(&self.tree.grid, p).and_then(|(cell, x)| Some((self.tree.find_leaf(cell)?, x)));
         leaf.is_some_and(|(leaf, x)| {
@@ -127,7 +132,8 @@ impl<'a> Locator<'a> {
         })
     }
 
-    /// Every primitive that contains `p`, ascending; if none does, the owner alone.
+    /// Every tetrahedron that contains `p`, ascending; if none does, the owner within the tolerance alone, if there is
+    /// one.
     pub fn owners(&self, p: [f32; 3]) -> Vec<u32> {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Vec::new() };
         let Some(leaf) = self.tree.find_leaf(cell) else { return Vec::new() };
@@ -145,7 +151,8 @@ impl<'a> Locator<'a> {
         if owners.is_empty() { self.in_leaf(leaf, cell, x).found().into_iter().collect() } else { owners }
     }
 
-    /// As [`Locator::locate`], through the paper's traversal with a stack of `stack` nodes instead of the descent.
+    /// As [`Locator::locate`], but finds the leaf by the paper's traversal with a stack of `stack` nodes instead of the
+    /// descent.
     pub fn locate_by_traversal(&self, p: [f32; 3], stack: usize) -> Location {
         let Some((cell, x)) = place(&self.tree.grid, p) else { return Location::NOWHERE };
         let code = morton(cell);
@@ -163,8 +170,9 @@ impl<'a> Locator<'a> {
         points.par_iter().map(|&p| self.locate(p)).collect()
     }
 
-    /// The field's value at a location: `(b0·v0 + b1·v1) + (b2·v2 + b3·v3)` over the owner's vertices in the caller's order, or the owner's value
-    /// of a field on cells. NaN without an owner, or where the field is too short.
+    /// The field's value at a location: `(b0·v0 + b1·v1) + (b2·v2 + b3·v3)` over the owner's vertices in the caller's
+    /// order, or the owner's value if the field has values per tetrahedron. NaN without an owner, or if the field is
+    /// too short.
     pub fn value(&self, field: &Field, location: &Location) -> f32 {
         let at = |i: u32| field.values.get(i as usize).copied().unwrap_or(f32::NAN);
         let Some(&ids) = self.mesh.tets.get(location.owner as usize) else { return f32::NAN };
@@ -188,43 +196,44 @@ impl<'a> Locator<'a> {
         Location { owner, barycentric: self.vertices.tet(self.mesh.tets[owner as usize]).barycentric(x) }
     }
 
-    /// The walk to a point, if its leaf is one to walk through: what [`Locator::locate`] does there.
+    /// The walk that [`Locator::locate`] takes to a point whose leaf has a seed; `None` for other leaves.
     pub fn walk(&self, p: [f32; 3]) -> Option<Walked> {
         let (cell, x) = place(&self.tree.grid, p)?;
         let seed = self.tree.seed(self.tree.find_leaf(cell)?)?;
-        Some(self.walker().walk(seed, &self.room(cell), x))
+        Some(self.walker().walk(seed, &self.leaf_cell(cell), x))
     }
 
-    /// The cell that holds `p` clearly, if it is `hint` or at most `most` steps across faces away from it.
+    /// The owner of `p`, if it can be reached from `hint` in fewer than `most` steps across faces and `p` is not near
+    /// an edge; see [`Walker::stride_to`].
     pub fn stride_to(&self, p: [f32; 3], hint: u32, most: u32) -> Option<Location> {
         let (_, x) = place(&self.tree.grid, p)?;
         Some(self.location(self.walker().stride_to(hint, x, most)?, x))
     }
 
-    /// The cell of a leaf, from one of its finest cells.
-    fn room(&self, finest: [u32; 3]) -> LeafCell {
+    /// The cell of a leaf, given one of its finest cells.
+    fn leaf_cell(&self, finest: [u32; 3]) -> LeafCell {
         let (grid, level) = (&self.tree.grid, self.tree.grid.level);
         let half = half_cell(grid, level);
         LeafCell { centre: cell_centre(half, finest.map(|q| q >> (MAX_LEVEL - level))), half }
     }
 
-    /// The owner among the primitives of a leaf, listed or not.
+    /// The owner among the tetrahedra of a leaf, whether they are listed or reached by a walk.
     fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Location {
-        let walk = |seed| self.walker().walk(seed, &self.room(finest), x).best;
+        let walk = |seed| self.walker().walk(seed, &self.leaf_cell(finest), x).best;
         let walked = self.stride_from_middle(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
         let best = walked.unwrap_or_else(|| self.listed(leaf, finest, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
     }
 
-    /// By a stride from the middle of the list, where leaves within the mesh have none.
+    /// The owner by a stride from the tetrahedron in the middle of the list, in trees with seeds.
     fn stride_from_middle(&self, leaf: u32, x: Vec3) -> Option<u32> {
         let list = self.tree.primitives(leaf);
         let middle = *list.get(list.len() / 2).filter(|_| self.tree.lists == Lists::Boundary)?;
         self.walker().stride_to(middle, x, STRIDE)
     }
 
-    /// The best of those of a leaf's list that are near, up to the first that contains x.
+    /// The best tetrahedron of a leaf's list among those near the point, searched up to the first that contains x.
     fn listed(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Best {
         let reach = reach(&self.tree.grid, self.tolerance);
         let near = |&&t: &&u32| is_near(&self.vertices.cells(self.mesh.tets[t as usize], MAX_LEVEL), finest, reach);

@@ -1,15 +1,17 @@
-//! The cells that the boundary touches, and who is listed where under `Lists::Boundary` (SPEC 2.6). Twin of `glsl/shared/{marks,seeds}.glsl`.
+//! The cells that the boundary touches, and the entries of cells with `Lists::Boundary` (SPEC 2.6). Twin of
+//! `glsl/shared/{marks,seeds}.glsl`.
 //!
-//! A cell is marked if a boundary primitive touches it, under the assignment. Any other cell lies inside the mesh as a whole or outside as a
-//! whole: inside if a primitive that is no boundary contains its centre. Rounding may leave the centre in a gap between cells; then those that
-//! come within the margin of their faces, at least one, stand for it.
+//! A cell is marked if a boundary tetrahedron touches it according to the assignment. Any other cell lies either
+//! entirely inside or entirely outside the mesh: inside if a non-boundary tetrahedron contains its centre. Because of
+//! rounding the centre may lie in a gap between tetrahedra. Then the tetrahedra that have it within the margin of their
+//! faces, at least one, are listed in place of the owner.
 
 use super::boundary::{NONE, bit};
 use super::grid::morton;
 use super::tet::{Tet, Vec3};
 use super::walk::Walker;
 
-/// One bit per cell of the level of the leaves, by Morton code.
+/// One bit per cell at the level of the leaves, by Morton code.
 #[derive(Clone, Debug)]
 pub struct Marks(pub(super) Vec<u32>);
 
@@ -20,7 +22,8 @@ impl Marks {
     }
 }
 
-/// Whether `t` is a seed of an unmarked cell with this centre: it contains it and no lower one does, or it is near and none does.
+/// Whether an unmarked cell with this centre lists `t`: `t` contains the centre and no lower tetrahedron does, or the
+/// centre is within the margin of its faces and no tetrahedron contains it.
 pub fn owns_centre(walker: &Walker<'_>, t: u32, tet: &Tet, centre: Vec3) -> bool {
     let weights = tet.weights(centre);
     if weights.clear || !weights.in_box || !weights.near() {

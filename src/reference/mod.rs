@@ -1,5 +1,5 @@
-//! The plain twin of every stage and query, in safe Rust with the same stems as the kernels: the oracle of the tests, the
-//! documentation of the algorithms, and the engine of `--device cpu`. Knows no Vulkan.
+//! The reference implementation of every stage and query, in plain safe Rust, with the file names of the kernels. It is
+//! the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
 pub mod assign;
 pub mod boundary;

@@ -1,4 +1,4 @@
-//! The order of a mesh in memory: along the Morton curve.
+//! Reordering of a mesh in memory along the Morton curve.
 
 use super::boundary::{fault_of, is_usable, valid_grid};
 use super::grid::morton;
@@ -7,16 +7,19 @@ use crate::mesh::{Mesh, On};
 use rayon::prelude::*;
 
 impl Mesh {
-    /// The same mesh with its tetrahedra along the Morton curve, by their centroids, and its points likewise; what has one code keeps its order. Bad cells
-    /// come last, and points that are not finite. [`Mesh::cell_ids`] and [`Mesh::point_ids`] name those of the source, as before; fields follow.
+    /// The same mesh with its tetrahedra sorted along the Morton curve by their centroids, and its points likewise;
+    /// items with equal codes keep their order. Bad tetrahedra and points that are not finite come last.
+    /// [`Mesh::cell_ids`] and [`Mesh::point_ids`] still give the ids of the source, and fields are reordered too.
     ///
-    /// Neighbours in space become neighbours in memory. A mesh of 1.5 million tetrahedra in no order took 15–50 % longer to locate points in and 25–30 %
-    /// longer to build over (lavapipe, Mesa 25) than along the curve; generators mostly give an order that is as good.
+    /// Neighbours in space become neighbours in memory. Where a mesh of 1.5 million tetrahedra was stored in no spatial
+    /// order, locating points took 15–50 % longer and building a tree 25–30 % longer than in the order of the curve
+    /// (lavapipe, Mesa 25). Mesh generators mostly produce an order that is equally good.
     ///
-    /// Answers stay the same but for one: of the cells that share a face, edge or vertex, the first along the curve owns its points, not the lowest id.
+    /// Answers stay the same with one exception: a point on a shared face, edge or vertex belongs to the first of its
+    /// tetrahedra along the curve, not to the one with the lowest id in the source.
     ///
     /// # Errors
-    /// [`Error::TooLarge`] past 32-bit indices.
+    /// [`Error::TooLarge`] if tetrahedra or points exceed 32-bit indices.
     pub fn along_curve(mut self) -> Result<Self> {
         if self.points.len().max(self.tets.len()) >= u32::MAX as usize {
             let (tets, points) = (self.tets.len(), self.points.len());
@@ -34,7 +37,7 @@ impl Mesh {
         });
         let mut place = vec![0; points.len()];
         (0..).zip(&points).for_each(|(new, &old)| place[old as usize] = new);
-        // An index that is out of range stays so.
+        // An index that is out of range stays out of range.
         let moved = |v: u32| place.get(v as usize).copied().unwrap_or(v);
         for field in &mut self.fields {
             let order = if field.on == On::Points { &points } else { &tets };
@@ -52,7 +55,7 @@ impl Mesh {
     }
 }
 
-/// The numbers below `n`, by their keys; equal ones ascending.
+/// The numbers below `n`, sorted by their keys; numbers with equal keys ascending.
 fn sorted(n: usize, key: impl Fn(u32) -> u32 + Sync) -> Vec<u32> {
     let mut pairs: Vec<(u32, u32)> = (0..n as u32).into_par_iter().map(|i| (key(i), i)).collect();
     pairs.par_sort_unstable();

@@ -1,22 +1,28 @@
-//! Overlap of two meshes (SPEC 3.5): which primitives of either intersect the other mesh, and which pairs. Twin of `glsl/query/overlap_*`.
+//! Overlap of two meshes (SPEC 3.5): the tetrahedra of each mesh that intersect the other one, or all intersecting
+//! pairs. Twin of `glsl/query/overlap_*`.
 //!
-//! Both meshes lie in one space; their trees have grids of their own. Geometry between them is computed in normalised coordinates of the
-//! [`joint_grid`] over both bounds.
+//! Both meshes lie in one space, but each tree has a grid of its own. Geometry that involves both meshes is computed in
+//! normalised coordinates of the [`joint_grid`] over both bounds.
 //!
 //! # Sets
-//! For either mesh (its own: A, the other: B), all of it by inference until the last step:
-//! 1. A vertex of A in a cell of a non-boundary leaf of B lies in B. One in a boundary leaf is looked for in the leaf's list; the tetrahedron
-//!    of B that holds it intersects A. A primitive of A with a vertex in B intersects B.
-//! 2. Of the others, those whose box meets the bounds of B descend B's tree over the cells of their box: a primitive that touches the box of a
-//!    non-boundary node, 2^18 (about 2^-22 of the joint bounds) larger on each side, intersects B. No node below is looked at.
-//! 3. Those that still are undecided are tested by separating axes against the primitives of boundary leaves, up to the first that touches:
-//!    the narrow phase. With the assignment `Aabb` each pair is tested once, in the cell of the lower corner of the two boxes' intersection.
+//! The following steps are taken for each mesh in turn, which is called A here, and the other mesh B. All but the last
+//! step decide by inference.
+//! 1. A vertex of A in the cell of a non-boundary leaf of B lies in B. One in a boundary leaf is searched for in the
+//!    leaf's list; the tetrahedron of B that contains it intersects A. A tetrahedron of A with a vertex in B intersects
+//!    B.
+//! 2. Each of the remaining tetrahedra whose box meets the bounds of B descends B's tree over the cells that its box
+//!    meets. A tetrahedron that touches the box of a non-boundary node, enlarged by 2^18 (about 2^-22 of the joint
+//!    bounds) on each side, intersects B. Nodes below such a node are not visited.
+//! 3. Tetrahedra that are still undecided are tested by separating axes against the tetrahedra of boundary leaves, up
+//!    to the first that touches (the narrow phase). With the assignment `Aabb` each pair is tested once, in the cell of
+//!    the lower corner of the two boxes' intersection.
 //!
-//! All roundings are below 2^-21 of the joint bounds, so only pairs nearer to touching than 1e-6 of the scene's diagonal can go either way.
+//! All rounding errors are below 2^-21 of the joint bounds, so the result is uncertain only for pairs that are nearer
+//! to touching than 1e-6 of the scene's diagonal.
 //!
 //! # Pairs
-//! No inference is possible: all pairs of primitives whose boxes meet are tested, found through the cells of B. The sets are those of the
-//! primitives in pairs then.
+//! Pairs cannot be inferred. All pairs of tetrahedra whose boxes meet are tested; they are found through the cells of
+//! B. The sets then consist of the tetrahedra that occur in pairs.
 
 use super::boundary::{Topology, bit};
 use super::grid::{Grid, MAX_LEVEL, canonical, two_to, unmorton};
@@ -42,35 +48,35 @@ pub struct OverlapSide<'a> {
     pub tree: &'a TreeArrays,
 }
 
-/// What one direction took.
+/// The effort of one direction.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Effort {
-    /// Primitives with a vertex in the other mesh, or around one of its vertices.
+    /// Tetrahedra with a vertex in the other mesh, or around one of its vertices.
     pub by_vertex: u32,
-    /// Primitives that touch a non-boundary node of the other tree.
+    /// Tetrahedra that touch a non-boundary node of the other tree.
     pub by_node: u32,
-    /// Primitives that needed a search in the other tree.
+    /// Tetrahedra that needed a search in the other tree.
     pub searched: u32,
-    /// Vertices that were looked up in the list of a leaf.
+    /// Vertices that were searched for in the list of a leaf.
     pub located: u32,
     /// Tests of two tetrahedra by separating axes.
     pub narrow: u64,
 }
 
-/// What intersects what.
+/// Which tetrahedra of each mesh intersect the other mesh.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Overlap {
-    /// Primitives of A that intersect B, ascending.
+    /// Tetrahedra of A that intersect B, ascending.
     pub a: Vec<u32>,
-    /// Primitives of B that intersect A, ascending.
+    /// Tetrahedra of B that intersect A, ascending.
     pub b: Vec<u32>,
-    /// Intersecting pairs, ascending by A then B, if asked for.
+    /// Intersecting pairs, if requested, ascending by A, then by B.
     pub pairs: Option<Vec<[u32; 2]>>,
-    /// What A against B took, and B against A.
+    /// The effort of A against B, then of B against A.
     pub effort: [Effort; 2],
 }
 
-/// The grid over the bounds of both meshes; one without valid cells does not count.
+/// The grid over the bounds of both meshes. A mesh without valid tetrahedra does not count.
 pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
     let three = |v: [f32; 4]| [v[0], v[1], v[2]];
     match valid {
@@ -83,7 +89,7 @@ pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
     }
 }
 
-/// The cells of the tree with grid `grid` in normalised coordinates of the joint grid.
+/// The cells of the tree with grid `grid`, in normalised coordinates of the joint grid.
 pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
     let corner = joint.normalise([grid.lo[0], grid.lo[1], grid.lo[2]]);
     let half = [0, 1, 2].map(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * two_to(39));
@@ -99,7 +105,7 @@ pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
     }
 }
 
-/// Centre and half size, allowance included, of the box of a node.
+/// Centre and half size of the box of a node, the half size with the allowance of step 2.
 fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
     let cell = unmorton(node.code);
     let half =
@@ -109,7 +115,7 @@ fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
     (centre, half.map(|h| h + two_to(18)))
 }
 
-/// Closed box of a primitive in the units of the mesh.
+/// Closed bounding box of a tetrahedron in the units of the mesh.
 fn raw_box(mesh: &Mesh, t: u32) -> (Vec3, Vec3) {
     let v = mesh.tets[t as usize].map(|i| mesh.points[i as usize].map(canonical));
     let fold = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|c| pick(pick(v[0][c], v[1][c]), pick(v[2][c], v[3][c])));
@@ -120,7 +126,7 @@ fn boxes_meet(a: &(Vec3, Vec3), b: &(Vec3, Vec3)) -> bool {
     (0..3).all(|c| a.0[c] <= b.1[c] && b.0[c] <= a.1[c])
 }
 
-/// One direction: the primitives of `own` against the tree of `other`.
+/// One direction: the tetrahedra of `own` against the tree of `other`.
 struct Direction<'a> {
     own: OverlapSide<'a>,
     other: OverlapSide<'a>,
@@ -129,7 +135,7 @@ struct Direction<'a> {
     frame: NodeFrame,
 }
 
-/// Where a vertex lies, as far as is known.
+/// Where a vertex lies relative to the other mesh; the tetrahedron is known only if a list was searched.
 #[derive(Clone, Copy, PartialEq)]
 enum Place {
     Outside,
@@ -138,7 +144,7 @@ enum Place {
 }
 
 impl Direction<'_> {
-    /// Whether a vertex lies in the other mesh; and whether that needed a list.
+    /// The place of a vertex, and whether a list was searched for it.
     fn place(&self, point: [f32; 3], other_normalised: &[Vec3]) -> (Place, bool) {
         let grid = &self.other.tree.grid;
         let p = point.map(canonical);
@@ -165,12 +171,12 @@ impl Direction<'_> {
         Tet::new(self.other.mesh.tets[t as usize], self.other_joint).v
     }
 
-    /// Finest cells of the other grid that a box meets.
+    /// The finest cells of the other grid that a box meets.
     fn cells(&self, bounds: &(Vec3, Vec3)) -> CellRange {
         CellRange { lo: self.other.tree.grid.quantize(bounds.0), hi: self.other.tree.grid.quantize(bounds.1) }
     }
 
-    /// Whether primitives with these boxes are compared in that leaf.
+    /// Whether tetrahedra with these boxes are compared in that leaf.
     fn compared_in(&self, leaf: Node, own: &(Vec3, Vec3), other: &(Vec3, Vec3)) -> bool {
         if !boxes_meet(own, other) {
             return false;
@@ -182,7 +188,7 @@ impl Direction<'_> {
         self.other.tree.grid.quantize(corner).map(|q| q >> (MAX_LEVEL - leaf.level)) == unmorton(leaf.code)
     }
 
-    /// Steps 2 and 3.
+    /// Steps 2 and 3: whether tetrahedron `t` intersects the other mesh.
     fn search(&self, t: u32, effort: &mut Effort) -> bool {
         let (bounds, v) = (raw_box(self.own.mesh, t), self.own_tet(t));
         let (cells, tree) = (self.cells(&bounds), self.other.tree);
@@ -220,7 +226,7 @@ impl Direction<'_> {
         found
     }
 
-    /// Everything that touches primitive `t`, ascending.
+    /// All tetrahedra of the other mesh that touch tetrahedron `t`, ascending.
     fn partners(&self, t: u32, effort: &mut Effort) -> Vec<u32> {
         let (bounds, v) = (raw_box(self.own.mesh, t), self.own_tet(t));
         let (cells, tree) = (self.cells(&bounds), self.other.tree);
@@ -252,7 +258,7 @@ impl Direction<'_> {
     }
 }
 
-/// Step 1 of one direction: the places of the vertices that valid cells use.
+/// Step 1 of one direction: the places of the vertices that valid tetrahedra use.
 fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
     let OverlapSide { mesh, topology, .. } = direction.own;
     let mut used = vec![false; mesh.points.len()];
@@ -270,7 +276,8 @@ fn places(direction: &Direction, effort: &mut Effort) -> Vec<Place> {
     places.into_iter().map(|p| p.0).collect()
 }
 
-/// Steps 1 to 3 of one direction, `around`: primitives of its own around a vertex of the other mesh.
+/// Steps 1 to 3 of one direction. `around` has a bit for each tetrahedron of `own` that contains a vertex of the other
+/// mesh.
 fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Effort) -> Vec<u32> {
     let OverlapSide { mesh, topology, .. } = direction.own;
     let one = |t: u32| {
@@ -297,7 +304,7 @@ fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Ef
 }
 
 impl Effort {
-    /// Sums up.
+    /// Adds the counts of `other`.
     pub(crate) fn add(&mut self, other: &Self) {
         self.by_vertex += other.by_vertex;
         self.by_node += other.by_node;
@@ -307,7 +314,8 @@ impl Effort {
     }
 }
 
-/// Overlap of A and B, with all pairs if `pairs`. The trees must have been built over these meshes, that of B with `Lists::All` if pairs are wanted.
+/// Overlap of A and B, with all pairs if `pairs` is true. The trees must have been built over these meshes, and that of
+/// B with `Lists::All` if pairs are requested.
 pub fn overlap(a: OverlapSide, b: OverlapSide, pairs: bool) -> Overlap {
     let mut overlap = Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() };
     let valid = [a, b].map(|s| s.topology.valid_cells() > 0);
@@ -351,7 +359,7 @@ pub fn overlap(a: OverlapSide, b: OverlapSide, pairs: bool) -> Overlap {
     overlap
 }
 
-/// The primitives that occur in pairs, ascending, each once.
+/// The tetrahedra of A, and those of B, that occur in pairs, ascending and each once.
 pub fn members(pairs: &[[u32; 2]]) -> (Vec<u32>, Vec<u32>) {
     let of = |side: usize| {
         let mut ids: Vec<u32> = pairs.iter().map(|p| p[side]).collect();

@@ -1,12 +1,18 @@
-//! What an entry says of where in its leaf's cell it lies, so that a search passes most of a list over. Twin of `glsl/shared/quarters.glsl`.
+//! Quarters: bits of an entry that tell which parts of the leaf's cell its tetrahedron is near, so that a search can
+//! skip most of a list. Twin of `glsl/shared/quarters.glsl`.
 //!
-//! A cell is cut in four along each axis. An entry is *near* a quarter that the quantized box of its primitive meets, once the box has grown by a cell
-//! of the finest grid all around: a bit for each, the lowest of the first axis first. The twelve bits stand above the primitive in the entry's word. In
-//! meshes of more than 2^20 tetrahedra, whose ids leave six bits, they are halves, and cells are not cut beyond the finest ones. A point that a
-//! primitive owns is near it, too: the primitive's box holds it, or it lies outside by at most three times the tolerance of the box (SPEC 3.1.4), which
-//! is less than a finest cell for tolerances below 2^-12. For larger ones boxes grow by more, and quarters are not asked; the octants of leaves still
-//! are, so that a point outside may be found under one α and not under another, as at the border of a leaf. On an axis so short beside the largest that
-//! normalised coordinates cannot tell its finest cells apart, everything is near.
+//! A leaf's cell is cut into four quarters along each axis. An entry is *near* a quarter if the quantized box of its
+//! tetrahedron, enlarged by one cell of the finest grid on all sides, meets it. The entry has one bit per quarter, the
+//! lowest quarter of the first axis in the lowest bit; these twelve bits stand above the tetrahedron's id in the
+//! entry's word. In meshes of more than 2^20 tetrahedra ids leave only six bits, which then stand for halves. A cell is
+//! never cut finer than cells of the finest grid.
+//!
+//! A tetrahedron is also near every point that it owns: its box contains the point, or the point lies outside by at
+//! most three times the tolerance in parts of the box (SPEC 3.1.4), which is less than a finest cell for tolerances
+//! below 2^-12. For larger tolerances boxes are enlarged by more, and quarters are not used. The octants of leaves are
+//! used still, so with such tolerances a point outside the mesh may have an owner under one α and none under another,
+//! as at the border of a leaf. On an axis so much shorter than the longest one that normalised coordinates cannot tell
+//! its finest cells apart, everything is near.
 
 use super::grid::{Grid, MAX_LEVEL, two_to, unmorton};
 use super::vertices::{CellRange, Vertices};
@@ -14,30 +20,33 @@ use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
 
-/// A mask of all octants.
+/// The mask of all octants.
 pub const ALL_OCTANTS: u32 = 0xff;
 
-/// An axis of less than this in normalised coordinates has finest cells of less than four of their steps.
+/// On an axis with a smaller extent than this in normalised coordinates, a finest cell is less than four steps of the
+/// coordinates wide.
 const COARSE: f32 = two_to(-30);
 
-/// The bits of an entry's word that are its primitive; quarters or halves stand above. All bits where entries have none: in the paper's lists, and in meshes that
-/// need the bits for their ids.
+/// The bits of an entry's word that are its tetrahedron's id; quarters or halves stand above them. All bits if entries
+/// have no quarters: in the paper's lists, and in meshes that need the bits for their ids.
 pub fn id_mask(lists: Lists, tets: usize) -> u32 {
     let bits = [20, 26].into_iter().find(|&bits| tets <= 1 << bits);
     bits.filter(|_| lists == Lists::Boundary).map_or(u32::MAX, |bits| (1 << bits) - 1)
 }
 
-/// How often a leaf's cell is cut in two along each axis.
+/// How many times a leaf's cell is halved along each axis.
 fn cuts(grid: &Grid) -> u32 {
     (grid.ids.leading_zeros() / 6).min(MAX_LEVEL - grid.level)
 }
 
-/// By how many finest cells per axis boxes grow, at least `least`.
+/// The number of finest cells by which boxes are enlarged on each axis: `least`, or the whole grid on axes that are too
+/// short.
 fn grown(grid: &Grid, least: u32) -> [u32; 3] {
     [0, 1, 2].map(|c| if grid.extent[c] < COARSE { 1024 } else { least })
 }
 
-/// The quarters of the leaf's cell with Morton code `code` that a box of finest cells is near to; `grid` is the tree's.
+/// The quarters of the leaf's cell with Morton code `code` that a box of finest cells is near; `grid` is that of the
+/// tree.
 pub fn quarters_near(grid: &Grid, code: u32, cells: &CellRange) -> u32 {
     let (n, leaf, reach) = (cuts(grid), unmorton(code), grown(grid, 1));
     if n == 0 {
@@ -51,7 +60,7 @@ pub fn quarters_near(grid: &Grid, code: u32, cells: &CellRange) -> u32 {
     along(0) | along(1) << (1 << n) | along(2) << (2 << n)
 }
 
-/// Primitives and quarters of entries as a device holds them, in a tree with this grid.
+/// Splits entries, as a device stores them in a tree with this grid, into tetrahedra and quarters.
 pub fn split_entries(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
     if grid.ids == u32::MAX {
         return (entries, Vec::new());
@@ -59,7 +68,7 @@ pub fn split_entries(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
     entries.into_iter().map(|entry| (entry & grid.ids, (entry >> grid.ids.count_ones()) as u16)).unzip()
 }
 
-/// The quarters of all entries, which have these Morton codes and primitives; none where entries have no bits for them.
+/// The quarters of all entries, given their Morton codes and tetrahedra; empty if entries have no bits for them.
 pub fn quarters(codes: &[u32], primitives: &[u32], grid: &Grid, mesh: &Mesh, vertices: &Vertices) -> Vec<u16> {
     if grid.ids == u32::MAX {
         return Vec::new();
@@ -68,7 +77,7 @@ pub fn quarters(codes: &[u32], primitives: &[u32], grid: &Grid, mesh: &Mesh, ver
     codes.par_iter().zip(primitives).map(near).collect()
 }
 
-/// The octants of its cell that an entry is near to: bit d for the 3-bit Morton digit d.
+/// The octants of its cell that an entry is near: bit d for the 3-bit Morton digit d.
 pub fn octants_near(grid: &Grid, quarters: u32) -> u32 {
     let n = cuts(grid);
     if n == 0 {
@@ -80,12 +89,13 @@ pub fn octants_near(grid: &Grid, quarters: u32) -> u32 {
     (0..8).filter(near).fold(0, |mask, d| mask | 1 << d)
 }
 
-/// By how many finest cells per axis the box of a primitive grows, so that a point which that tolerance lets it own is within.
+/// The number of finest cells by which the box of a tetrahedron is enlarged on each axis, so that it contains every
+/// point that this tolerance lets the tetrahedron own.
 pub fn reach(grid: &Grid, tolerance: f32) -> [u32; 3] {
     grown(grid, 1 + (tolerance.clamp(0.0, 1.0) * 4096.0) as u32)
 }
 
-/// Whether a primitive's quantized box is so near that it can own a point in that finest cell.
+/// Whether a tetrahedron's quantized box is near enough for it to own a point in that finest cell.
 pub fn is_near(cells: &CellRange, cell: [u32; 3], reach: [u32; 3]) -> bool {
     (0..3).all(|c| cells.lo[c] <= cell[c] + reach[c] && cell[c].saturating_sub(reach[c]) <= cells.hi[c])
 }
@@ -94,7 +104,7 @@ pub fn is_near(cells: &CellRange, cell: [u32; 3], reach: [u32; 3]) -> bool {
 mod tests {
     use super::*;
 
-    /// By looking at every finest cell of the leaf.
+    /// The quarters found by testing every finest cell of the leaf.
     fn counted(grid: &Grid, code: u32, cells: &CellRange, parts: u32) -> u32 {
         let (leaf, side) = (unmorton(code), 1 << (MAX_LEVEL - grid.level));
         let mut bits = 0;
@@ -116,7 +126,8 @@ mod tests {
             let mut different = std::collections::HashSet::new();
             for lo in 0..side + 2 {
                 for hi in lo.max(2)..side + 4 {
-                    // From two cells before the leaf's to two behind them, the same along two of the axes.
+                    // The box reaches from up to two cells before the leaf's cell to up to two after it, equally along
+                    // the first and the last axis.
                     let [from, to] = [lo, hi].map(|k| first.map(|f| (f + k).saturating_sub(2)));
                     let cells = CellRange { lo: [from[0], first[1], from[2]], hi: [to[0], first[1] + hi / 2, to[2]] };
                     let near = quarters_near(&grid, code, &cells);

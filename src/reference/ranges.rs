@@ -1,9 +1,13 @@
-//! The range of a field's values in every node of a tree. Twin of `glsl/build/51_scatter_ranges`, `52_push_ranges` and `53_merge_ranges`.
+//! The range of a field's values in every node of a tree. Twin of `glsl/build/51_scatter_ranges`, `52_push_ranges` and
+//! `53_merge_ranges`.
 //!
-//! A value counts where it is one: a tetrahedron with a value that is not finite has none anywhere (interpolation gives none), and counts nowhere. Every other
-//! valid one counts with its smallest and largest value in all leaves whose cells its quantized box meets, listed there or not (quantization is monotone, so
-//! these hold all of its points). A tetrahedron whose box has more than [`SPAN`] leaves along an axis counts in all leaves below the nodes that its box meets on
-//! the deepest level where they are no more: its range reaches a little far, and its work is bounded. Other nodes have the union of their children's.
+//! A tetrahedron with a value that is not finite counts nowhere, since interpolation in it yields no value. Every other
+//! valid tetrahedron counts, with its smallest and largest value, in all leaves whose cells its quantized box meets,
+//! whether they list it or not; quantization is monotone, so these leaves contain all of its points. A tetrahedron
+//! whose box meets more than [`SPAN`] leaves along an axis is treated more coarsely, which bounds the work: it counts
+//! in all leaves below the nodes that its box meets on the deepest level where there are at most [`SPAN`] of them along
+//! each axis. Its range then extends a little beyond its box. The range of an internal node is the union of its
+//! children's.
 
 use super::boundary::Topology;
 use super::grid::{canonical, morton, two_to};
@@ -13,24 +17,25 @@ use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Most nodes along an axis that a tetrahedron adds its values to.
+/// Most nodes along an axis to which a tetrahedron adds its values.
 pub const SPAN: u32 = 4;
 
-/// A key with the order of the floats.
+/// An integer key that sorts like the float.
 fn ordered(x: f32) -> u32 {
     let bits = x.to_bits();
     if bits >> 31 != 0 { !bits } else { bits | 1 << 31 }
 }
 
-/// The float of a key.
+/// The float of a key; inverse of [`ordered`].
 fn unordered(key: u32) -> f32 {
     f32::from_bits(if key >> 31 != 0 { key & 0x7fff_ffff } else { !key })
 }
 
-/// `[smallest, largest]` value of every node, `[∞, −∞]` of those without one. The field must have as many values as the mesh has points or tetrahedra.
+/// `[smallest, largest]` value of every node, `[∞, −∞]` for nodes without a value. The field must have as many values
+/// as the mesh has points or tetrahedra.
 pub fn ranges(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, field: &Field) -> Vec<[f32; 2]> {
     let vertices = Vertices::new(mesh, &tree.grid);
-    // Keys; the lower end's complemented, so that both only grow and 0 is nothing.
+    // Keys of both ends. Those of the lower ends are complemented, so that keys only grow, and 0 means no value.
     let keys: Vec<[AtomicU32; 2]> = (0..tree.nodes()).map(|_| Default::default()).collect();
     mesh.tets.par_iter().enumerate().filter(|&(t, _)| topology.is_valid(t as u32)).for_each(|(t, &ids)| {
         let values = if field.on == On::Points { ids.map(|id| field.values[id as usize]) } else { [field.values[t]; 4] };
@@ -62,8 +67,9 @@ pub fn ranges(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, field: &Field
     keys.into_iter().map(floats).collect()
 }
 
-/// Which nodes have something to see: a value within one of the ranges `drawn` (ascending, apart), which is assumed where interpolation might round into one.
-/// One bit per node. Twin of `glsl/query/visible`.
+/// One bit per node, set if something is visible in the node: a value within one of the ranges `drawn` (ascending and
+/// disjoint). Ranges of nodes are widened a little, since interpolation may round beyond them. Twin of
+/// `glsl/query/visible`.
 pub fn visible(ranges: &[[f32; 2]], drawn: &[[f32; 2]]) -> Vec<u32> {
     let rounding = two_to(-19);
     let one = |&[lo, hi]: &[f32; 2]| {

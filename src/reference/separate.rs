@@ -1,32 +1,35 @@
-//! Separating axes of tetrahedra and boxes, and the point of a tetrahedron nearest to another one. Twin of `glsl/shared/separate.glsl`: the same
-//! operations in the same order. All in normalised coordinates (differences below 2^43, multiples of 2^-42: no product of three overflows or becomes
-//! denormal).
+//! Separating-axis tests of tetrahedra and boxes, and the point of a tetrahedron nearest to the origin. Twin of
+//! `glsl/shared/separate.glsl`: the same operations in the same order. All values are in normalised coordinates:
+//! differences are below 2^43 and multiples of 2^-42, so no product of three of them overflows or becomes denormal.
 //!
-//! **Box and tetrahedron**, [`box_touches`]: the box has its centre at the origin and half axes h. 25 axes: its three axes, four face normals of the
-//! tetrahedron, 18 crosses of edges and box axes. Axis L separates if the interval of the vertices' products `L·v` lies outside
-//! ±(Σ|L·h| + `bound·slack`), where `bound` sums the absolute products that L consists of. With a slack of [`touch_slack`], 2^-20 of what is
-//! added up in it, that is at least twice the sum of all roundings: a tetrahedron that touches the box is never called apart, and one that is
-//! called touching is apart by no more than about 2^-19 of box and tetrahedron.
+//! **Box and tetrahedron**, [`box_touches`]: the centre of the box is the origin, and h are its half axes. There are 25
+//! axes: three axes of the box, four face normals of the tetrahedron, and 18 crosses of edges with axes of the box.
+//! Axis L separates the two if the interval of the products `L·v` of the vertices lies outside ±(Σ|L·h| +
+//! `bound·slack`), where `bound` sums the absolute products that L consists of. The slack of [`touch_slack`], 2^-20 of
+//! the lengths in it, is at least twice the sum of all rounding errors. So a tetrahedron that touches the box is never
+//! called separate, and one that is called touching is at most about 2^-19 of the size of box and tetrahedron away.
 //!
-//! **Two tetrahedra**, [`tets_touch`]: 8 face normals and 36 crosses of edges, no allowance: touching counts. The answer for (a, b) is that for
-//! (b, a) to the bit, because every difference and cross product changes nothing but its sign.
+//! **Two tetrahedra**, [`tets_touch`]: two with an equal vertex touch; of others, 8 face normals and 36 crosses of edges
+//! are tried as axes, with no allowance, and touching counts as intersection. The answer for (a, b) equals that for
+//! (b, a) bit for bit, because every difference and cross product changes only its sign.
 
 use super::grid::{canonical, reciprocal, two_to};
 use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
 
-/// Smallest and largest of four.
+/// The smallest and the largest of four values.
 fn range4(x: [f32; 4]) -> (f32, f32) {
     (x[0].min(x[1]).min(x[2].min(x[3])), x[0].max(x[1]).max(x[2].max(x[3])))
 }
 
-/// Closed box of four points.
+/// The closed bounding box of four points.
 pub fn bounds(v: &[Vec3; 4]) -> (Vec3, Vec3) {
     let range = [0, 1, 2].map(|c| range4(v.map(|p| p[c])));
     (range.map(|r| r.0), range.map(|r| r.1))
 }
 
-/// The allowance of [`box_touches`] for vertices `v` (relative to the centre of the box) and half axes `h`: per axis 2^-20 of the largest coordinate
-/// of a vertex and of the box, and 2^-42.
+/// The allowance of [`box_touches`] for vertices `v` (relative to the centre of the box) and half axes `h`. On each
+/// axis it is 2^-20 of the sum of the largest absolute coordinate of a vertex and the half extent of the box, plus
+/// 2^-42.
 pub fn touch_slack(v: &[Vec3; 4], h: &[Vec3; 3]) -> Vec3 {
     let (lo, hi) = bounds(v);
     [0, 1, 2].map(|c| {
@@ -36,7 +39,8 @@ pub fn touch_slack(v: &[Vec3; 4], h: &[Vec3; 3]) -> Vec3 {
     })
 }
 
-/// Whether the closed tetrahedron `v` and the closed box with its centre at 0 and the half axes `h` touch, with that allowance.
+/// Whether the closed tetrahedron `v` and the closed box with centre 0 and half axes `h` touch, with the allowance
+/// `slack`.
 pub fn box_touches(v: &[Vec3; 4], h: &[Vec3; 3], slack: Vec3) -> bool {
     let apart = |axis: Vec3, bound: Vec3| {
         let (lo, hi) = range4(v.map(|p| dot(axis, p)));
@@ -70,6 +74,9 @@ fn face_separates(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
 
 /// Whether two closed tetrahedra touch.
 pub fn tets_touch(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
+    if a.iter().any(|p| b.contains(p)) {
+        return true;
+    }
     if face_separates(a, b) || face_separates(b, a) {
         return false;
     }
@@ -91,24 +98,25 @@ pub fn tets_touch(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
     true
 }
 
-/// A point of a tetrahedron near 0.
+/// The point of a tetrahedron that is nearest to 0.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Closest {
-    /// Squared distance, scaled by 2^-42, never below that of the tetrahedron's box.
+    /// Squared distance, scaled by 2^-42, never below that of the tetrahedron's bounding box.
     pub square: f32,
     /// Barycentric coordinates of the point, in the order of the vertices.
     pub weights: [f32; 4],
 }
 
-/// Squared distance of the box of `v` to 0, scaled by 2^-42.
+/// Squared distance from 0 to the bounding box of `v`, scaled by 2^-42.
 pub fn box_square(v: &[Vec3; 4]) -> f32 {
     let (lo, hi) = bounds(v);
     let d = [0, 1, 2].map(|c| (lo[c].max(-hi[c]).max(0.0)) * two_to(-21));
     dot(d, d)
 }
 
-/// The point of the triangle `a b c` nearest to 0, by its weights. (The regions of a triangle as in Ericson, Real-Time Collision Detection, 5.1.5;
-/// quotients by [`reciprocal`], products of products without denormals.)
+/// The weights of the point of the triangle `a b c` nearest to 0. The regions of a triangle are those of Ericson,
+/// Real-Time Collision Detection, 5.1.5; quotients are computed by [`reciprocal`], and products of products without
+/// denormals.
 fn closest_in_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
     let (ab, ac) = (sub(b, a), sub(c, a));
     let (d1, d2) = (-dot(ab, a), -dot(ac, a));
@@ -146,7 +154,8 @@ fn closest_in_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
     [(1.0 - v) - w, v, w]
 }
 
-/// The point of the surface of the tetrahedron `v` nearest to 0; of faces equally near, the one opposite to the first vertex.
+/// The point of the surface of the tetrahedron `v` nearest to 0. If several faces are equally near, the one opposite to
+/// the first vertex counts.
 pub fn closest(v: &[Vec3; 4]) -> Closest {
     let s = v.map(|p| p.map(|x| x * two_to(-21)));
     let mut best = Closest { square: f32::MAX, weights: [0.0; 4] };

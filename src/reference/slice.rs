@@ -1,4 +1,5 @@
-//! Conservative slicing (SPEC 3.4): value, kind and owner of every voxel. Twin of `glsl/query/slice_locate` and `slice_touch`.
+//! Conservative slicing (SPEC 3.4): value, kind and owner of every voxel. Twin of `glsl/query/slice_locate` and
+//! `slice_touch`.
 
 use super::boundary::{NONE, Topology};
 use super::leaf_walk::{meets, reached_cells, walk_leaves};
@@ -29,24 +30,24 @@ pub struct Slicer<'a> {
     part: CellRange,
 }
 
-/// A voxel's answer.
+/// The result for one voxel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Voxel {
-    /// Value, NaN where empty or without field.
+    /// Value; NaN if the voxel is empty or there is no field.
     pub value: f32,
     /// [`EMPTY`], [`TOUCHED`] or [`INSIDE`].
     pub kind: u8,
-    /// Tetrahedron that gave the value, or [`NONE`].
+    /// The tetrahedron that contains the centre, or that is nearest to it, or [`NONE`].
     pub owner: u32,
 }
 
 const NOTHING: Voxel = Voxel { value: f32::NAN, kind: EMPTY, owner: NONE };
 
 impl<'a> Slicer<'a> {
-    /// Prepares slicing of `mesh` by these voxels. `tree` must have been built over it.
+    /// Prepares slicing of `mesh` into these voxels. `tree` must have been built over the mesh.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] as [`VoxelGrid::plan`] says.
+    /// [`crate::Error::Invalid`] as [`VoxelGrid::plan`].
     pub fn new(
         mesh: &'a Mesh,
         topology: &'a Topology,
@@ -71,7 +72,8 @@ impl<'a> Slicer<'a> {
         })
     }
 
-    /// The same, where only these cells of the finest grid are looked at: centres in other cells belong to another block, and so do their lists.
+    /// Restricts slicing to these cells of the finest grid: centres in other cells, and the lists there, belong to
+    /// other blocks.
     #[must_use]
     pub fn within(self, part: CellRange) -> Self {
         Self { part, ..self }
@@ -89,8 +91,8 @@ impl<'a> Slicer<'a> {
         Band { rows, values, kinds, owners: all().map(|v| v.owner).collect() }
     }
 
-    /// The voxels of a run, at `x` of the rows `lines`: located one after the other, each first in the cell of the one before; then those outside
-    /// by their boxes.
+    /// The voxels of a run, at column `x` of the rows `lines`. Centres are located one after the other, each first
+    /// around the owner of the one before. Voxels with their centre outside are decided by their boxes.
     fn run(&self, rows: Rows, x: u32, lines: Range<u32>) -> Vec<Voxel> {
         let mut hint = NONE;
         lines
@@ -110,20 +112,20 @@ impl<'a> Slicer<'a> {
             .collect()
     }
 
-    /// The value of a voxel with its centre in a cell.
+    /// The value of a voxel whose centre lies in the mesh.
     fn value(&self, owner: u32, centre: [f32; 3]) -> f32 {
         let (field, stand) = (self.field, self.locator.walker().stand_in(owner));
         let at = |(field, stand): (&Field, Stand)| stand.value(field, stand.sides(self.tree.grid.normalise(centre)).barycentric());
         field.zip(stand).map_or(f32::NAN, at)
     }
 
-    /// The primitive `t` relative to a point in normalised coordinates.
+    /// The tetrahedron `t`, and its vertices relative to a point, in normalised coordinates.
     fn around(&self, t: u32, x: Vec3) -> (Tet, [Vec3; 4]) {
         let tet = Tet::new(self.mesh.tets[t as usize], &self.normalised);
         (tet, tet.v.map(|v| sub(v, x)))
     }
 
-    /// A voxel whose centre is in no cell.
+    /// The result for a voxel whose centre is in no tetrahedron.
     fn touched(&self, centre: [f32; 3]) -> Voxel {
         let three = |v: [f32; 4]| [v[0], v[1], v[2]];
         let grid = &self.tree.grid;
@@ -147,7 +149,7 @@ impl<'a> Slicer<'a> {
         if best.1 == NONE { NOTHING } else { Voxel { value: self.extrapolated(best.1, x), kind: TOUCHED, owner: best.1 } }
     }
 
-    /// The value that the primitive `t` gives a voxel with its centre at `x`.
+    /// The value that tetrahedron `t` gives to a voxel with its centre at `x`.
     fn extrapolated(&self, t: u32, x: Vec3) -> f32 {
         let (Some(field), (tet, v)) = (self.field, self.around(t, x)) else { return f32::NAN };
         let weights = tet.weights(x);
@@ -162,7 +164,8 @@ impl<'a> Slicer<'a> {
     }
 }
 
-/// The squared distance of the primitive to the centre (at 0) if it touches the box and is not farther than `most`.
+/// The squared distance from the centre of a box (at 0) to the tetrahedron `v`, if this touches the box and is not
+/// farther away than `most`.
 pub fn touching(v: &[Vec3; 4], half: &[Vec3; 3], most: f32) -> Option<f32> {
     let near = box_square(v) <= most && box_touches(v, half, touch_slack(v, half));
     near.then(|| closest(v).square).filter(|&square| square <= most)

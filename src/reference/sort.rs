@@ -3,17 +3,18 @@
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Widest digit: 2^11 counters per chunk stay in the first-level cache.
+/// Bits of the widest digit. Its 2^11 counters per chunk stay in the first-level cache.
 const DIGIT_BITS: u32 = 11;
 
-/// Sorts the pairs by the low `bits` bits of their keys; equal keys keep their order. At most 2^32 − 1 pairs of equally long arrays.
+/// Sorts the pairs by the low `bits` bits of their keys; pairs with equal keys keep their order. Both arrays have the
+/// same length, at most 2^32 − 1.
 pub fn sort_pairs(keys: Vec<u32>, values: Vec<u32>, bits: u32) -> (Vec<u32>, Vec<u32>) {
     let passes = bits.min(32).div_ceil(DIGIT_BITS);
     if passes == 0 || keys.len() < 2 {
         return (keys, values);
     }
     let width = bits.min(32).div_ceil(passes);
-    // Shared so that chunks can scatter at once; every element is written by one chunk only.
+    // Shared, so that chunks can scatter simultaneously; each element is written by one chunk only.
     let shared = |v: Vec<u32>| v.into_par_iter().map(AtomicU32::new).collect::<Vec<_>>();
     let plain = |v: Vec<AtomicU32>| v.into_par_iter().map(AtomicU32::into_inner).collect();
     let blank = |n: usize| (0..n).into_par_iter().map(|_| AtomicU32::new(0)).collect::<Vec<_>>();

@@ -1,32 +1,33 @@
-//! Stage 3: where neighbouring codes differ, nodes end (SPEC 2.5, the paper's §3.2). Twin of `glsl/build/3*`.
+//! Stage 3: nodes end where successive codes differ (SPEC 2.5, the paper's §3.2). Twin of `glsl/build/3*`.
 
 use rayon::prelude::*;
 
 /// Codes per task.
 const CHUNK: usize = 1 << 16;
 
-/// The nodes of all levels, breadth first.
+/// The nodes of all levels, in breadth-first order.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Splits {
     /// Morton code of each node at its own level.
     pub codes: Vec<u32>,
-    /// `PO`: one more than leaves; leaf j ends at entry `po[j + 1]`.
+    /// `PO`, with one element more than there are leaves; the entries of leaf j are `po[j] .. po[j + 1]`.
     pub po: Vec<u32>,
-    /// `CO`: one more than internal nodes; the children of i are `co[i] + 1 ..= co[i + 1]`.
+    /// `CO`, with one element more than there are internal nodes; the children of node i are `co[i] + 1 ..= co[i + 1]`.
     pub co: Vec<u32>,
-    /// `NO`: nodes on levels 0…k.
+    /// `NO`: `no[k]` is the number of nodes on levels 0…k.
     pub no: Vec<u32>,
 }
 
-/// A node while its level is gathered: its code and the end of its entries.
+/// A node of a level in construction: its code, and the end of its entries.
 type End = (u32, u32);
 
-/// Finds all nodes of a tree with leaves at `level` from the sorted codes. Without codes there is a root all the same.
+/// Finds all nodes of a tree with leaves at `level` from the sorted codes. Without codes the tree still has a root.
 pub fn splits(codes: &[u32], level: u32) -> Splits {
     if codes.is_empty() {
         return Splits { codes: vec![0], po: vec![0, 0], co: vec![0], no: vec![1] };
     }
-    // From the leaves upwards: a node ends where one of the level below does and the code without its last digit changes.
+    // From the leaves to the root: a node ends where a node of the level below ends and the code without its last digit
+    // changes.
     let mut levels = vec![leaves(codes)];
     for _ in 0..level {
         let parents = levels.last().map(|children| parents(children)).unwrap_or_default();

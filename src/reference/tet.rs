@@ -1,8 +1,8 @@
-//! Orientation, containment and barycentric coordinates of a tetrahedron in normalised coordinates (SPEC 2.1, 3.1). Twin of
-//! `glsl/shared/tet.glsl`: the same operations in the same order.
+//! Orientation, containment and barycentric coordinates of a tetrahedron in normalised coordinates (SPEC 2.1, 3.1).
+//! Twin of `glsl/shared/tet.glsl`: the same operations in the same order.
 //!
-//! A tetrahedron is looked at with its vertices in ascending global index, so that two neighbours evaluate their common face
-//! bit-identically.
+//! The vertices of a tetrahedron are taken in ascending global index, so that two neighbours get bit-identical results
+//! for their common face.
 
 use super::grid::{reciprocal, two_to};
 
@@ -23,7 +23,7 @@ pub(crate) fn dot(a: Vec3, b: Vec3) -> f32 {
 
 /// The vertices of the face opposite to vertex i, in ascending global index.
 pub(super) const FACES: [[usize; 3]; 4] = [[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]];
-/// Edges, and the two vertices that are not on them.
+/// The two vertices of each edge, and the two that are not on it.
 pub(super) const EDGES: [[usize; 4]; 6] = [[0, 1, 2, 3], [0, 2, 1, 3], [0, 3, 1, 2], [1, 2, 0, 3], [1, 3, 0, 2], [2, 3, 0, 1]];
 
 pub(super) fn abs(a: Vec3) -> Vec3 {
@@ -44,41 +44,44 @@ pub fn orient(a: Vec3, b: Vec3, c: Vec3, p: Vec3) -> f32 {
 /// A tetrahedron with its vertices in ascending global index.
 #[derive(Clone, Copy, Debug)]
 pub struct Tet {
-    /// Corners by ascending global index.
+    /// Vertices in ascending global index.
     pub v: [Vec3; 4],
-    /// `rank[i]`: place in `v` of the i-th vertex as the caller numbered them.
+    /// `rank[i]` is the place in `v` of the caller's i-th vertex.
     pub rank: [usize; 4],
 }
 
-/// A point relative to a tetrahedron.
+/// Where a point lies relative to a tetrahedron.
 #[derive(Clone, Copy, Debug)]
 pub struct Weights {
-    /// Six times the signed volumes opposite to each vertex in ascending index, positive inside.
+    /// For each vertex, in ascending index, six times the signed volume between the point and the opposite face;
+    /// positive inside.
     pub w: [f32; 4],
-    /// Their sum.
+    /// Sum of the weights.
     pub sum: f32,
-    /// Inside the closed box of the four vertices.
+    /// Whether the point lies in the closed bounding box.
     pub in_box: bool,
-    /// No face says outside, the box agrees, the cell is not flat: the closed cell holds the point.
+    /// Whether the closed tetrahedron contains the point: no weight is negative, the point lies in the bounding box,
+    /// and the tetrahedron is not flat.
     pub inside: bool,
-    /// 2^-16 of the box's volume: a weight this near to 0 may be that of a point on either side of the face, by rounding.
+    /// 2^-16 of the volume of the bounding box. If a weight is within this margin of 0, then because of rounding the
+    /// point may lie on either side of the face.
     pub margin: f32,
-    /// Inside by more than the margin, so that rounding cannot put the point into a neighbour as well: in a mesh whose cells do not overlap, this
-    /// cell is the owner.
+    /// Whether the point is inside by more than the margin, so that rounding cannot put it into a neighbour as well. In
+    /// a mesh whose tetrahedra do not overlap, this tetrahedron is then the owner.
     pub clear: bool,
 }
 
-/// The box of a tetrahedron, and its margin.
+/// The bounding box of a tetrahedron, and its margin.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
     lo: Vec3,
     hi: Vec3,
-    /// A weight this near to 0 may be that of a point on either side of the face, by rounding.
+    /// The margin of [`Weights::margin`].
     margin: f32,
 }
 
 impl Bounds {
-    /// Of four corners.
+    /// The bounding box and margin of four vertices.
     pub fn new([a, b, c, d]: [Vec3; 4]) -> Self {
         let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
         let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
@@ -91,16 +94,17 @@ impl Bounds {
     }
 }
 
-/// What a step of a walk needs: cheaper than [`Weights`], but neighbours may disagree about their face by rounding.
+/// What a step of a walk needs to know of a point. It is cheaper to compute than [`Weights`], but because of rounding
+/// neighbours may disagree about their common face.
 #[derive(Clone, Copy, Debug)]
 pub struct Sides {
-    /// As in [`Weights`], opposite to the vertices in their order here.
+    /// Weights as in [`Weights::w`], in the order of the vertices given.
     pub w: [f32; 4],
-    /// Their sum.
+    /// Sum of the weights, never negative.
     pub sum: f32,
-    /// As in [`Weights`]: rounding is far below the margin here too.
+    /// As [`Weights::clear`]; here too rounding errors are far below the margin.
     pub clear: bool,
-    /// No face says outside by more than the margin.
+    /// Whether the point is outside of no face by more than the margin.
     pub near: bool,
 }
 
@@ -109,7 +113,7 @@ pub fn least_of(w: [f32; 4]) -> f32 {
     w[0].min(w[1]).min(w[2].min(w[3]))
 }
 
-/// The sides of p on which the faces of a tetrahedron lie.
+/// The weights of p in a tetrahedron, computed relative to p.
 pub fn sides_of(v: [Vec3; 4], bounds: &Bounds, p: Vec3) -> Sides {
     let [a, b, c, d] = v.map(|v| sub(v, p));
     let (ab, cd) = (cross(a, b), cross(c, d));
@@ -129,7 +133,8 @@ impl Sides {
 }
 
 impl Tet {
-    /// Barycentric coordinates of `p` in the caller's order of vertices: what an owner comes with, whatever found it.
+    /// Barycentric coordinates of `p` in the caller's order of vertices. Every search reports them for an owner,
+    /// however it was found.
     pub fn barycentric(&self, p: Vec3) -> [f32; 4] {
         let b = sides_of(self.v, &Bounds::new(self.v), p).barycentric();
         self.rank.map(|r| b[r])
@@ -145,16 +150,16 @@ impl Tet {
         Self { v, rank }
     }
 
-    /// Six times the signed volume with the vertices in ascending index. Exactly 0: the cell is flat.
+    /// Six times the signed volume with the vertices in ascending index; exactly 0 means that the tetrahedron is flat.
     pub fn volume(&self) -> f32 {
         orient(self.v[0], self.v[1], self.v[2], self.v[3])
     }
 
-    /// The four signed volumes of `p`, negative where a face says that `p` lies outside; `sign` is that of the volume.
+    /// The weights of `p`; a weight is negative if `p` lies outside of that face.
     pub fn weights(&self, p: Vec3) -> Weights {
         let [a, b, c, d] = self.v;
         let s = if self.volume() < 0.0 { -1.0 } else { 1.0 };
-        // The order of a face's vertices alternates the sign with the opposite vertex.
+        // The sign of a face's orientation alternates with the opposite vertex.
         let w = [-s * orient(b, c, d, p), s * orient(a, c, d, p), -s * orient(a, b, d, p), s * orient(a, b, c, p)];
         let bounds = Bounds::new(self.v);
         let (in_box, margin) = (bounds.hold(p), bounds.margin);
@@ -164,17 +169,17 @@ impl Tet {
 }
 
 impl Weights {
-    /// Whether no face says outside by more than the margin.
+    /// Whether the point is outside of no face by more than the margin.
     pub fn near(&self) -> bool {
         self.w.iter().all(|&w| w >= -self.margin)
     }
 
-    /// Whether the point is that near to one face, and inside of all others by more.
+    /// Whether the point is within the margin of exactly one face, and inside of all others by more than the margin.
     pub fn near_one_face(&self) -> bool {
         self.near() && self.w.iter().filter(|&&w| w <= self.margin).count() == 1
     }
 
-    /// Smallest barycentric coordinate; −∞ (as `f32::MIN`) for a flat cell.
+    /// Smallest barycentric coordinate; `f32::MIN` for a flat tetrahedron.
     pub fn smallest(&self) -> f32 {
         if self.sum <= 0.0 {
             return f32::MIN;

@@ -1,32 +1,34 @@
-//! Traversal for predicates with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of `glsl/shared/traverse.glsl`.
+//! Traversal under a node predicate, with a short stack and a bit trail (SPEC 3.2, the paper's Alg. 3). Twin of
+//! `glsl/shared/traverse.glsl`.
 //!
-//! The trail has three bits per level: how many siblings of the node on the current path, accepted by `F_N` too, are still to be visited. (The
-//! paper counts those that were visited; counting what is left says without a look at the tree whether and where there is more: at the
-//! highest bit set.) The children of a node are at most eight, so at most seven are left; leaves are handled in their parent and have no digit,
-//! so 27 bits serve 10 levels. The stack keeps the nearest of the siblings left; where it has run dry, the trail leads from the root
-//! to the next one.
+//! The trail has three bits per level: the number of siblings of the node on the current path that `F_N` accepted too
+//! and that are still to be visited. (The paper counts the siblings that were visited. Counting those left tells,
+//! without reading the tree, whether more are to be visited and on which level: that of the highest bit set.) A node
+//! has at most eight children, so at most seven are left. Leaves are handled in their parent and have no digit, so 27
+//! bits suffice for 10 levels. The stack keeps the nearest of the siblings left. When it has run empty, the trail leads
+//! from the root to the next sibling.
 
 use crate::tree::TreeArrays;
 use std::collections::VecDeque;
 use std::ops::ControlFlow;
 
-/// Nodes on a stack that never runs dry: seven siblings on each level but the first and the leaves', and the root's.
+/// A size of the stack at which no node is ever dropped: at most seven siblings wait on each level.
 pub const fn full_stack(level: u32) -> usize {
     7 * level as usize + 8
 }
 
-/// A node as predicates see it.
+/// A node as predicates receive it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Node {
     /// Index of the node.
     pub index: u32,
-    /// Its level, the root's being 0.
+    /// Level of the node; the root is on level 0.
     pub level: u32,
     /// Morton code of its cell at that level.
     pub code: u32,
 }
 
-/// The short stack: the oldest node is dropped where there is no room.
+/// The short stack. When it is full, the oldest node is dropped.
 struct Stack {
     nodes: VecDeque<Node>,
     size: usize,
@@ -43,15 +45,16 @@ impl Stack {
     }
 }
 
-/// Calls `f_p` for every primitive of every leaf that `f_n` accepts and whose ancestors it accepts, in order, until it breaks. A primitive comes
-/// once per such leaf.
+/// Calls `f_p` for every tetrahedron of every leaf that `f_n` accepts along with all its ancestors, in order, until
+/// `f_p` breaks. A tetrahedron is passed once per such leaf.
 pub fn traverse(tree: &TreeArrays, stack: usize, f_n: impl FnMut(Node) -> bool, mut f_p: impl FnMut(Node, u32) -> ControlFlow<()>) {
     traverse_leaves(tree, stack, f_n, |leaf| tree.primitives(leaf.index).iter().try_for_each(|&p| f_p(leaf, p)));
 }
 
-/// Calls `found` for every leaf that `f_n` accepts and whose ancestors it accepts, in order, until it breaks. Every size of the stack gives the
-/// same leaves; a small one has `f_n` asked more often. `f_n` should answer the same whenever asked about a node; if it becomes stricter on the
-/// way, no leaf that it still accepts is missed, but one may come twice.
+/// Calls `found` for every leaf that `f_n` accepts along with all its ancestors, in order, until `found` breaks. The
+/// leaves are the same for every size of the stack; with a small one `f_n` is called more often. `f_n` should always
+/// give the same answer for a node. If it becomes stricter during the traversal, no leaf that it still accepts is
+/// missed, but one may be visited twice.
 pub fn traverse_leaves(tree: &TreeArrays, stack: usize, mut f_n: impl FnMut(Node) -> bool, mut found: impl FnMut(Node) -> ControlFlow<()>) {
     let root = Node::default();
     if !f_n(root) {
@@ -64,7 +67,7 @@ pub fn traverse_leaves(tree: &TreeArrays, stack: usize, mut f_n: impl FnMut(Node
     let mut stack = Stack { nodes: VecDeque::new(), size: stack.min(full_stack(tree.grid.level)) };
     let mut trail = 0u32;
     let mut node = root;
-    // Levels below this one follow the trail.
+    // Levels above this one follow the trail; from this level on it is written.
     let mut resume = 0;
     loop {
         let leaf_level = node.level + 1 == tree.grid.level;
@@ -96,7 +99,7 @@ pub fn traverse_leaves(tree: &TreeArrays, stack: usize, mut f_n: impl FnMut(Node
             node = accepted[n - 1 - left];
             continue;
         }
-        // Nothing below this node: on to the next sibling left, on the deepest level that has one.
+        // There is nothing below this node. Go on with the next sibling left, on the deepest level that has one.
         if trail == 0 {
             return;
         }

@@ -1,8 +1,9 @@
 //! Direct volume rendering (SPEC 3.3, the paper's §4.2). Twin of `glsl/query/volume_intervals` and `volume_march`.
 //!
-//! Ray intervals first, from the boundary nodes of the tree alone; then samples within them. What a sample is and how it adds up is said in
-//! [`crate::render`]. Where the transfer function is transparent for some values, nodes without any other ([`super::ranges`]) are left out of intervals and
-//! skipped between them. The tree decides only where samples need not be taken, so the picture does not depend on it.
+//! The ray intervals are computed first, from the boundary nodes of the tree alone; then samples are taken within them.
+//! [`crate::render`] defines what a sample is and how samples add up. If the transfer function is transparent for some
+//! values, nodes without any other values ([`super::ranges`]) are left out of the intervals and skipped within them.
+//! The tree only decides which samples need not be taken, so the picture does not depend on it.
 
 mod brute;
 mod interval;
@@ -29,15 +30,15 @@ use std::time::{Duration, Instant};
 /// A drawn picture.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
-    /// Straight RGBA, 8 bits a channel, row 0 on top.
+    /// Straight RGBA, 8 bits per channel, row 0 on top.
     pub pixels: Vec<u8>,
-    /// Samples taken within the ray intervals.
+    /// Number of samples taken within the ray intervals.
     pub samples: u64,
-    /// Samples within them that were not taken: their nodes have nothing to see.
+    /// Number of samples within the intervals that were skipped, since nothing is visible in their nodes.
     pub skipped_samples: u64,
-    /// Those that lie in the mesh.
+    /// Number of samples taken that lie in the mesh.
     pub found_samples: u64,
-    /// Milliseconds for the field's ranges, where values are transparent.
+    /// Milliseconds for the field's ranges, if some values are transparent.
     pub ranges_ms: f64,
     /// Milliseconds for the ray intervals.
     pub interval_ms: f64,
@@ -52,11 +53,12 @@ pub struct Scene<'a> {
     pub(crate) tree: &'a TreeArrays,
     pub(crate) field: &'a Field,
     pub(crate) prepared: Prepared,
-    /// Which nodes have something to see; `None` where no value of the field is transparent.
+    /// One bit per node, set if something is visible there; `None` if no value of the field is transparent.
     pub(crate) visible: Option<Vec<u32>>,
     pub(crate) ranges_ms: f64,
     part: CellRange,
-    /// With tolerance 0: whether a point just outside counts would depend on the leaf that it lies in.
+    /// It has tolerance 0, because with another one it would depend on the leaf whether a point just outside the mesh
+    /// counts.
     pub(crate) locator: Locator<'a>,
 }
 
@@ -64,7 +66,8 @@ impl<'a> Scene<'a> {
     /// Prepares to draw `field` as `settings` say. `topology` and `tree` must be those of `mesh`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the field has not as many values as the mesh has points or tetrahedra, or the topology is another mesh's; as [`Prepared::new`].
+    /// [`Error::Invalid`] if the number of the field's values is not that of the mesh's points or tetrahedra, or the
+    /// topology is that of another mesh; errors of [`Prepared::new`].
     pub fn new(mesh: &'a Mesh, topology: &'a Topology, tree: &'a TreeArrays, field: &'a Field, settings: &RenderSettings) -> Result<Self> {
         let expected = if field.on == On::Points { mesh.points.len() } else { mesh.tets.len() };
         if field.values.len() != expected || topology.neighbours.len() != mesh.tets.len() {
@@ -84,20 +87,20 @@ impl<'a> Scene<'a> {
         Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, part: CellRange::WHOLE, locator })
     }
 
-    /// The same with every sample in the mesh taken, transparent or not.
+    /// Turns off skipping: every sample in the mesh is taken, transparent or not.
     #[must_use]
     pub fn without_skipping(mut self) -> Self {
         self.visible = None;
         self
     }
 
-    /// The same with samples in these cells of the finest grid alone, as a block draws them where none is in front of it.
+    /// Restricts samples to these cells of the finest grid, as a block draws them if no other block is in front of it.
     #[must_use]
     pub fn within(self, part: CellRange) -> Self {
         Self { part, ..self }
     }
 
-    /// What is drawn.
+    /// The plan of the picture.
     pub fn plan(&self) -> &Plan {
         &self.prepared.plan
     }
@@ -108,7 +111,7 @@ impl<'a> Scene<'a> {
     }
 }
 
-/// Draws the scene; `report` is told how many rows of how many are done.
+/// Draws the scene. `report` receives the number of rows done and the number of rows.
 pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
     let [width, height] = plan.size;
@@ -135,7 +138,8 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     };
     let mut pixels = vec![0; width as usize * height as usize * 4];
     pixels.par_chunks_exact_mut(width as usize * 4).enumerate().for_each(row);
-    // Both stages run side by side on all threads: the time on the clock is divided as the threads spent theirs.
+    // Both stages run side by side on all threads, so the elapsed time is divided in proportion to the time that the
+    // threads spent in each.
     let share = |part: &AtomicU64| {
         let all = interval_ns.load(Ordering::Relaxed) + march_ns.load(Ordering::Relaxed);
         part.load(Ordering::Relaxed) as f64 / (all.max(1)) as f64

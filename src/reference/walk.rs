@@ -1,16 +1,20 @@
-//! Walking to a point across shared faces (SPEC 2.6). Twin of `glsl/shared/walk.glsl`.
+//! Walks to a point across shared faces (SPEC 2.6). Twin of `glsl/shared/walk.glsl`.
 //!
-//! A walk goes to a point x of a cell that is full of mesh, from the cell's seed.
-//! 1. **Through the face that says outside most.** The cheapest step; ends nearly always where x is. It may circle, or leave the mesh.
-//! 2. **Straight on** from the cell's centre to x: through the face that the segment meets first. The cell is a box without surface, so the segment
-//!    crosses interior faces only, and each of them nearer to x than the one before. Rounding can still mislead where it meets an edge, so
-//! 3. the same again by way of other points of the cell, whose two segments meet other edges.
+//! A walk leads to a point x in a leaf's cell that lies entirely within the mesh, starting at the leaf's seed. It has
+//! up to three parts:
+//! 1. **Through the outermost face**, the one with the most negative weight of x. This is the cheapest step, and nearly
+//!    always leads to x, but it may go in circles or leave the mesh.
+//! 2. **Straight on** from the cell's centre to x, through the face that the segment meets first. The mesh has no
+//!    surface in the cell, so the segment crosses interior faces only, each of them nearer to x than the one before.
+//!    Rounding can still mislead this walk where the segment meets an edge.
+//! 3. **By detours**: part 2 by way of other points of the cell, so that the two segments meet other edges.
 //!
-//! Before all that, a *stride*: part 1 without a look at anything but cells that hold x clearly, as most points are held, or on one of their faces.
+//! A *stride* is tried before all that. It takes the steps of part 1, but ends only in a tetrahedron that contains x
+//! clearly, as is the case for most points, or at one of its faces.
 //!
-//! Each part is bounded. Where all of them fail, the best of the tetrahedra in which they ended is the answer: no point is lost. A walk that comes
-//! near to x ends with the *star* of x: the tetrahedra reached across faces that x is so near to that rounding could put it on either side. The
-//! owner is chosen among them, so it does not depend on the way.
+//! Each part is bounded. If all of them fail, the best of the tetrahedra in which they ended is the answer, so no point
+//! is lost. A walk that comes near x ends with the *star* of x: the tetrahedra reached across faces that are so near x
+//! that rounding could put it on either side. The owner is chosen among them, so it does not depend on the way taken.
 
 use super::boundary::NONE;
 use super::candidates::Best;
@@ -28,14 +32,16 @@ pub const HINTED: u32 = 16;
 pub const STRIDE: u32 = 64;
 /// Most steps along one segment.
 pub const LEG: u32 = 1024;
-/// Points to go by, the first being x itself.
+/// Points of the cell to go by in parts 2 and 3; the first one is the centre.
 pub const DETOURS: u32 = 8;
-/// Stars that part 1 looks at: the second is that of the same gap between faces, or x is not there.
+/// Number of stars that part 1 searches. The second one can only be that of the same gap between faces; otherwise x is
+/// not there.
 const ARRIVALS: u32 = 2;
-/// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap of rounding between cells, and the nearest owns it.
+/// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap between tetrahedra that is due to
+/// rounding, and the nearest tetrahedron owns it.
 const GAP: f32 = -two_to(-17);
 
-/// Cell of a leaf in normalised coordinates.
+/// The cell of a leaf in normalised coordinates.
 #[derive(Clone, Copy, Debug)]
 pub struct LeafCell {
     /// Centre.
@@ -47,28 +53,29 @@ pub struct LeafCell {
 /// How a walk ended.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Walked {
-    /// The owner, or the nearest.
+    /// The owner, or the nearest tetrahedron.
     pub best: Best,
-    /// Tetrahedra passed.
+    /// Number of tetrahedra passed.
     pub steps: u32,
-    /// Points gone by, 0 if the first part was enough.
+    /// Number of points of the cell gone by; 0 if part 1 was sufficient.
     pub detours: u32,
 }
 
-/// The tetrahedron that a stride stands in, its corners in ascending index, so that what is worked out of them does not depend on the way.
+/// The tetrahedron in which a stride currently is. Its vertices are in ascending index, so that what is computed from
+/// them does not depend on the way taken.
 #[derive(Clone, Copy, Debug)]
 pub struct Stand {
-    /// Its number.
+    /// Number of the tetrahedron.
     pub t: u32,
     /// Its vertices in the caller's order.
     cell: [u32; 4],
-    /// Its vertices ascending.
+    /// Its vertices in ascending index.
     pub ids: [u32; 4],
     v: [Vec3; 4],
 }
 
 impl Stand {
-    /// The value of a field in it, at barycentric coordinates in ascending index of the corners.
+    /// The value of a field at barycentric coordinates `b`, given in ascending index of the vertices.
     pub fn value(&self, field: &Field, b: [f32; 4]) -> f32 {
         match field.on {
             On::Points => weighed(b, self.ids.map(|i| field.values[i as usize])),
@@ -76,18 +83,19 @@ impl Stand {
         }
     }
 
-    /// The sides of x on which its faces lie.
+    /// The weights of x in this tetrahedron.
     pub fn sides(&self, x: Vec3) -> Sides {
         sides_of(self.v, &Bounds::new(self.v), x)
     }
 }
 
-/// What has these values at the corners, at barycentric coordinates.
+/// Interpolates the values `v` at the vertices to barycentric coordinates `b`.
 pub fn weighed(b: [f32; 4], v: [f32; 4]) -> f32 {
-    (b[0] * v[0] + b[1] * v[1]) + (b[2] * v[2] + b[3] * v[3])
+    let beside = [0, 1, 2].map(|k| v[k] - v[3]);
+    ((b[0] * beside[0] + b[1] * beside[1]) + b[2] * beside[2]) + v[3]
 }
 
-/// The face that says outside most.
+/// The outermost face: the one with the smallest weight, the first of several.
 pub fn outermost(own: [f32; 4]) -> usize {
     (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face })
 }
@@ -109,7 +117,7 @@ impl Walker<'_> {
         (tet, tet.weights(x))
     }
 
-    /// Visits the star of x in a tetrahedron near to it, until `visit` returns true.
+    /// Visits the star of x, starting with `first`, a tetrahedron near x, until `visit` returns true.
     pub fn star(&self, first: u32, x: Vec3, mut visit: impl FnMut(u32, &Tet, &Weights) -> bool) {
         let mut star = vec![first];
         let mut next = 0;
@@ -128,7 +136,7 @@ impl Walker<'_> {
         }
     }
 
-    /// Looks for the owner in the star of x; whether it is settled.
+    /// Searches the star of x for the owner, and returns whether it is settled.
     fn arrive(&self, t: u32, x: Vec3, best: &mut Best) -> bool {
         self.star(t, x, |t, tet, weights| {
             best.consider(t, tet, weights);
@@ -137,7 +145,7 @@ impl Walker<'_> {
         best.inside || (best.in_box && best.smallest >= GAP)
     }
 
-    /// Stands in a tetrahedron, if there is one of that number.
+    /// A stand in tetrahedron `t`, if it exists.
     pub fn stand_in(&self, t: u32) -> Option<Stand> {
         let cell = *self.mesh.tets.get(t as usize)?;
         let mut ids = cell;
@@ -145,14 +153,16 @@ impl Walker<'_> {
         Some(Stand { t, cell, ids, v: ids.map(|id| self.normalised[id as usize]) })
     }
 
-    /// The tetrahedron behind the face that says outside most.
+    /// The tetrahedron on the other side of the outermost face; `None` if x is not outside of a face or there is no
+    /// neighbour.
     fn step_on(&self, from: &Stand, at: &Sides) -> Option<Stand> {
         let face = outermost(at.w);
         let place = from.cell.iter().position(|&id| id == from.ids[face])?;
         (at.w[face] < 0.0).then(|| self.stand_in(self.neighbours[from.t as usize][place])).flatten()
     }
 
-    /// Goes from `t` to the tetrahedron that holds x clearly, if it is not far.
+    /// Steps from `t` to the tetrahedron that contains x clearly; `None` if the first `most` tetrahedra do not include
+    /// it.
     pub fn stride(&self, t: u32, x: Vec3, most: u32) -> Option<(Stand, Sides)> {
         let mut stand = self.stand_in(t)?;
         for _ in 0..most {
@@ -165,7 +175,8 @@ impl Walker<'_> {
         None
     }
 
-    /// The owner of x near to a face of the stand, if it is far from all other faces of the two beside that one.
+    /// The owner of x, which is near a face of the stand, if in both tetrahedra at this face x is well inside of all
+    /// other faces.
     fn owner_at_face(&self, stand: &Stand, x: Vec3) -> Option<u32> {
         let (tet, here) = self.weights(stand.t, x);
         if !here.near_one_face() {
@@ -176,13 +187,14 @@ impl Walker<'_> {
             return None;
         }
         let there = self.weights(u, x).1;
-        // The face weighs the same from either side.
+        // The weight of the shared face is the same from either side, except for its sign.
         let shared = there.near_one_face() && least_of(there.w) == -least_of(here.w);
         let own = here.inside && (!there.inside || stand.t < u);
         (shared && (own || there.inside)).then_some(if own { stand.t } else { u })
     }
 
-    /// Goes from `t` towards x, to its owner if that is not far, and if x does not lie near an edge.
+    /// Steps from `t` to the owner of x; `None` if the first `most` tetrahedra do not lead to it, or if x is near an
+    /// edge.
     pub fn stride_to(&self, t: u32, x: Vec3, most: u32) -> Option<u32> {
         let mut stand = self.stand_in(t)?;
         for _ in 0..most {
@@ -195,7 +207,7 @@ impl Walker<'_> {
         None
     }
 
-    /// Part 1, from `t`; whether the owner is settled.
+    /// Part 1, from `t`. Returns whether the owner is settled.
     fn towards(&self, mut t: u32, x: Vec3, walked: &mut Walked) -> bool {
         let mut arrivals = 0;
         for _ in 0..STEPS {
@@ -222,7 +234,7 @@ impl Walker<'_> {
         walked.best.inside || (walked.best.in_box && walked.best.smallest >= GAP)
     }
 
-    /// Straight on from `a`, which lies in `t`, to `b`: where the segment ends.
+    /// Walks along the segment from `a`, which lies in `t`, to `b`, and returns the tetrahedron in which it ends.
     fn leg(&self, mut t: u32, a: Vec3, b: Vec3, walked: &mut Walked) -> u32 {
         let mut from = NONE;
         for _ in 0..LEG {
@@ -248,16 +260,16 @@ impl Walker<'_> {
         t
     }
 
-    /// Walks to a point x of a cell that is full of mesh, from its seed.
-    pub fn walk(&self, seed: u32, room: &LeafCell, x: Vec3) -> Walked {
+    /// Walks to a point x of the cell `cell`, which lies entirely within the mesh, from the leaf's seed.
+    pub fn walk(&self, seed: u32, cell: &LeafCell, x: Vec3) -> Walked {
         let mut walked = Walked::default();
         if self.towards(seed, x, &mut walked) {
             return walked;
         }
         for k in 0..DETOURS {
             walked.detours += 1;
-            let by = room.point(k);
-            let t = if k == 0 { seed } else { self.leg(seed, room.centre, by, &mut walked) };
+            let by = cell.point(k);
+            let t = if k == 0 { seed } else { self.leg(seed, cell.centre, by, &mut walked) };
             let t = self.leg(t, by, x, &mut walked);
             if self.arrive(t, x, &mut walked.best) {
                 break;
@@ -268,10 +280,10 @@ impl Walker<'_> {
 }
 
 impl LeafCell {
-    /// Point number `k` of the cell, the first its centre.
+    /// Point number `k` of the cell; number 0 is the centre.
     fn point(&self, k: u32) -> Vec3 {
         [0, 1, 2].map(|c| {
-            // Anywhere in the cell, by Fibonacci hashing.
+            // A pseudorandom place in the cell, by Fibonacci hashing.
             let part = ((3 * k + c as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 * two_to(-23) - 1.0;
             let away = if k == 0 { 0.0 } else { part };
             let at = self.centre[c] + self.half[c] * away;

@@ -1,4 +1,4 @@
-//! The opacity of a field that nobody chose one for.
+//! Automatic opacity, for fields without an opacity given.
 
 use crate::mesh::{Field, Mesh, On};
 use glam::DVec3;
@@ -7,17 +7,18 @@ use glam::DVec3;
 const BINS: usize = 64;
 /// Control points of the result.
 const POINTS: usize = 33;
-/// How much rare values gain over common ones; 1 would show every value alike.
+/// How much rare values gain over common ones; with 1 every value would show equally.
 const EQUALITY: f64 = 0.85;
-/// Optical depth of the mesh on an average ray.
+/// Optical depth of the mesh along an average ray.
 const DEPTH: f64 = 1.4;
-/// The densest that a value gets, per unit.
+/// Largest opacity of a value, per unit.
 const MOST: f64 = 0.85;
 
-/// Opacity points for a field over `range`, from how much of the mesh's volume has which value: common values get faint, so that one looks through
-/// them at the rare ones; and all is scaled so that an average ray (the mean chord of the mesh, four times volume over surface) still passes
-/// for a quarter. High values count somewhat more than low ones. `unit` is the length that opacities belong to; `neighbours` and `valid` are
-/// as for [`shading_normals`](super::shading_normals).
+/// Opacity points for a field over `range`, derived from the distribution of its values over the mesh's volume. Common
+/// values become faint, so that rare ones show through them, and high values count somewhat more than low ones. The
+/// opacities are scaled so that about a quarter of the light passes an average ray, whose length is the mean chord of
+/// the mesh (four times volume over surface). `unit` is the length that opacities refer to; `neighbours` and `valid`
+/// are as for [`shading_normals`](super::shading_normals).
 pub fn auto_opacity(
     mesh: &Mesh,
     neighbours: &[[u32; 4]],
@@ -44,7 +45,7 @@ pub fn auto_opacity(
         let value = |i: usize| field.values.get(i).map_or(f64::NAN, |&v| (f64::from(v) - lo) / span);
         let values = if field.on == On::Points { ids.map(|id| value(id as usize)) } else { [value(tet); 4] };
         if values.iter().all(|v| (0.0..=1.0).contains(v)) {
-            // As if the values of the cell were spread evenly from the smallest to the largest.
+            // The volume of the tetrahedron is spread evenly over the bins from the smallest to the largest value.
             let bin = |v: f64| ((v * BINS as f64) as usize).min(BINS - 1);
             let (first, last) = (bin(values.into_iter().fold(1.0, f64::min)), bin(values.into_iter().fold(0.0, f64::max)));
             bins[first..=last].iter_mut().for_each(|b| *b += v / (last - first + 1) as f64);
@@ -63,7 +64,7 @@ pub fn auto_opacity(
     let share = bins.map(|b| b / total);
     let weight = |i: usize| (share[i] * BINS as f64 + 0.01).powf(-EQUALITY) * (0.5 + (i as f64 + 0.5) / BINS as f64);
     let mean: f64 = (0..BINS).map(|i| share[i] * weight(i)).sum();
-    // Extinction per unit.
+    // Extinction per unit length and weight.
     let scale = DEPTH / (mean * 4.0 * volume / surface);
     let opacity = |i: usize| (1.0 - (-scale * weight(i)).exp()).min(MOST) as f32;
     let point = |k: usize| {

@@ -26,7 +26,7 @@ impl From<&Grid> for Bounds {
 }
 
 impl Bounds {
-    /// Lower and upper corner in double precision.
+    /// The eight corners in double precision; the first is the lower one, the last the upper one.
     pub(crate) fn corners(&self) -> [DVec3; 8] {
         let (lo, hi) = (DVec3::from_array(self.lo.map(f64::from)), DVec3::from_array(self.hi.map(f64::from)));
         [0, 1, 2, 3, 4, 5, 6, 7].map(|i| {
@@ -46,16 +46,16 @@ impl Bounds {
 /// How rays spread.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Projection {
-    /// Rays through one eye; the angle between the top and the bottom of the picture, in degrees.
+    /// Rays through one eye; the value is the angle between the top and the bottom of the picture, in degrees.
     Perspective(f64),
-    /// Parallel rays; the height of the picture in mesh units.
+    /// Parallel rays; the value is the height of the picture in mesh units.
     Orthographic(f64),
 }
 
 /// A camera in mesh coordinates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera {
-    /// Where the eye is.
+    /// Position of the eye.
     pub eye: DVec3,
     /// Unit vector into the picture.
     pub forward: DVec3,
@@ -67,16 +67,17 @@ pub struct Camera {
     pub projection: Projection,
 }
 
-/// Perspective angle of a framed camera, degrees.
+/// Default perspective angle, in degrees.
 pub const DEFAULT_FOV: f64 = 30.0;
 /// Part of the picture that a framed box fills.
 const FILL: f64 = 0.94;
 
 impl Camera {
-    /// A camera at `eye` that looks at `target`. An `up` along the view is replaced by another axis.
+    /// A camera at `eye` that looks at `target`. If `up` is parallel to the view, another axis replaces it.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if eye and target are the same point, a coordinate is not finite, or the projection has no extent.
+    /// [`Error::Invalid`] if eye and target are the same point, a coordinate is not finite, or the projection has no
+    /// extent.
     pub fn look_at(eye: DVec3, target: DVec3, up: DVec3, projection: Projection) -> Result<Self> {
         let forward = (target - eye).try_normalize().filter(|_| eye.is_finite() && target.is_finite());
         let Some(forward) = forward else {
@@ -94,8 +95,8 @@ impl Camera {
         Ok(Self { eye, forward, right, up: right.cross(forward), projection })
     }
 
-    /// A camera on the side `from` (a direction, of any length) of the box that just holds all `points` in it; perspective with that
-    /// angle in degrees, `None`: orthographic.
+    /// A camera on the side `from` (a direction of any length) of the box, placed so that all `points` just fit into
+    /// the picture. `fov` is the perspective angle in degrees; `None`: orthographic.
     pub fn frame_from(bounds: &Bounds, points: &[DVec3], aspect: f64, from: DVec3, up: DVec3, fov: Option<f64>) -> Self {
         let corners = bounds.corners();
         let center = (corners[0] + corners[7]) * 0.5;
@@ -111,7 +112,8 @@ impl Camera {
         let offset = if let Some(degrees) = fov {
             let ty = (degrees.clamp(0.01, 179.0).to_radians() * 0.5).tan() * FILL;
             let tx = ty * aspect;
-            // X − ex ≤ (Z − ez)·tx and its three likes: the eye that two opposite sides of the picture pin, further back wins.
+            // Each point must satisfy X − ex ≤ (Z − ez)·tx and the three corresponding inequalities. Each pair of
+            // opposite sides of the picture determines an eye; the one farther back is taken.
             let [r, l] = [most(&|p| p.x - p.z * tx), most(&|p| -p.x - p.z * tx)];
             let [t, b] = [most(&|p| p.y - p.z * ty), most(&|p| -p.y - p.z * ty)];
             camera.projection = Projection::Perspective(degrees);
@@ -126,7 +128,7 @@ impl Camera {
         camera
     }
 
-    /// How far from its origin a ray of [`Camera::rays`] can meet the box: no farther than this.
+    /// An upper bound on the distance from the origin of a ray of [`Camera::rays`] at which it can meet the box.
     pub(crate) fn reach(&self, size: [u32; 2], bounds: &Bounds) -> f64 {
         let depth = |p: DVec3| (p - self.eye).dot(self.forward);
         let corners = bounds.corners();
@@ -141,13 +143,14 @@ impl Camera {
         (distance * (1.0 - near / far)).min(slope.hypot(1.0) * (far - near))
     }
 
-    /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the nearest corner of
-    /// `bounds`, or at the eye where that lies behind it, so that single precision is spent on the mesh and not on the way to it.
+    /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the
+    /// nearest corner of `bounds`, or at the eye if that plane lies behind it, so that no single precision is wasted on
+    /// the way to the mesh.
     pub fn rays(&self, size: [u32; 2], bounds: &Bounds) -> RayGrid {
         let [w, h] = size.map(f64::from);
         let depth = |p: DVec3| (p - self.eye).dot(self.forward);
         let nearest = bounds.corners().into_iter().map(depth).fold(f64::MAX, f64::min);
-        // Half a pixel's place: s = ((x + ½)·2/w − 1) to the right, t = 1 − (y + ½)·2/h upwards.
+        // Centres of pixels: s = ((x + ½)·2/w − 1) to the right, t = 1 − (y + ½)·2/h upwards.
         let (s0, ds, t0, dt) = (1.0 / w - 1.0, 2.0 / w, 1.0 - 1.0 / h, -2.0 / h);
         let (half, perspective) = match self.projection {
             Projection::Perspective(degrees) => ((degrees.to_radians() * 0.5).tan(), true),
@@ -181,7 +184,8 @@ impl Camera {
     }
 }
 
-/// The direction of the default view: front, right and top sides show, the larger ones more.
+/// The direction of the default view, from the mesh to the eye: front, right and top sides are visible, larger sides
+/// more.
 pub fn three_quarter(bounds: &Bounds) -> DVec3 {
     let e = [0, 1, 2].map(|c| f64::from(bounds.hi[c]) - f64::from(bounds.lo[c]));
     let largest = e.into_iter().fold(0.0, f64::max);
@@ -192,26 +196,27 @@ pub fn three_quarter(bounds: &Bounds) -> DVec3 {
     DVec3::new(0.58 * weight[0], -weight[1], 0.55 * weight[2])
 }
 
-/// The rays of a picture, ready for a kernel: six vectors.
+/// The rays of a picture, in the form that kernels take: six vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayGrid {
     /// Origin of the ray of pixel (0, 0).
     pub origin: [f32; 3],
-    /// What one pixel to the right adds to it.
+    /// Added to the origin for each pixel to the right.
     pub origin_x: [f32; 3],
-    /// What one pixel down adds to it.
+    /// Added to the origin for each pixel down.
     pub origin_y: [f32; 3],
     /// Direction of the ray of pixel (0, 0), of any length.
     pub direction: [f32; 3],
-    /// What one pixel to the right adds to it.
+    /// Added to the direction for each pixel to the right.
     pub direction_x: [f32; 3],
-    /// What one pixel down adds to it.
+    /// Added to the direction for each pixel down.
     pub direction_y: [f32; 3],
 }
 
 impl RayGrid {
-    /// Origin and unit direction of the ray of pixel (x, y), row 0 on top. Per component `(origin + x·origin_x) + y·origin_y`, and
-    /// w = `(direction + x·direction_x) + y·direction_y` likewise; direction = w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
+    /// Origin and unit direction of the ray of pixel (x, y), with row 0 on top. The origin is
+    /// `(origin + x·origin_x) + y·origin_y` for each component. With w = `(direction + x·direction_x) + y·direction_y`,
+    /// the direction is w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
     pub fn ray(&self, x: u32, y: u32) -> ([f32; 3], [f32; 3]) {
         let (x, y) = (x as f32, y as f32);
         let origin = [0, 1, 2].map(|c| (self.origin[c] + x * self.origin_x[c]) + y * self.origin_y[c]);

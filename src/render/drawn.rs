@@ -1,16 +1,17 @@
-//! Which values a transfer function shows.
+//! The values that a transfer function shows.
 
 use super::TABLE_SIZE;
 use crate::reference::grid::canonical;
 
-/// The ranges of values, ascending and apart, outside of which every value has opacity 0 in `table` (place 0 at `value_lo`, `value_scale` places per unit of value),
-/// however the place is rounded.
+/// Ranges of values, ascending and disjoint, outside of which every value has opacity 0 in `table`, however its place
+/// is rounded. Place 0 is at `value_lo`, and there are `value_scale` places per unit of value.
 pub(super) fn drawn_values(table: &[[f32; 4]], value_lo: f32, value_scale: f32) -> Vec<[f32; 2]> {
     const EVERYTHING: [f32; 2] = [f32::NEG_INFINITY, f32::INFINITY];
     if !value_scale.is_normal() {
         return vec![EVERYTHING];
     }
-    // A value is drawn by the two entries around its place; the place is exact to 2^-12 of an entry, and the value is rounded once more.
+    // A value is drawn using the two entries around its place. The place is exact to 2^-12 of an entry, and the value
+    // is rounded once more.
     let last = TABLE_SIZE - 1;
     let value = |entry: f64| (f64::from(value_lo) + entry / (last as f64 * f64::from(value_scale))) as f32;
     let mut drawn: Vec<[f32; 2]> = Vec::new();
@@ -59,7 +60,7 @@ mod tests {
         let plan_of = |opacity: &[(f32, f32)]| plan(opacity, [0.0, 1.0]).drawn;
         assert_eq!(plan_of(&[(0.0, 0.1), (1.0, 0.2)]), [[f32::NEG_INFINITY, f32::INFINITY]]);
         assert_eq!(plan_of(&[(0.0, 0.0), (1.0, 0.0)]), [[0.0f32; 2]; 0]);
-        // A ramp that begins at the smallest value hides none of the field's.
+        // A ramp that starts at the smallest value of the field hides none of its values.
         let ramp = plan(&[(0.0, 0.0), (1.0, 0.2)], [0.0, 1.0]);
         assert!(!ramp.hides(&[0.0, 0.5, 1.0, f32::NAN]) && ramp.hides(&[0.5, -0.1]));
         let low = plan_of(&[(0.0, 0.5), (0.1, 0.0), (1.0, 0.0)]);

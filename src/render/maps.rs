@@ -1,20 +1,20 @@
-//! Built-in colour maps, as control points of a piecewise-linear function on 256 steps. No channel is further than 1.5/255 from the
-//! published table.
+//! Built-in colour maps, as control points of a piecewise-linear function on 256 steps. No channel differs by more than
+//! 1.5/255 from the published table.
 //!
-//! Sources: viridis, magma, inferno, plasma (Smith and van der Walt, CC0); cividis (Nuñez, Anderton, Renslow 2018); turbo (Mikhailov
-//! 2019); coolwarm (Moreland 2009).
+//! Sources: viridis, magma, inferno, plasma (Smith and van der Walt, CC0); cividis (Nuñez, Anderton, Renslow 2018);
+//! turbo (Mikhailov 2019); coolwarm (Moreland 2009).
 
-/// A map: name, what it is good for, control points (place in 0…255, 0xRRGGBB).
+/// A built-in colour map.
 pub struct ColorMap {
     /// Name on the command line.
     pub name: &'static str,
     /// One line for the help.
     pub about: &'static str,
-    /// Ascending places, from 0 to 255.
+    /// Control points: places, ascending from 0 to 255, and colours 0xRRGGBB.
     pub points: &'static [(u8, u32)],
 }
 
-/// Every built-in map; the first one is the default, [`DEFAULT_MAP`](super::transfer::DEFAULT_MAP).
+/// All built-in maps; the first one is the default, [`DEFAULT_MAP`](super::transfer::DEFAULT_MAP).
 pub const MAPS: &[ColorMap] = &[
     ColorMap {
         name: "viridis",
@@ -169,7 +169,7 @@ pub const MAPS: &[ColorMap] = &[
     ColorMap { name: "grey", about: "black to white", points: &[(0, 0x00_00_00), (255, 0xff_ff_ff)] },
 ];
 
-/// The map of that name.
+/// The map of this name.
 pub fn find(name: &str) -> Option<&'static ColorMap> {
     MAPS.iter().find(|map| map.name == name)
 }

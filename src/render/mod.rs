@@ -1,20 +1,26 @@
-//! What a picture is (SPEC 3.3): camera, transfer function and settings, and the [`Plan`] that they make of a mesh. Knows no Vulkan: the
-//! kernels and the reference renderer both draw a plan, with the same operations in the same order.
+//! Definition of a picture (SPEC 3.3): camera, transfer function and settings, and the [`Plan`] that they yield for a
+//! mesh. Does not depend on Vulkan: the kernels and the reference renderer draw the same plan with the same operations
+//! in the same order.
 //!
 //! # Definition
-//! - The ray of pixel (x, y), row 0 on top, is [`RayGrid::ray`]. Sample k lies at `origin + direction · ((k + ½)·Δ)`, whatever the tree.
-//! - A sample outside the mesh, or whose value is not finite, adds nothing. Another one has the value v of the field at its owner,
-//!   the place x = clamp((v − lo)·scale, 0, 1) in the transfer function, and the colour and opacity of [`Plan::lookup`] there.
-//! - Front to back, with colour C and opacity A from 0: `w = (1 − A)·a`, `C += w·c`, `A += w`, until A reaches the termination.
-//! - Colours are composited as the sRGB values they are displayed with (as `ParaView` does), not as light: a transfer function
-//!   looks like its legend, and no conversion is needed anywhere.
-//! - The opacity of a transfer function belongs to a length, [`OPACITY_UNIT`] of the mesh's diagonal: a ray through that much of one
-//!   value is covered so far, whatever the step. The table holds `1 − (1 − a)^(s·Δ/unit)` for the opacity scale s.
-//! - With shading, c is lit and a grows on surfaces seen from the side, as [`Lighting::shade`] says, by normals that
-//!   [`shading_normals`] gives the vertices.
-//! - Iso-surfaces instead of the volume: between two samples one after the other, both with a value, each iso value that just one of them is below
-//!   adds colour and opacity of its place, as one surface, in the order along the ray. It lies where the value is linear between the two, which is
-//!   exact if they lie in one cell, with that cell's normals ([`gradient_normals`]).
+//! - The ray of pixel (x, y), with row 0 on top, is [`RayGrid::ray`]. Sample k lies at
+//!   `origin + direction · ((k + ½)·Δ)`, independently of the tree.
+//! - A sample adds nothing if it lies outside the mesh or its value is not finite. Otherwise it has the field's value v
+//!   in its owner, the place x = clamp((v − lo)·scale, 0, 1) in the transfer function, and the colour and opacity of
+//!   [`Plan::lookup`] there.
+//! - Samples are composited front to back, with colour C and opacity A starting at 0: `w = (1 − A)·a`, `C += w·c`,
+//!   `A += w`, until A reaches the termination.
+//! - Colours are composited as the sRGB values they are displayed with (as `ParaView` does), not as light. So a
+//!   transfer function looks like its legend, and no conversion is needed anywhere.
+//! - The opacity of a transfer function refers to a length, [`OPACITY_UNIT`] of the mesh's diagonal: it is what a ray
+//!   gathers over that length at a constant value, whatever the step. The table contains `1 − (1 − a)^(s·Δ/unit)` for
+//!   the opacity scale s.
+//! - With shading, c is lit and a grows on surfaces seen from the side, as defined by [`Lighting::shade`], using the
+//!   normals that [`shading_normals`] computes for the vertices.
+//! - Iso-surfaces replace the volume: between two successive samples that both have a value, each iso-value that
+//!   separates the two values adds the colour and opacity at its place as one surface, in the order along the ray. The
+//!   surface lies where the value, taken as linear between the two samples, equals the iso-value. This is exact if both
+//!   samples lie in one tetrahedron. The normals are those of the second sample's tetrahedron ([`gradient_normals`]).
 
 pub mod auto;
 pub mod camera;
@@ -32,8 +38,8 @@ pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
 pub use transfer::TransferFunction;
 
-/// `1/√x` of a normal positive `x` by correctly rounded multiplications and subtractions alone, so that every device gets the same
-/// bits; relative error below 2^-22. Twin of the function in the shading kernel.
+/// `1/√x` of a normal positive `x`, computed by correctly rounded multiplications and subtractions alone, so that every
+/// device gets the same bits. The relative error is below 2^-22. Twin of the function in the shading kernel.
 pub fn inverse_sqrt(x: f32) -> f32 {
     let mut r = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
     let half = x * 0.5;

@@ -1,4 +1,5 @@
-//! A picture's settings worked out for one mesh and field: all that the kernels and the reference renderer need to know.
+//! The settings of a picture evaluated for one mesh and field: everything that the kernels and the reference renderer
+//! need.
 
 use super::drawn::drawn_values;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
@@ -11,12 +12,13 @@ use glam::DVec3;
 
 /// Entries of the sampled transfer function.
 pub const TABLE_SIZE: usize = 1024;
-/// A step is at least this part of the diagonal: sample numbers stay exact in single precision.
+/// Smallest step as a part of the diagonal, which keeps sample numbers exact in single precision.
 const MIN_STEP: f64 = 1.0 / 65_536.0;
-/// Samples of a ray end here, where `k + ½` is no longer exact in single precision; the kernels keep flags from bit 30 on.
+/// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
+/// flags from bit 30 on.
 pub const MAX_SAMPLES: u32 = 1 << 23;
 
-/// What is drawn.
+/// A picture to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
     /// Width and height in pixels.
@@ -29,26 +31,28 @@ pub struct Plan {
     pub value_lo: f32,
     /// Places per unit of value.
     pub value_scale: f32,
-    /// [`TABLE_SIZE`] entries: sRGB colour, and opacity of one step or of one surface.
+    /// [`TABLE_SIZE`] entries: sRGB colour, and the opacity of one step or of one surface.
     pub table: Vec<[f32; 4]>,
-    /// Ranges of values, ascending and apart, outside of which the table is transparent.
+    /// Ranges of values, ascending and disjoint, outside of which the table is transparent; with iso-surfaces, the
+    /// iso-values.
     pub drawn: Vec<[f32; 2]>,
-    /// Values of the iso-surfaces that are drawn instead of the volume, ascending, each once.
+    /// Values of the iso-surfaces that are drawn instead of the volume, ascending and distinct.
     pub iso: Vec<f32>,
-    /// A ray ends once it is this opaque.
+    /// Opacity at which a ray ends.
     pub termination: f32,
-    /// The light; `None`: colours as they are.
+    /// The light; `None`: colours are not lit.
     pub lighting: Option<Lighting>,
     /// What is behind the mesh.
     pub background: Background,
 }
 
 impl Plan {
-    /// Works out `settings` for a mesh with these bounds, whose coordinates are relative to `origin`, and a field with this range.
+    /// Evaluates `settings` for a mesh with these bounds, whose coordinates are relative to `origin`, and a field with
+    /// this range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a setting makes no sense, the step is below 1/65,536 of the diagonal, or the camera sees the mesh at an angle so flat that a ray
-    /// would have more than [`MAX_SAMPLES`].
+    /// [`Error::Invalid`] if a setting is out of its limits, if the step is below 1/65,536 of the diagonal, or if the
+    /// camera sees the mesh at so flat an angle that a ray would have more than [`MAX_SAMPLES`] samples.
     pub fn new(settings: &RenderSettings, bounds: &Bounds, origin: [f64; 3], field_range: Option<[f32; 2]>) -> Result<Self> {
         settings.check()?;
         let [width, height] = settings.size.map(f64::from);
@@ -56,7 +60,7 @@ impl Plan {
         Self::with_camera(settings, &camera, bounds, field_range)
     }
 
-    /// As [`Plan::new`], with another camera than that of the settings.
+    /// As [`Plan::new`], but with `camera` instead of the camera of the settings.
     ///
     /// # Errors
     /// As [`Plan::new`].
@@ -109,7 +113,7 @@ impl Plan {
         })
     }
 
-    /// Whether some of these values are transparent, so that parts of the mesh need not be looked at.
+    /// Whether some of these values are transparent, so that parts of the mesh can be skipped.
     pub fn hides(&self, values: &[f32]) -> bool {
         let everything = matches!(self.drawn[..], [[lo, hi]] if lo.is_infinite() && hi.is_infinite());
         let is_hidden = |v: f32| {
@@ -119,7 +123,7 @@ impl Plan {
         !everything && values.iter().copied().any(is_hidden)
     }
 
-    /// What the kernels need of it besides the table.
+    /// The plan as the kernels take it, without the table.
     pub fn view(&self) -> RenderView {
         let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
         let Lighting { to_light, strength: [ambient, diffuse, specular], rim } =
@@ -146,7 +150,8 @@ impl Plan {
         }
     }
 
-    /// The picture of colours as [`crate::query::Drawn`] and the kernels have them, over the background: four bytes per pixel, straight alpha.
+    /// The picture for `colors` as in [`crate::query::Drawn`], composited over the background: four bytes per pixel,
+    /// straight alpha.
     pub fn pixels(&self, colors: &[[f32; 4]]) -> Vec<u8> {
         let [width, height] = self.size;
         let rows = colors.chunks(width.max(1) as usize).zip(0..height);
@@ -158,14 +163,14 @@ impl Plan {
         1.0 / self.step
     }
 
-    /// Where sample `k` of a ray (origin, unit direction) lies.
+    /// The position of sample `k` of a ray (origin, unit direction).
     pub fn sample(&self, (origin, direction): ([f32; 3], [f32; 3]), k: u32) -> [f32; 3] {
         let t = (k as f32 + 0.5) * self.step;
         [0, 1, 2].map(|c| origin[c] + direction[c] * t)
     }
 
-    /// Colour, and opacity of one step, at a finite value: with `x = clamp((value − lo)·scale, 0, 1)·1023`, i = min(floor(x), 1022), t = x − i,
-    /// `table[i] + (table[i+1] − table[i])·t`.
+    /// Colour, and opacity of one step, at a finite value. With `x = clamp((value − lo)·scale, 0, 1)·1023`, i =
+    /// min(floor(x), 1022) and t = x − i, it is `table[i] + (table[i+1] − table[i])·t`.
     pub fn lookup(&self, value: f32) -> [f32; 4] {
         let x = ((value - self.value_lo) * self.value_scale).clamp(0.0, 1.0) * (TABLE_SIZE - 1) as f32;
         let i = (x as usize).min(TABLE_SIZE - 2);
@@ -175,18 +180,19 @@ impl Plan {
     }
 }
 
-/// How much larger than its cell the box of a node is when rays are tested against it, so that rounding of samples, boxes and rays loses
-/// nothing. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is four of its last bits. Twin of `glsl/query/volume_plan`.
+/// How much larger than its cell the box of a node is when rays are tested against it, so that no sample is lost by
+/// rounding of samples, boxes and rays. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is
+/// four of its last bits. Twin of `glsl/query/volume_plan`.
 pub fn interval_slack(grid: &Grid) -> [f32; 3] {
     let (lo, hi) = (grid.lo, grid.hi);
     let largest = (0..3).map(|c| canonical(hi[c] - lo[c])).fold(0.0, f32::max);
     [0, 1, 2].map(|c| canonical(largest * two_to(-18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * two_to(-21)))
 }
 
-/// A plan and the normals that its light needs.
+/// A plan, its camera, and the normals that its light needs.
 #[derive(Clone, Debug)]
 pub struct Prepared {
-    /// What is drawn.
+    /// The plan.
     pub plan: Plan,
     /// The camera, framed around the mesh's vertices.
     pub camera: Camera,
@@ -197,8 +203,9 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// All that has to be known to draw `field` on `mesh`. `neighbours` has four entries per tetrahedron, [`u32::MAX`] where the face opposite to
-    /// that vertex is on the surface; `valid` says which tetrahedra count; `bounds` are theirs.
+    /// Prepares everything needed to draw `field` on `mesh`. `neighbours` has four entries per tetrahedron,
+    /// [`u32::MAX`] if the face opposite to that vertex is on the surface. `valid` says which tetrahedra count, and
+    /// `bounds` are the bounds of these.
     ///
     /// # Errors
     /// As [`Plan::new`].
@@ -244,7 +251,7 @@ impl Prepared {
     }
 }
 
-/// Smallest and largest finite value that valid tetrahedra have.
+/// The smallest and the largest finite value in valid tetrahedra.
 fn used_range(mesh: &Mesh, valid: &impl Fn(usize) -> bool, field: &Field) -> Option<[f32; 2]> {
     let mut range: Option<[f32; 2]> = None;
     for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
@@ -256,7 +263,7 @@ fn used_range(mesh: &Mesh, valid: &impl Fn(usize) -> bool, field: &Field) -> Opt
     range
 }
 
-/// The range of values, never empty: a constant field lies in the middle.
+/// The range of values, made wide enough for a constant field, which then lies in the middle.
 fn value_range(range: Option<[f32; 2]>) -> [f64; 2] {
     let [lo, hi] = range.unwrap_or([0.0, 1.0]).map(f64::from);
     let least = lo.abs().max(hi.abs()).max(1e-30) * 1e-6;
@@ -315,7 +322,8 @@ mod tests {
             let settings = RenderSettings { size: [16_384, 1], step: Some(step), ..RenderSettings::default() };
             Plan::with_camera(&settings, camera, &BOX, None)
         };
-        // Far beside the box, seen along the edge of a picture that is all width; and as far before it.
+        // One camera is far beside the box, which appears at the edge of a very wide picture; the other is equally far
+        // in front of it.
         let (beside, before) = (camera([1e7, 0.0, 6.0], [1e7, 1.0, 6.0]), camera([1e7, 2.0, 6.0], [0.0, 2.0, 6.0]));
         assert!(plan(&beside, 0.1).unwrap_err().to_string().contains("step of 0.89"));
         assert!(plan(&beside, 0.9).is_ok() && plan(&before, 0.1).is_ok());

@@ -1,11 +1,11 @@
-//! What a user decides about a picture.
+//! The settings of a picture.
 
 use super::{CameraSpec, TransferFunction, transfer};
 use crate::error::{Error, Result};
 
-/// The length that opacities of a transfer function belong to, as part of the diagonal of the mesh's bounds.
+/// The length that opacities of a transfer function refer to, as a part of the diagonal of the mesh's bounds.
 pub const OPACITY_UNIT: f64 = 0.01;
-/// Steps per diagonal by default.
+/// Default number of steps per diagonal.
 pub const DEFAULT_STEPS: f64 = 512.0;
 /// Most iso-surfaces of a picture.
 pub const MAX_ISO: usize = 8;
@@ -32,24 +32,26 @@ pub struct RenderSettings {
     pub camera: CameraSpec,
     /// Colours and opacities.
     pub transfer: TransferFunction,
-    /// Values whose iso-surfaces are drawn instead of the volume, up to [`MAX_ISO`]; none: the volume. A surface is opaque unless `transfer` has opacities,
-    /// which are the surface's own then.
+    /// Values whose iso-surfaces are drawn instead of the volume, up to [`MAX_ISO`]; if empty, the volume is drawn.
+    /// Surfaces are opaque unless `transfer` has opacities, which are then those of the surfaces themselves.
     pub iso: Vec<f32>,
-    /// The field's values at places 0 and 1 of the transfer function; by default what the function says, or all of the field's range.
+    /// The field's values at places 0 and 1 of the transfer function. The default is the range of the transfer
+    /// function, or else the whole range of the field.
     pub range: Option<[f32; 2]>,
     /// Distance Δ of two samples in mesh units; by default 1/512 of the diagonal.
     pub step: Option<f64>,
     /// What is behind the mesh.
     pub background: Background,
-    /// Factor on the extinction: 2 is as opaque as twice the way through the mesh.
+    /// Factor on the extinction; 2 is as opaque as twice the path through the mesh.
     pub opacity_scale: f32,
-    /// A ray ends once it is this opaque.
+    /// Opacity at which a ray ends.
     pub termination: f32,
-    /// Light the surface and the field's gradient.
+    /// Lights the surface and the field's gradient.
     pub shading: bool,
-    /// Opacity per unit that a lit surface seen from the side has at least, 0…1: outlines stay crisp where the field is faint. 0: none.
+    /// Least opacity per unit, 0…1, of a lit surface seen from the side, which keeps outlines crisp where the field is
+    /// faint; 0: none.
     pub outline: f32,
-    /// Direction to the light in the picture: right, up, towards the viewer; of any length.
+    /// Direction to the light relative to the picture: right, up, towards the viewer; of any length.
     pub light: [f32; 3],
 }
 
@@ -73,10 +75,10 @@ impl Default for RenderSettings {
 }
 
 impl RenderSettings {
-    /// Refuses what cannot be drawn.
+    /// Checks that the settings can be drawn.
     ///
     /// # Errors
-    /// [`Error::Invalid`] names the setting and its limits.
+    /// [`Error::Invalid`], which names the setting and its limits.
     pub fn check(&self) -> Result<()> {
         let fail = |message: String| Err(Error::Invalid(message));
         if self.size.iter().any(|v| !(1..=MAX_SIZE).contains(v)) {
@@ -131,7 +133,7 @@ impl std::str::FromStr for Background {
 }
 
 impl Background {
-    /// The background in row `y` of `height`, and its alpha.
+    /// Colour and alpha of the background in row `y` of `height`.
     pub fn at(&self, y: u32, height: u32) -> [f32; 4] {
         let [r, g, b] = match *self {
             Self::Transparent => return [0.0; 4],
@@ -144,7 +146,8 @@ impl Background {
         [r, g, b, 1.0]
     }
 
-    /// The pixel of a ray's colour (premultiplied) and opacity in row `y`: over the background, straight alpha, 8 bits, rounded.
+    /// The pixel for a ray's colour (premultiplied) and opacity in row `y`: composited over the background, with
+    /// straight alpha, rounded to 8 bits.
     pub fn pixel(&self, ray: [f32; 4], y: u32, height: u32) -> [u8; 4] {
         let behind = self.at(y, height);
         let alpha = ray[3] + (1.0 - ray[3]) * behind[3];

@@ -1,21 +1,23 @@
 //! Shading: normals at the vertices, and the light.
 //!
-//! A vertex on the surface has the surface's normal, of length 1 (less on coarse meshes, to the same effect); one inside has the field's gradient, as long as it is steep, at most 1.
-//! Interpolated like any field they light the surface and the fronts inside the mesh, and leave even regions alone.
+//! A vertex on the surface has the normal of the surface, of length 1 (shorter on coarse meshes, for the same effect).
+//! A vertex inside has the gradient of the field, with a length that grows with its steepness up to 1. Interpolated
+//! like any field, these normals light the surface and the fronts inside the mesh, and leave even regions alone.
 
 use crate::mesh::{Field, Mesh, On};
 use crate::render::{Bounds, inverse_sqrt};
 use glam::{DVec3, Vec3};
 
-/// Part of light that comes from everywhere.
+/// Part of the light that comes from all directions.
 const AMBIENT: f32 = 0.42;
-/// Part that depends on the angle between normal and light.
+/// Part of the light that depends on the angle between normal and light.
 const DIFFUSE: f32 = 0.72;
 /// Strength of highlights (their exponent is 32).
 const SPECULAR: f32 = 0.18;
-/// A surface's normal is full where the cells on it are at most this thick, in diagonals: the lit skin is as deep on coarse meshes as on fine ones.
+/// A normal of the surface has length 1 where the tetrahedra on it are at most this thick, in diagonals. So the lit
+/// skin is equally deep on coarse and on fine meshes.
 const SKIN: f64 = 0.02;
-/// A gradient is a full normal once it would cross the field's range on this part of the diagonal.
+/// A gradient makes a normal of length 1 if it would cross the field's range on this part of the diagonal.
 const STEEP: f64 = 0.12;
 
 /// The light of a picture.
@@ -29,7 +31,7 @@ pub struct Lighting {
     pub rim: f32,
 }
 
-/// What light does to a sample: `lit = min(color·factor + added, 1)`, `opacity' = a + (1 − a)·rim`.
+/// The effect of light on a sample: `lit = min(color·factor + added, 1)`, `opacity' = a + (1 − a)·rim`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shade {
     /// Factor on the colour.
@@ -41,12 +43,13 @@ pub struct Shade {
 }
 
 impl Lighting {
-    /// The usual strengths with the light in that direction (unit vector).
+    /// The default strengths, with the light in this direction (unit vector).
     pub fn new(to_light: Vec3, rim: f32) -> Self {
         Self { to_light: to_light.to_array(), strength: [AMBIENT, DIFFUSE, SPECULAR], rim }
     }
 
-    /// The unit vector halfway between the light and the viewer of a ray with this unit direction, for [`Lighting::shade`].
+    /// The unit vector halfway between the directions to the light and to the viewer, for a ray with this unit
+    /// direction; see [`Lighting::shade`].
     pub fn half(&self, direction: [f32; 3]) -> [f32; 3] {
         let h = [0, 1, 2].map(|c| self.to_light[c] - direction[c]);
         let square = dot(h, h).max(1e-12);
@@ -54,11 +57,11 @@ impl Lighting {
         h.map(|v| v * r)
     }
 
-    /// Light on a sample of a ray with this unit direction and its `half`.
+    /// The effect of light on a sample of a ray with this unit direction and its `half`.
     ///
-    /// `n` is the interpolated normal, of length up to 1. With m = min(|n|, 1), c = |n·light|/|n|, h = min(|n·half|/|n|, 1) and
-    /// g = 1 − min(|n·direction|/|n|, 1) (the sides of a normal are alike): factor = 1 + m·((ambient + diffuse·c) − 1),
-    /// added = m·(specular·h^32), rim = m·(g⁴·rim).
+    /// `n` is the interpolated normal, of length up to 1. With m = min(|n|, 1), c = |n·light|/|n|, h =
+    /// min(|n·half|/|n|, 1) and g = 1 − min(|n·direction|/|n|, 1) (both sides of a surface look alike): factor = 1 +
+    /// m·((ambient + diffuse·c) − 1), added = m·(specular·h^32), rim = m·(g⁴·rim).
     pub fn shade(&self, n: [f32; 3], direction: [f32; 3], half: [f32; 3]) -> Shade {
         let square = dot(n, n);
         if square < 1e-8 {
@@ -81,8 +84,9 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
-/// A normal per vertex of the mesh, for shading. `neighbours` has four entries per tetrahedron, [`u32::MAX`] where the face opposite
-/// to that vertex is on the surface; `valid` says which tetrahedra count. A field of cells has no gradient, only the surface is lit.
+/// A normal per vertex of the mesh, for shading. `neighbours` has four entries per tetrahedron, [`u32::MAX`] if the
+/// face opposite to that vertex is on the surface. `valid` says which tetrahedra count. A field with values per
+/// tetrahedron has no gradient, so only the surface is lit.
 pub fn shading_normals(
     mesh: &Mesh,
     neighbours: &[[u32; 4]],
@@ -96,12 +100,14 @@ pub fn shading_normals(
     normals(mesh, |tet, face| neighbours.get(tet).is_some_and(|across| across[face] == u32::MAX), valid, field, steep, bounds)
 }
 
-/// A normal of length 1 per vertex, for iso-surfaces: the field's gradient, on the surface of the mesh as well; 0 where it has none.
+/// A normal of length 1 per vertex, for iso-surfaces: the gradient of the field, also on the surface of the mesh; 0
+/// where there is none.
 pub fn gradient_normals(mesh: &Mesh, valid: impl Fn(usize) -> bool, field: &Field, bounds: &Bounds) -> Vec<[f32; 3]> {
     normals(mesh, |_, _| false, valid, field, f64::INFINITY, bounds)
 }
 
-/// Normals of the surface (the faces that `is_outside`), elsewhere the gradient times `steep` (per unit of value over the diagonal), at most 1 long.
+/// Normals of the surface (the faces that `is_outside`); elsewhere the gradient (change of value per diagonal) times
+/// `steep`, at most 1 long, or of length 1 if `steep` is infinite.
 fn normals(
     mesh: &Mesh,
     is_outside: impl Fn(usize, usize) -> bool,
@@ -112,12 +118,12 @@ fn normals(
 ) -> Vec<[f32; 3]> {
     let length = bounds.diagonal();
     let has_gradient = steep > 0.0 && field.on == On::Points && field.values.len() == mesh.points.len();
-    // Per vertex: normal times area, volume of the cells below, area.
+    // For each vertex: normal times area, volume of the tetrahedra below, area.
     let mut surface = vec![(DVec3::ZERO, 0.0, 0.0); mesh.points.len()];
     let mut inside = vec![(DVec3::ZERO, 0.0); mesh.points.len()];
     for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
         let ids = ids.map(|id| id as usize);
-        // In diagonals, so that no product overflows on meshes of any size.
+        // Lengths are in diagonals, so that no product overflows for meshes of any size.
         let p = ids.map(|id| DVec3::from_array(mesh.points[id].map(f64::from)) / length);
         let volume = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]);
         for i in 0..4 {
@@ -136,7 +142,8 @@ fn normals(
             let v = ids.map(|id| f64::from(field.values[id]));
             if v.iter().all(|v| v.is_finite()) {
                 let (a, b, c) = (p[1] - p[0], p[2] - p[0], p[3] - p[0]);
-                // The gradient times the volume: averages over the cells round a vertex weigh them by volume.
+                // The gradient times the volume, so that the mean over the tetrahedra around a vertex is weighted by
+                // volume.
                 let gradient = (b.cross(c) * (v[1] - v[0]) + c.cross(a) * (v[2] - v[0]) + a.cross(b) * (v[3] - v[0])) * volume.signum();
                 for id in ids {
                     inside[id].0 += gradient;
@@ -146,7 +153,7 @@ fn normals(
         }
     }
     let normal = |((sum, below, area), (gradient, volume)): ((DVec3, f64, f64), (DVec3, f64))| {
-        // Volume (sixfold) over area (twofold) is the height of the cells.
+        // Six times the volume over twice the area is the height of the tetrahedra.
         let skin = |n: DVec3| n * if below > SKIN * area { SKIN * area / below } else { 1.0 };
         let gradient = || match volume {
             0.0 => DVec3::ZERO,
@@ -185,7 +192,7 @@ mod tests {
             mesh.points.iter_mut().for_each(|p| *p = p.map(|v| v * scale));
             mesh.fields[0].values = mesh.points.iter().map(|p| p[1] / scale).collect();
             let bounds = Bounds { lo: [0.0; 3], hi: [2.0 * scale; 3] };
-            // Without surface: every vertex has the gradient.
+            // Without a surface every vertex has the gradient.
             let normals = shading_normals(&mesh, &vec![[0; 4]; mesh.tets.len()], |_| true, &mesh.fields[0], [0.0, 2.0], &bounds);
             let expected = STEEP as f32 * 12f32.sqrt() / 2.0;
             assert!(normals.iter().all(|n| (n[1] - expected).abs() < 1e-4 && n[0].abs() < 1e-5), "{scale}: {:?} {expected}", normals[13]);

@@ -14,10 +14,11 @@ pub struct TransferFunction {
 
 /// Name of the default map.
 pub const DEFAULT_MAP: &str = "viridis";
-/// The opacity where none is given and [`auto_opacity`](super::auto_opacity) has nothing to go by: faint where the field is low, dense where it is high.
+/// The opacity if none is given and [`auto_opacity`](super::auto_opacity) has no data: faint where the field is low,
+/// dense where it is high.
 pub const DEFAULT_OPACITY: &[(f32, f32)] = &[(0.0, 0.04), (0.25, 0.08), (0.5, 0.18), (0.75, 0.38), (1.0, 0.7)];
 
-/// The JSON form, for the help.
+/// The JSON form, as explained in the help.
 pub const JSON_HELP: &str = r##"{"map": "viridis", "opacity": [[0, 0.02], [0.6, 0.1], [1, 0.8]]}, or with own colours
 {"colors": [[0, "#1a2a6c"], [0.5, [0.7, 0.1, 0.1]], [1, "#fdbb2d"]], "opacity": …}. Places run from 0 to 1 over the field's range;
 with "positions": "values" they are values of the field. Colours are sRGB. Opacities (0 to 1) are what a ray gathers on 1/100 of the mesh's
@@ -30,16 +31,16 @@ impl Default for TransferFunction {
 }
 
 impl TransferFunction {
-    /// A colour map without opacity of its own.
+    /// A function with the colours of a map and no opacities.
     pub fn from_map(map: &maps::ColorMap) -> Self {
         let colors = map.points.iter().map(|&(place, rgb)| (f32::from(place) / 255.0, from_hex(rgb))).collect();
         Self { colors, opacity: None, range: None }
     }
 
-    /// A built-in map by name; `_r` behind the name turns it round.
+    /// A built-in map by name; the suffix `_r` reverses it.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for an unknown name; it lists those there are.
+    /// [`Error::Invalid`] for an unknown name; the message lists the known ones.
     pub fn named(name: &str) -> Result<Self> {
         let (base, reverse) = name.strip_suffix("_r").map_or((name, false), |base| (base, true));
         let map = maps::find(base).ok_or_else(|| {
@@ -57,17 +58,17 @@ impl TransferFunction {
         Ok(function)
     }
 
-    /// A function of colour and opacity points (place 0…1, ascending; channels 0…1).
+    /// A function from colour and opacity points (places 0…1, ascending; channels 0…1).
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a list is empty, a place descends or lies outside 0…1, or a channel does.
+    /// [`Error::Invalid`] if a list is empty, places descend, or a place or channel lies outside 0…1.
     pub fn new(colors: Vec<(f32, [f32; 3])>, opacity: Vec<(f32, f32)>) -> Result<Self> {
         check("colour", colors.iter().map(|(place, c)| (*place, &c[..])))?;
         check("opacity", opacity.iter().map(|(place, a)| (*place, std::slice::from_ref(a))))?;
         Ok(Self { colors, opacity: Some(opacity), range: None })
     }
 
-    /// The same colours with another opacity.
+    /// Replaces the opacities.
     ///
     /// # Errors
     /// As [`TransferFunction::new`].
@@ -78,7 +79,7 @@ impl TransferFunction {
     /// Opacity points from text: one number for all places, or `PLACE:OPACITY,…` as in `0:0,0.5:0.1,1:0.8`.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the text is neither.
+    /// [`Error::Invalid`] if the text has neither form.
     pub fn parse_opacity(text: &str) -> Result<Vec<(f32, f32)>> {
         let wrong =
             || Error::Invalid(format!("opacity `{text}`: give one number from 0 to 1, or PLACE:OPACITY pairs such as 0:0,0.5:0.1,1:0.8"));
@@ -92,12 +93,12 @@ impl TransferFunction {
         text.split(',').map(|part| pair(part).ok_or_else(wrong)).collect()
     }
 
-    /// Whether it says how opaque values are; otherwise that is chosen for the field at hand.
+    /// Whether the function has opacities; if not, they are chosen for the field.
     pub fn has_opacity(&self) -> bool {
         self.opacity.is_some()
     }
 
-    /// The values of places 0 and 1, where the function fixes them.
+    /// The values of places 0 and 1, if the function fixes them.
     pub fn range(&self) -> Option<[f32; 2]> {
         self.range
     }
@@ -109,7 +110,8 @@ impl TransferFunction {
     }
 }
 
-/// The value at `x` between two points; the first or last one outside. Of points at one place the last one counts.
+/// The value at `x`, interpolated between two points; outside of all points that of the first or the last one. Of
+/// several points at one place the last one counts.
 fn interpolate<T: Copy>(points: &[(f32, T)], x: f32, mix: impl Fn(T, T, f32) -> T) -> T {
     let next = points.partition_point(|&(place, _)| place <= x).clamp(1, points.len().max(2) - 1);
     let (a, b) = (points[next - 1], points[next.min(points.len() - 1)]);
@@ -118,7 +120,7 @@ fn interpolate<T: Copy>(points: &[(f32, T)], x: f32, mix: impl Fn(T, T, f32) -> 
     mix(a.1, b.1, t)
 }
 
-/// Whether the places ascend within 0…1 and the channels lie in 0…1.
+/// Checks that the places ascend within 0…1 and that the channels lie in 0…1.
 fn check<'a>(what: &str, points: impl Iterator<Item = (f32, &'a [f32])>) -> Result<()> {
     let mut last = None;
     for (place, channels) in points {
@@ -138,7 +140,7 @@ fn from_hex(rgb: u32) -> [f32; 3] {
     [16, 8, 0].map(|shift| (rgb >> shift & 255) as f32 / 255.0)
 }
 
-/// `#rrggbb`, with or without the mark.
+/// Parses `#rrggbb`, with or without the `#`.
 pub fn parse_color(text: &str) -> Option<[f32; 3]> {
     let digits = text.trim().trim_start_matches('#');
     (digits.len() == 6).then(|| u32::from_str_radix(digits, 16).ok()).flatten().map(from_hex)
@@ -148,7 +150,7 @@ pub fn parse_color(text: &str) -> Option<[f32; 3]> {
 mod json {
     use super::{DEFAULT_OPACITY, Error, Result, TransferFunction, parse_color};
 
-    /// A colour as the file spells it.
+    /// A colour as written in the file.
     #[derive(serde::Deserialize)]
     #[serde(untagged)]
     enum Color {
@@ -156,7 +158,7 @@ mod json {
         Channels([f32; 3]),
     }
 
-    /// What places are.
+    /// The meaning of places.
     #[derive(Clone, Copy, Default, PartialEq, serde::Deserialize)]
     #[serde(rename_all = "lowercase")]
     enum Positions {
@@ -165,7 +167,7 @@ mod json {
         Values,
     }
 
-    /// The file.
+    /// The content of the file.
     #[derive(serde::Deserialize)]
     #[serde(deny_unknown_fields)]
     struct File {
@@ -192,7 +194,7 @@ mod json {
             let mut opacity = file.opacity;
             let mut range = file.range;
             if file.positions == Positions::Values {
-                // Places given as values: rescale them to the range they span together (or to the one stated).
+                // Places given as values are rescaled to the range that they span together, or to the given range.
                 let places = || colors.iter().map(|c| c.0).chain(opacity.iter().flatten().map(|o| o.0));
                 let [lo, hi] = range.unwrap_or_else(|| [places().fold(f32::MAX, f32::min), places().fold(f32::MIN, f32::max)]);
                 for place in colors.iter_mut().map(|c| &mut c.0).chain(opacity.iter_mut().flatten().map(|o| &mut o.0)) {

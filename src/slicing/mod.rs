@@ -1,15 +1,19 @@
-//! What a slice is (SPEC 3.4): a stack of layers of voxels. Knows no Vulkan: the kernels and the reference both slice a [`VoxelGrid`], with the
-//! same operations in the same order.
+//! Definition of a slice (SPEC 3.4): a stack of layers of voxels. Does not depend on Vulkan: the kernels and the
+//! reference slice a [`VoxelGrid`] with the same operations in the same order.
 //!
 //! # Definition
-//! - The centre of voxel (x, y) of layer k is `((origin + k·up) + y·down) + x·across`; row 0 of a layer has the lowest coordinate.
-//! - Its box is the centre ± the three half axes of [`VoxelGrid::half`], a closed set; on an oblique plane it is rotated with the plane. The box is
-//!   tested in normalised coordinates, its half axes there rounded to multiples of 2^-42.
-//! - The centre lies in the mesh (it has an owner, SPEC 3.1): kind [`INSIDE`], value interpolated there.
-//! - Else, of the boundary primitives that touch the box, by separating axes with the allowance that [`crate::reference::separate`] states, the
-//!   one nearest to the centre (squared distances as computed; ties: lowest id) is the owner: kind [`TOUCHED`]. Its value is that of its closest
-//!   point, or continued linearly to the centre.
-//! - Else kind [`EMPTY`], value NaN.
+//! - The centre of voxel (x, y) of layer k is `((origin + k·up) + y·down) + x·across`; row 0 of a layer has the lowest
+//!   coordinate.
+//! - The box of a voxel is the closed set of its centre ± the three half axes of [`VoxelGrid::half`]; on an oblique
+//!   plane it is rotated with the plane. The box is tested in normalised coordinates, in which its half axes are
+//!   rounded to multiples of 2^-42.
+//! - A voxel whose centre lies in the mesh (has an owner, SPEC 3.1) has the kind [`INSIDE`], and the value interpolated
+//!   at its centre.
+//! - Otherwise the boundary tetrahedra that touch the box are determined, by separating axes with the allowance that
+//!   [`crate::reference::separate`] states. If there are any, the kind is [`TOUCHED`], and the tetrahedron nearest to
+//!   the centre (by squared distances as computed; ties: lowest id) is the owner. The value is that of its point
+//!   closest to the centre, or is continued linearly to the centre.
+//! - All other voxels have the kind [`EMPTY`] and the value NaN.
 
 pub mod settings;
 pub use settings::{Plane, SliceSettings};
@@ -23,44 +27,46 @@ use std::ops::Range;
 
 /// Kind of a voxel that the mesh does not touch.
 pub const EMPTY: u8 = 0;
-/// Kind of a voxel whose box the mesh touches, its centre being outside.
+/// Kind of a voxel whose box the mesh touches, but whose centre lies outside.
 pub const TOUCHED: u8 = 1;
 /// Kind of a voxel whose centre lies in the mesh.
 pub const INSIDE: u8 = 2;
 
-/// Most voxels below each other in a layer whose centres are located together, each from the owner of the one before.
+/// Most voxels of a run: voxels of a column of a layer whose centres are located one after the other, each from the
+/// owner of the one before.
 pub const VOXEL_RUN: u32 = 64;
-/// Steps of a walk across faces before the tree is asked.
+/// Most tetrahedra of a walk across faces before the tree is searched.
 pub const WALK: u32 = 6;
-/// Most voxels along an axis: numbers up to this are exact in single precision.
+/// Most voxels along an axis; numbers up to this are exact in single precision.
 pub const MOST: u32 = 1 << 24;
 
-/// What a touched voxel gets.
+/// The value that a touched voxel gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Extrapolate {
-    /// The value at the closest point of the closest primitive.
+    /// The value at the closest point of the closest tetrahedron.
     #[default]
     Nearest,
-    /// The field of the closest primitive continued to the centre of the voxel. (Of a flat primitive: as `Nearest`.)
+    /// The field of the closest tetrahedron, continued to the centre of the voxel. (For a flat tetrahedron: as
+    /// `Nearest`.)
     Linear,
 }
 
-/// Where the voxels of a stack of layers lie.
+/// The positions of the voxels of a stack of layers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct VoxelGrid {
     /// Centre of voxel (0, 0) of layer 0.
     pub origin: [f32; 3],
-    /// From one voxel to the next in a row.
+    /// Vector from one voxel to the next in a row.
     pub across: [f32; 3],
-    /// From one row to the next.
+    /// Vector from one row to the next.
     pub down: [f32; 3],
-    /// From one layer to the next.
+    /// Vector from one layer to the next.
     pub up: [f32; 3],
     /// Half axes of a voxel's box.
     pub half: [[f32; 3]; 3],
-    /// Voxels per row, and rows.
+    /// Voxels per row, and rows per layer.
     pub size: [u32; 2],
-    /// Layers.
+    /// Number of layers.
     pub layers: u32,
 }
 
@@ -71,7 +77,8 @@ impl VoxelGrid {
         [0, 1, 2].map(|c| ((self.origin[c] + k * self.up[c]) + y * self.down[c]) + x * self.across[c])
     }
 
-    /// Whether the boxes of these voxels may meet the closed box `[lo, hi]` in a mesh of this grid: no face of either keeps them apart.
+    /// Whether the boxes of these voxels may meet the closed box `[lo, hi]` in a mesh with this grid, that is, whether
+    /// no face of either separates them.
     pub fn meets(&self, rows: Rows, [lo, hi]: [[f64; 3]; 2], grid: &Grid) -> bool {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         let [x, y] = self.size.map(|n| f64::from(n) - 1.0);
@@ -81,7 +88,8 @@ impl VoxelGrid {
         let corner = wide(self.origin) + wide(self.up) * f64::from(layer) + wide(self.down) * low;
         let (lo, hi) = (DVec3::from_array(lo), DVec3::from_array(hi));
         let largest = (0..3).map(|c| f64::from(grid.hi[c]) - f64::from(grid.lo[c])).fold(0.0, f64::max);
-        // More than centres and boxes are off by rounding, and owners by the tolerance.
+        // The allowance exceeds the rounding errors of centres and boxes, and the distance that the tolerance adds to
+        // owners.
         let half = (hi - lo) * 0.5 + DVec3::splat(largest / 1024.0) + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
         let from_middle = corner - (lo + hi) * 0.5;
         let normals = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| self.half_normal(i, j));
@@ -94,26 +102,27 @@ impl VoxelGrid {
         })
     }
 
-    /// Perpendicular to two of the half axes.
+    /// A unit vector perpendicular to two of the half axes.
     fn half_normal(&self, i: usize, j: usize) -> DVec3 {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
         wide(self.half[i]).cross(wide(self.half[j])).normalize_or_zero()
     }
 
-    /// Voxels of a layer.
+    /// Number of voxels of a layer.
     pub fn layer_voxels(&self) -> u64 {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }
 
-    /// Voxels of all layers.
+    /// Number of voxels of all layers.
     pub fn voxels(&self) -> u64 {
         self.layer_voxels() * u64::from(self.layers)
     }
 
-    /// Whether this is a stack of voxels at all.
+    /// Checks that this is a stack of voxels.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there are no voxels or too many, or if they are not finite.
+    /// [`Error::Invalid`] if there are no voxels or too many along an axis, or if coordinates are not finite or 1e37 or
+    /// more.
     pub fn check(&self) -> Result<()> {
         let [w, h] = self.size;
         if w == 0 || h == 0 || self.layers == 0 || w.max(h).max(self.layers) > MOST {
@@ -127,9 +136,10 @@ impl VoxelGrid {
         Ok(())
     }
 
-    /// What the kernels and the reference need of these voxels over the mesh with grid `grid`. Twin of `glsl/query/slice_plan`.
+    /// What the kernels and the reference need to know of these voxels over a mesh with grid `grid`. Twin of
+    /// `glsl/query/slice_plan`.
     pub fn over(&self, grid: &Grid) -> SlicePlan {
-        // Twice the mesh; what is larger need not be scaled, which could overflow.
+        // Twice the mesh. Larger half axes need not be scaled, which could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
         let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
         let normalise = |x: f32| {
@@ -160,7 +170,7 @@ impl VoxelGrid {
         }
     }
 
-    /// As [`VoxelGrid::over`], of voxels that can be sliced.
+    /// As [`VoxelGrid::over`], but checks that the voxels can be sliced.
     ///
     /// # Errors
     /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or more than twice as large as the mesh.
@@ -180,14 +190,14 @@ impl VoxelGrid {
 pub struct Rows {
     /// Layer of the first row.
     pub layer: u32,
-    /// Number of the first row in that layer; 0 where there are rows of several layers.
+    /// Number of the first row in that layer; 0 if the rows span several layers.
     pub first: u32,
-    /// Number of rows; behind the last row of a layer comes the first one of the next.
+    /// Number of rows; the last row of a layer is followed by the first row of the next one.
     pub count: u32,
 }
 
 impl Rows {
-    /// The same rows, at most so many at a time, in a stack of layers of `height` rows.
+    /// Divides the rows into parts of at most `most` rows, in a stack with layers of `height` rows.
     pub fn parts(self, most: u32, height: u32) -> impl Iterator<Item = Self> + use<> {
         (0..self.count).step_by(most.max(1) as usize).map(move |i| {
             let [first, layer] = self.row(i, height);
@@ -195,48 +205,49 @@ impl Rows {
         })
     }
 
-    /// Number of runs in each column: those of [`VOXEL_RUN`] rows that a layer has, none in two layers (where rows begin in the middle of a layer and go on
-    /// in others, as if layers began there).
+    /// Number of runs in each column. The rows of each layer are divided into runs of [`VOXEL_RUN`] rows, so that no
+    /// run spans two layers. (Rows that start in the middle of a layer and continue in others are divided as if a layer
+    /// started there.)
     pub fn runs(self, height: u32) -> u32 {
         let most = self.count.min(height).max(1);
         self.count / most * most.div_ceil(VOXEL_RUN) + (self.count % most).div_ceil(VOXEL_RUN)
     }
 
-    /// The rows of run number i.
+    /// The rows of run number `i`.
     pub fn run(self, i: u32, height: u32) -> Range<u32> {
         let most = self.count.min(height).max(1);
         let (of_layer, in_layer) = (i / most.div_ceil(VOXEL_RUN) * most, i % most.div_ceil(VOXEL_RUN) * VOXEL_RUN);
         of_layer + in_layer..self.count.min(of_layer + most.min(in_layer + VOXEL_RUN))
     }
 
-    /// Row and layer of the i-th row.
+    /// Row and layer of the `i`-th row.
     pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
         let at = self.first + i;
         [at % height, self.layer + at / height]
     }
 }
 
-/// Voxels of whole rows: of a part of a layer, or of several whole layers.
+/// The voxels of whole rows: part of a layer, or several whole layers.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Band {
     /// Which rows.
     pub rows: Rows,
-    /// Value per voxel, NaN where empty or without field.
+    /// Value of each voxel; NaN if the voxel is empty or there is no field.
     pub values: Vec<f32>,
-    /// Kind per voxel.
+    /// Kind of each voxel.
     pub kinds: Vec<u8>,
-    /// Owner per voxel, or all ones.
+    /// Owner of each voxel, or `u32::MAX`.
     pub owners: Vec<u32>,
 }
 
-/// Voxels by kind.
+/// Numbers of voxels by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Tally {
-    /// Centre in the mesh.
+    /// Voxels with their centre in the mesh.
     pub inside: u64,
-    /// Touched by the mesh.
+    /// Voxels that the mesh merely touches.
     pub touched: u64,
-    /// Neither.
+    /// All other voxels.
     pub empty: u64,
 }
 
@@ -253,8 +264,10 @@ impl Tally {
     }
 }
 
-/// The parts in which a stack is sliced: as many rows as make at most `most` voxels, at least one; several layers only if whole, and parts of a layer by
-/// [`VOXEL_RUN`] rows if so many fit: then runs begin at the same rows whatever `most` is, and owners are the same where cells overlap, too.
+/// The parts in which a stack is sliced, each with as many rows as make at most `most` voxels, but at least one row. A
+/// part has several layers only if they are whole, and parts of a layer are multiples of [`VOXEL_RUN`] rows if that
+/// many fit. Then runs start at the same rows whatever `most` is, and owners are the same even where tetrahedra
+/// overlap.
 pub fn bands(grid: &VoxelGrid, most: u64) -> impl Iterator<Item = Rows> + use<> {
     let [w, h] = grid.size;
     let layers = grid.layers;

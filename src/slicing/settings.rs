@@ -1,4 +1,4 @@
-//! From what a user asks for to a [`VoxelGrid`]: plane, place, layers, size, thickness.
+//! Converts what a user asks for (plane, place, layers, size, thickness) to a [`VoxelGrid`].
 
 use super::{MOST, VoxelGrid};
 use crate::error::{Error, Result};
@@ -7,7 +7,8 @@ use glam::DVec3;
 /// The plane of the layers.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Plane {
-    /// Perpendicular to an axis: 0 is x, 1 is y, 2 is z. Rows run along the next axis but one in the order x y z without it: (y, z), (x, z), (x, y).
+    /// Perpendicular to an axis: 0 is x, 1 is y, 2 is z. Rows run along the first of the other two axes, and the second
+    /// leads from row to row: (y, z), (x, z) or (x, y).
     Axis(usize),
     /// Perpendicular to a direction of any length.
     Normal([f64; 3]),
@@ -18,16 +19,17 @@ pub enum Plane {
 pub struct SliceSettings {
     /// The plane of the layers.
     pub plane: Plane,
-    /// Place of the first layer's centre along the (unit) normal, in the coordinates of the source. `None`: the layers fill the mesh.
+    /// Place of the first layer's centre along the (unit) normal, in the coordinates of the source. `None`: the layers
+    /// fill the mesh.
     pub at: Option<f64>,
     /// Number of layers, upwards along the normal.
     pub layers: u32,
-    /// Voxels per row and rows; 0: as many as make the voxels square.
+    /// Voxels per row, and rows; 0: as many as make the voxels square.
     pub size: [u32; 2],
-    /// Size of a voxel along the normal. `None`: the size of `spacing`; without one, the size of a voxel in the plane for one layer or with `at`, else the
-    /// layers' share of the mesh.
+    /// Size of a voxel along the normal. `None`: the absolute value of `spacing`. If that is 0 or not given, the size
+    /// of a voxel in the plane for one layer or with `at`, else the layers' share of the mesh.
     pub thickness: Option<f64>,
-    /// Distance of two layers, below 0 downwards; `None`: their thickness.
+    /// Distance of two layers, negative for layers that go downwards; `None`: their thickness.
     pub spacing: Option<f64>,
 }
 
@@ -37,7 +39,8 @@ impl Default for SliceSettings {
     }
 }
 
-/// Two unit vectors that make a right-handed system with the unit normal `n`: the first is perpendicular to the axis that is least along `n`.
+/// Two unit vectors that form a right-handed system with the unit normal `n`. The first is perpendicular to the
+/// coordinate axis with the smallest component of `n`.
 fn in_plane(n: DVec3) -> (DVec3, DVec3) {
     let a = n.abs();
     let least = if a.x <= a.y && a.x <= a.z {
@@ -52,10 +55,12 @@ fn in_plane(n: DVec3) -> (DVec3, DVec3) {
 }
 
 impl SliceSettings {
-    /// The voxels over a mesh with the bounds `[lo, hi]` relative to `origin`. They cover the bounds as seen along the normal.
+    /// The voxels over a mesh with the bounds `[lo, hi]` relative to `origin`. They cover the bounds as seen along the
+    /// normal.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a normal of no length, sizes of 0 or beyond 2^24, a thickness that is not above 0, or a mesh without extent.
+    /// [`Error::Invalid`] for a normal of no length, sizes of 0 or beyond 2^24, a thickness that is not above 0, or a
+    /// mesh without extent.
     pub fn voxels(&self, lo: [f32; 3], hi: [f32; 3], origin: [f64; 3]) -> Result<VoxelGrid> {
         let invalid = |text: &str| Err(Error::Invalid(text.into()));
         let (n, u, v) = match self.plane {
@@ -85,7 +90,7 @@ impl SliceSettings {
         if !largest.is_finite() || largest <= 0.0 {
             return invalid("the mesh has no extent; there is nothing to slice");
         }
-        // A side of no extent gets voxels all the same.
+        // A side without extent gets voxels, too.
         let (wide, high) = (wide.max(largest * 1e-6), high.max(largest * 1e-6));
         let [w, h] = match self.size {
             [0, 0] => return invalid("a layer needs at least one voxel"),
@@ -116,7 +121,7 @@ impl SliceSettings {
             Some(_) => return invalid("the place of a slice must be a number"),
             None => middle - spacing * (f64::from(self.layers) - 1.0) * 0.5,
         };
-        // Centred where square voxels overhang.
+        // Square voxels may extend beyond the mesh, so they are centred.
         let first = |lo: f64, hi: f64, d: f64, count: u32| f64::midpoint(lo, hi) - d * (f64::from(count) - 1.0) * 0.5;
         let corner = u * first(u0, u1, du, w) + v * first(v0, v1, dv, h) + n * at;
         let single = |d: DVec3| d.as_vec3().to_array();
@@ -131,11 +136,12 @@ impl SliceSettings {
         })
     }
 
-    /// The same with cubes for voxels, as packages for printers want them: as thick and far apart as they are wide.
-    /// `fill`: as many layers as fill the mesh. Across the layers of axis y rows run along z, so that the package is no mirror image of the mesh.
+    /// These settings with voxels that are cubes, as packages for printers require: the thickness and distance of
+    /// layers equal the width of a voxel. With `fill`, there are as many layers as fill the mesh. For layers across
+    /// axis y, rows run along z, so that the package is not a mirror image of the mesh.
     ///
     /// # Errors
-    /// As [`SliceSettings::voxels`]; and [`Error::Invalid`] for settings that make no cubes.
+    /// As [`SliceSettings::voxels`]; and [`Error::Invalid`] for settings whose voxels would not be cubes.
     pub fn cubes(&self, lo: [f32; 3], hi: [f32; 3], origin: [f64; 3], fill: bool) -> Result<Self> {
         let plane = if self.plane == Plane::Axis(1) { Plane::Normal([0.0, 1.0, 0.0]) } else { self.plane };
         let mut cubes = Self { size: [self.size[0], 0], plane, ..*self };
@@ -167,7 +173,7 @@ mod tests {
         settings.voxels(BOX.0, BOX.1, BOX.2)
     }
 
-    /// A package has no directions of its own: a left-handed one is the mirror image of the mesh.
+    /// A package does not store directions, so a left-handed one would be the mirror image of the mesh.
     #[test]
     fn packages_are_no_mirror_images() {
         let wide = |v: [f32; 3]| DVec3::from_array(v.map(f64::from));
@@ -184,7 +190,7 @@ mod tests {
         let settings = SliceSettings { layers: 3, at: Some(1.0), spacing: Some(-0.5), ..SliceSettings::default() };
         let grid = voxels(settings).unwrap();
         assert_eq!((grid.up, grid.half[2]), ([0.0, 0.0, -0.5], [0.0, 0.0, 0.25]));
-        // One layer over another, each as thick as a voxel is wide.
+        // Layers at the same place, each as thick as a voxel is wide.
         let grid = voxels(SliceSettings { spacing: Some(0.0), size: [8, 0], ..settings }).unwrap();
         assert_eq!((grid.up[2], grid.half[2]), (0.0, [0.0, 0.0, 0.25]));
     }

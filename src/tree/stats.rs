@@ -1,8 +1,8 @@
-//! Figures about a tree.
+//! Statistics and sizes of a tree.
 
 use super::TreeArrays;
 
-/// What [`TreeArrays::validate`] found while it checked.
+/// Statistics gathered by [`TreeArrays::validate`].
 #[derive(Clone, Debug, PartialEq)]
 pub struct TreeStats {
     /// Level of the leaves, l.
@@ -11,7 +11,7 @@ pub struct TreeStats {
     pub entries: u64,
     /// Nodes, `n_n`.
     pub nodes: u64,
-    /// Nodes that are not leaves, `n_ni`.
+    /// Internal nodes, `n_ni`.
     pub internal_nodes: u64,
     /// Leaves.
     pub leaves: u64,
@@ -23,18 +23,18 @@ pub struct TreeStats {
     pub boundary_entries: u64,
     /// Entries of the longest leaf.
     pub longest_leaf: u64,
-    /// Entries per leaf.
+    /// Mean number of entries per leaf.
     pub mean_leaf: f64,
-    /// Nodes of each level.
+    /// Number of nodes on each level.
     pub nodes_per_level: Vec<u64>,
 }
 
 /// Bytes of a tree, per array.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct TreeBytes {
-    /// Primitive ids.
+    /// Tetrahedron ids, with the quarters of the entries.
     pub p: u64,
-    /// Primitive offsets of the leaves.
+    /// Entry offsets of the leaves.
     pub po: u64,
     /// Child offsets.
     pub co: u64,
@@ -49,7 +49,7 @@ pub struct TreeBytes {
 }
 
 impl TreeBytes {
-    /// Of a tree with so many entries, nodes, and nodes that are not leaves, down to `level`.
+    /// Sizes for a tree with this many entries, nodes and internal nodes, and leaves on `level`.
     pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool) -> Self {
         Self {
             p: 4 * entries,
@@ -62,27 +62,28 @@ impl TreeBytes {
         }
     }
 
-    /// The most that a tree down to `level` can take, where `entries` counts those of the assignment `Aabb` on every level: a level has no more nodes
-    /// than entries or cells. Twin of `most_words` in `glsl/build/11_choose_depth`.
+    /// Upper bounds for a tree with leaves on `level`, where `entries` are the numbers of `Aabb` entries on every
+    /// level: a level has no more nodes than entries or cells. Twin of `most_words` in `glsl/build/11_choose_depth`.
     pub fn most(entries: &[u64; 11], level: u32, boxes: bool) -> Self {
         let nodes = |levels: u32| 1 + (1..=levels).map(|k| entries[k as usize].min(8u64.pow(k))).sum::<u64>();
         let internal = if level == 0 { 0 } else { nodes(level - 1) };
         Self::new(entries[level as usize], nodes(level), internal, level, boxes)
     }
 
-    /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, that is P, boxes, a byte per flag, CO, and no PO.
+    /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, which is P, boxes, one byte per
+    /// boundary flag, and CO, without PO.
     pub fn paper(&self) -> u64 {
         let (leaves, internal) = (self.po / 4 - 1, self.co / 4 - 1);
         self.p + 25 * (leaves + internal) + 4 * internal
     }
 
-    /// All arrays, by the names of the paper where it has one.
+    /// All arrays, named as in the paper where it has them.
     pub fn arrays(&self) -> [(&'static str, u64); 7] {
         let Self { p, po, co, no, boundary, mask, boxes } = *self;
         [("P", p), ("BV", boxes), ("CO", co), ("PO", po), ("BF", boundary), ("NO", no), ("mask", mask)]
     }
 
-    /// Sum over the arrays.
+    /// Sum of all arrays.
     pub fn total(&self) -> u64 {
         self.arrays().into_iter().map(|a| a.1).sum()
     }
@@ -95,7 +96,7 @@ impl TreeArrays {
         TreeBytes::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some())
     }
 
-    /// Figures of the tree, which must be a valid one.
+    /// Gathers the statistics of a valid tree.
     pub(super) fn stats(&self) -> TreeStats {
         let leaves = u64::from(self.nodes() - self.internal_nodes());
         let lengths = || self.leaves().map(|j| (j, self.entries(j).len() as u64));

@@ -1,4 +1,4 @@
-//! The rules that every tree keeps (SPEC 2.5).
+//! Checks the rules that every tree must satisfy (SPEC 2.5).
 
 use super::{TreeArrays, TreeStats};
 use crate::error::{Error, Result};
@@ -14,20 +14,21 @@ use crate::reference::quarters::{id_mask, quarters_near};
 use crate::reference::vertices::Vertices;
 use rayon::prelude::*;
 
-/// Outcome of a rule: the text names what is wrong, with indices.
+/// Outcome of a rule; the text says what is wrong, with indices.
 type Rule = Result<(), String>;
 
-/// Breaks the rule unless `holds`.
+/// Fails with `text` unless `holds`.
 fn rule(holds: bool, text: impl FnOnce() -> String) -> Rule {
     if holds { Ok(()) } else { Err(text()) }
 }
 
 impl TreeArrays {
-    /// Checks every rule of the data structure against the mesh the tree was built over, and gathers statistics. Never panics, whatever the
-    /// arrays hold.
+    /// Checks every rule of the data structure against the mesh that the tree was built over, and gathers statistics.
+    /// Never panics, whatever the arrays contain.
     ///
     /// # Errors
-    /// [`Error::BrokenTree`] with the first broken rule and the indices that break it; [`Error::Invalid`] if `topology` is not of `mesh`.
+    /// [`Error::BrokenTree`] with the first broken rule and the indices that break it; [`Error::Invalid`] if `topology`
+    /// does not belong to `mesh`.
     pub fn validate(&self, mesh: &Mesh, topology: &Topology) -> Result<TreeStats> {
         if topology.neighbours.len() != mesh.tets.len() {
             let (of, is) = (topology.neighbours.len(), mesh.tets.len());
@@ -58,7 +59,7 @@ impl TreeArrays {
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
-    /// All arrays are as long as NO says; bits and bytes past the last node are 0.
+    /// All arrays have the lengths that follow from NO; bits and bytes beyond the last node are 0.
     fn check_lengths(&self) -> Rule {
         let (level, nodes) = (self.grid.level as usize, self.nodes() as usize);
         rule(self.no.len() == level + 1, || format!("NO has {} levels, the grid {}", self.no.len(), level + 1))?;
@@ -79,7 +80,7 @@ impl TreeArrays {
         rule(tail(&self.mask, nodes % 4 * 8), || format!("mask has bits past node {nodes}"))
     }
 
-    /// NO: one root; every level has at least a node and at most 8 per node above.
+    /// NO: there is one root; every level has at least one node, and at most 8 per node of the level above.
     fn check_levels(&self) -> Rule {
         rule(self.no[0] == 1, || format!("NO[0] = {}, there is one root", self.no[0]))?;
         let mut above = 1;
@@ -91,7 +92,8 @@ impl TreeArrays {
         Ok(())
     }
 
-    /// CO: 1 to 8 children, contiguous, those of a level's nodes being exactly the next level.
+    /// CO: every internal node has 1 to 8 children, which are contiguous; the children of a level's nodes are exactly
+    /// the next level.
     fn check_children(&self) -> Rule {
         rule(self.co[0] == 0, || format!("CO[0] = {}, children begin at node 1", self.co[0]))?;
         for (i, pair) in self.co.windows(2).enumerate() {
@@ -105,7 +107,8 @@ impl TreeArrays {
         Ok(())
     }
 
-    /// Masks count the children. Returns the Morton codes of all nodes, parents' prefixes included by construction, ascending on each level.
+    /// The masks of internal nodes match their numbers of children. Returns the Morton codes of all nodes, which have
+    /// their parents' codes as prefixes by construction, after checking that they ascend on each level.
     fn check_masks(&self) -> Result<Vec<u32>, String> {
         let mut codes = vec![0; self.nodes() as usize];
         for i in 0..self.internal_nodes() {
@@ -125,7 +128,7 @@ impl TreeArrays {
         Ok(codes)
     }
 
-    /// PO: ascending over the leaves, up to all entries.
+    /// PO: offsets ascend over the leaves, up to the number of entries.
     fn check_offsets(&self) -> Rule {
         let n_m = self.p.len() as u64;
         rule(self.po[0] == 0, || format!("PO[0] = {}, entries begin at 0", self.po[0]))?;
@@ -139,8 +142,9 @@ impl TreeArrays {
         rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))
     }
 
-    /// P and the quarters of its entries: ascending in every leaf, and exactly the pairs of primitive and cell of the assignment. A pair that belongs there, in lists without
-    /// duplicates, as often as there are pairs, is every pair once.
+    /// P and the quarters of its entries: ids ascend in every leaf, and the entries are exactly the pairs of
+    /// tetrahedron and cell of the assignment. Each entry belongs to the assignment, and without duplicates as many
+    /// entries as pairs means that every pair occurs once.
     fn check_lists(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let vertices = Vertices::new(mesh, &self.grid);
         let all = Stage { mesh, topology, vertices: &vertices, grid: &self.grid, assign: self.assign, marks: None };
@@ -168,7 +172,8 @@ impl TreeArrays {
         rule(pairs == n_m as u64, || format!("P has {n_m} entries, the assignment {} makes {pairs}", self.assign))
     }
 
-    /// BF: a leaf's flag is 0 if its cell is touched, and by no boundary primitive; others' says whether a child has it. Masks of the leaves.
+    /// BF: a leaf's flag is 0 if one of its tetrahedra touches its cell and none is a boundary tetrahedron; an internal
+    /// node's flag is set if a child's is. Also checks the masks of the leaves.
     fn check_flags(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let internal = self.internal_nodes();
         let vertices = Vertices::new(mesh, &self.grid);
@@ -189,7 +194,7 @@ impl TreeArrays {
         (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)
     }
 
-    /// BV: a leaf's box is its cell's, others' the union of the children's, to the bit.
+    /// BV: a leaf's box is its cell's, an internal node's is the union of its children's, bit for bit.
     fn check_boxes(&self, codes: &[u32]) -> Rule {
         let Some(boxes) = &self.boxes else { return Ok(()) };
         let internal = self.internal_nodes();

@@ -1,10 +1,11 @@
-//! Which shapes of the kernels are fastest on the device at hand: a search over the table of tunables, and the profile that later runs find.
+//! Search for the target (the tuning parameters of the kernels) that is fastest on the device at hand, and the profile
+//! in which later runs find it.
 //!
 //! ```text
 //! tunables   what can be changed, and in which steps
-//! workload   what is timed: stage 0, two constructions, every query; and whether its answers are the expected ones, byte for byte
+//! workload   what is timed (stage 0, two constructions, every query), and the answers that must be equal byte for byte
 //! search     one tunable after the other: verified, then timed in turns with the best so far
-//! profile    a file per device and driver in the user's configuration folder
+//! profile    one file per device and driver in the user's configuration folder
 //! ```
 
 mod profile;

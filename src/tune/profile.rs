@@ -21,7 +21,7 @@ pub struct Gain {
     pub after_ms: f64,
 }
 
-/// The best shapes found on a device, and with which driver.
+/// The best target found on a device, and the circumstances.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Profile {
@@ -33,38 +33,39 @@ pub struct Profile {
     pub subgroup: u32,
     /// Version of this crate.
     pub version: String,
-    /// The mesh.
+    /// Mesh that it was tuned with.
     pub mesh: String,
-    /// The shapes.
+    /// The target.
     pub target: Target,
-    /// What they gained.
+    /// What the target gained.
     pub gains: Vec<Gain>,
 }
 
-/// What a look for a device's profile finds.
+/// Result of the search for a device's profile.
 #[derive(Debug)]
 pub enum Search {
-    /// The device's.
+    /// The device's profile, with its path.
     Found(PathBuf, Box<Profile>),
     /// There is none.
     Nothing,
-    /// There is one that cannot be used; why, and what to do.
+    /// There is one that cannot be used; the text says why and what to do.
     Ignored(String),
 }
 
-/// Where profiles are kept: `olbvh` in `XDG_CONFIG_HOME`, `~/.config`, or what the system has for that; `None` without a home.
+/// The folder of profiles: `olbvh` in `XDG_CONFIG_HOME` or `~/.config`, or in the system's equivalent; `None` without a
+/// home.
 pub fn folder() -> Option<PathBuf> {
     Some(etcetera::choose_base_strategy().ok()?.config_dir().join("olbvh"))
 }
 
-/// Letters and digits, the rest as single hyphens.
+/// Reduces text to lower-case letters and digits, with everything else replaced by single hyphens.
 fn slug(text: &str) -> String {
     let mapped: String = text.chars().map(|c| if c.is_ascii_alphanumeric() { c.to_ascii_lowercase() } else { '-' }).collect();
     mapped.split('-').filter(|part| !part.is_empty()).collect::<Vec<_>>().join("-")
 }
 
 impl Profile {
-    /// The name of a device's file: a new driver has a new one, since it compiles kernels anew.
+    /// The file name of a device's profile. A new driver has a new file, because it compiles kernels differently.
     pub fn file_name(device: &DeviceReport) -> String {
         format!("{}.{}.json", slug(&device.name), slug(&device.driver))
     }
@@ -72,7 +73,8 @@ impl Profile {
     /// Reads a profile.
     ///
     /// # Errors
-    /// [`Error::Io`] and [`Error::File`] if it cannot be read, is none, or has shapes that do not serve meshes of every size.
+    /// [`Error::Io`] and [`Error::File`] if the file cannot be read, is not a profile, or has a target that does not
+    /// suit meshes of every size.
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
         let wrong = |place: String, e: &dyn std::fmt::Display| {
@@ -84,7 +86,8 @@ impl Profile {
         Ok(profile)
     }
 
-    /// The profile of a device in a folder. One that is broken, or of another device, or does not fit this one is ignored: it costs speed only.
+    /// Finds the profile of a device in a folder. A profile that is broken, belongs to another device, or does not suit
+    /// this one is ignored, which costs only speed.
     pub fn find(folder: &Path, device: &DeviceReport) -> Search {
         let path = folder.join(Self::file_name(device));
         if !path.exists() {
@@ -115,7 +118,7 @@ impl Profile {
         }
     }
 
-    /// Writes it, complete or not at all.
+    /// Writes the profile, completely or not at all.
     ///
     /// # Errors
     /// [`Error::Io`] if the file cannot be written.

@@ -8,62 +8,63 @@ use crate::gpu::StageTime;
 use crate::kernels::{Target, WorkgroupLimits};
 use std::time::{Duration, Instant};
 
-/// Times of a candidate and of the best so far, taken in turns, that decide.
+/// Number of times that are taken of a candidate and of the best so far, in turns, for a decision.
 const PAIRS: usize = 7;
-/// A candidate so many times as slow in the first turn is not timed again.
+/// A candidate that is slower than the best by this factor in the first two turns is not timed again.
 const HOPELESS: f64 = 1.25;
-/// The least gain worth a change.
+/// Minimum gain for a change, as a fraction of the time.
 const LEAST_GAIN: f64 = 0.01;
 
-/// What is tuned.
+/// The work that is tuned.
 pub trait Work {
-    /// Whether a target gives the expected answers, byte for byte. Compiles its kernels, so that no time holds that.
+    /// Checks that a target gives the expected answers, byte for byte. It also compiles the kernels, so that no
+    /// measured time includes that.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] for other answers, or whatever fails.
+    /// [`Error::Mismatch`] for other answers, or any error of the work itself.
     fn verify(&self, target: &Target) -> Result<()>;
-    /// Runs what the stages with these beginnings belong to.
+    /// Runs the work whose stages have names with these beginnings, and returns its times.
     ///
     /// # Errors
-    /// Whatever fails.
+    /// Any error of the work itself.
     fn run(&self, target: &Target, stages: &[&str]) -> Result<Vec<StageTime>>;
 }
 
-/// What the search has done.
+/// A step of the search.
 #[derive(Clone, Debug)]
 pub enum Event {
-    /// A candidate was timed: what was changed, time by that of the best so far, and whether it is the best now.
+    /// A candidate was timed.
     Tried {
-        /// The change.
+        /// What was changed.
         change: String,
-        /// Median of the candidate by that of the best so far.
+        /// Median time of the candidate divided by that of the best so far.
         ratio: f64,
-        /// It is kept.
+        /// Whether the candidate is the best now.
         kept: bool,
     },
-    /// A candidate that is not the device's: wrong answers, or it does not run.
+    /// A candidate was refused because it gives wrong answers or does not run.
     Refused {
-        /// The change.
+        /// What was changed.
         change: String,
-        /// Why.
+        /// The reason.
         why: String,
     },
 }
 
-/// The end of a search.
+/// The result of a search.
 #[derive(Clone, Debug)]
 pub struct Tuned {
     /// The best target.
     pub target: Target,
-    /// Changes that are kept.
+    /// Number of changes that were kept.
     pub kept: usize,
-    /// Candidates timed.
+    /// Number of candidates that were timed.
     pub tried: usize,
-    /// Candidates refused.
+    /// Number of candidates that were refused.
     pub refused: usize,
-    /// Whether nothing was left to try when it ended.
+    /// Whether nothing was left to try when the search ended.
     pub complete: bool,
-    /// Milliseconds of every stage before and after, and of all together, measured in turns at the end.
+    /// Milliseconds of every stage, and of all together, before and after tuning, measured in turns at the end.
     pub gains: Vec<Gain>,
 }
 
@@ -78,7 +79,7 @@ struct Searcher<'a> {
     report: &'a dyn Fn(&Event, f64),
 }
 
-/// Milliseconds of the stages with these beginnings.
+/// Sum of the milliseconds of the stages whose names start with `beginnings`.
 fn sum(stages: &[StageTime], beginnings: &[&str]) -> f64 {
     StageTime::sum(stages.iter().filter(|s| beginnings.iter().any(|b| s.name.starts_with(b))))
 }
@@ -100,7 +101,8 @@ impl Searcher<'_> {
         self.begin.elapsed() >= self.time
     }
 
-    /// Tries a candidate; whether it is the best now. Errors of the candidate refuse it; those of the best so far end the search.
+    /// Tries a candidate and returns whether it is the best now. An error of the candidate refuses it; a lost device
+    /// ends the search.
     fn attempt(&mut self, change: String, candidate: Target, stages: &[&str]) -> Result<bool> {
         let outcome = self.work.verify(&candidate).and_then(|()| self.contest(&candidate, stages));
         let event = match outcome {
@@ -112,7 +114,7 @@ impl Searcher<'_> {
                 }
                 Event::Tried { change, ratio, kept: better }
             }
-            // Nothing that follows would run.
+            // After a lost device, nothing that follows would run.
             Err(error @ Error::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. }) => return Err(error),
             Err(error) => {
                 self.refused += 1;
@@ -123,19 +125,20 @@ impl Searcher<'_> {
         Ok(matches!(event, Event::Tried { kept: true, .. }))
     }
 
-    /// Who wins by chance once, one of 70 in a race, does not win twice.
+    /// Races a candidate against the best; a winner must win a second race. About one candidate in 70 wins a single
+    /// race by chance.
     fn contest(&self, candidate: &Target, stages: &[&str]) -> Result<(f64, bool)> {
         let first = self.race(candidate, stages)?;
         if first.1 { self.race(candidate, stages) } else { Ok(first) }
     }
 
-    /// Times candidate and best in turns: the ratio of the medians, and whether the candidate is better by more than the times vary: its upper
-    /// quartile below the lower quartile of the best.
+    /// Times candidate and best in turns. Returns the ratio of the medians, and whether the candidate is better by more
+    /// than the times vary, that is whether its upper quartile lies below the lower quartile of the best.
     fn race(&self, candidate: &Target, stages: &[&str]) -> Result<(f64, bool)> {
         let time = |target: &Target| Ok::<_, Error>(sum(&self.work.run(target, stages)?, stages));
         let (mut ours, mut theirs) = (Vec::new(), Vec::new());
         for pair in 0..PAIRS {
-            // Who goes first changes, so that neither always meets what the other left behind.
+            // The order alternates, so that neither always meets the state that the other left behind.
             if pair % 2 == 0 {
                 theirs.push(time(&self.best)?);
                 ours.push(time(candidate)?);
@@ -152,7 +155,7 @@ impl Searcher<'_> {
         Ok((ratio, clear && ratio < 1.0 - LEAST_GAIN))
     }
 
-    /// Every tunable once, each as far as it gains; whether any did.
+    /// Tries every tunable once, each as far as it gains; returns whether any did.
     fn round(&mut self, room: &WorkgroupLimits) -> Result<bool> {
         let before = self.kept;
         for tunable in &TUNABLES {
@@ -176,10 +179,11 @@ impl Searcher<'_> {
     }
 }
 
-/// Searches from `start` on, and tries no further candidate after that time; `report` is told of every one, and which part of the time is over.
+/// Searches from `start` on, and tries no further candidate after `time`. `report` receives every step, and the
+/// fraction of the time that has passed.
 ///
 /// # Errors
-/// If `start` itself gives wrong answers or does not run, or the device is lost.
+/// Any error if `start` itself gives wrong answers or does not run, and an error if the device is lost.
 pub fn tune(work: &dyn Work, room: &WorkgroupLimits, start: &Target, time: Duration, report: &dyn Fn(&Event, f64)) -> Result<Tuned> {
     work.verify(start)?;
     let begin = Instant::now();
@@ -199,7 +203,7 @@ pub fn tune(work: &dyn Work, room: &WorkgroupLimits, start: &Target, time: Durat
     Ok(Tuned { target: best, kept, tried, refused, complete, gains })
 }
 
-/// Medians of every stage under both targets, in turns.
+/// Medians of every stage with both targets, measured in turns.
 fn gains(work: &dyn Work, start: &Target, best: &Target) -> Result<Vec<Gain>> {
     let every = &["mesh.", "build.", "query."];
     let mut runs: [Vec<Vec<StageTime>>; 2] = [Vec::new(), Vec::new()];
@@ -231,7 +235,8 @@ mod tests {
     use crate::kernels::Row;
     use std::cell::{Cell, RefCell};
 
-    /// A device that likes queries of 64 and runs of 256, calculates wrongly with spines of 128, and whose times vary.
+    /// A fake device that is fastest with queries of 64 and runs of 256, computes wrong results with spines of 128, and
+    /// whose times vary.
     struct Fake {
         noise: f64,
         calls: Cell<u32>,

@@ -1,16 +1,16 @@
-//! What can be changed.
+//! The parameters that can be changed.
 
 use crate::kernels::{Row, Target, WorkgroupLimits};
 
-/// One choice of a [`Target`].
+/// One parameter of a [`Target`].
 pub struct Tunable {
-    /// Its name, as in a profile.
+    /// Name, as in a profile.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub about: &'static str,
-    /// Beginnings of the names of the stages that it changes; those decide.
+    /// Prefixes of the names of the stages that it affects; their times decide.
     pub stages: &'static [&'static str],
-    /// The values tried, ascending.
+    /// Values to try, ascending.
     pub values: &'static [u32],
     get: fn(&Target) -> u32,
     set: fn(&mut Target, u32),
@@ -18,12 +18,12 @@ pub struct Tunable {
 
 const GROUPS: &[u32] = &[4, 8, 16, 32, 64, 128, 256, 512, 1024];
 const ROWS: &[u32] = &[12, 16, 24, 32, 64, 128, 256, 512, 1024];
-/// Stages with a scan or a sort.
+/// Stages that contain a scan or a sort.
 const SCANS: &[&str] = &["build.count", "build.filter", "build.sort", "build.count_splits"];
 const RUNS: &[&str] = &["build.emit", "build.count_splits", "build.splits", "build.leaves"];
 const EACH: &[&str] = &["mesh.", "build.depth", "build.count", "build.filter", "build.emit", "build.leaves", "build.levels"];
 
-/// Every tunable but the kind of sort, those first that matter most.
+/// Every tunable except the kind of sort, the most important ones first.
 pub static TUNABLES: [Tunable; 10] = [
     Tunable {
         name: "sort.rows",
@@ -108,12 +108,12 @@ pub static TUNABLES: [Tunable; 10] = [
 ];
 
 impl Tunable {
-    /// Its value in a target.
+    /// Value of the parameter in a target.
     pub fn of(&self, target: &Target) -> u32 {
         (self.get)(target)
     }
 
-    /// The target with the next value above or below that the device has room for.
+    /// The target with the next value, above or below, that the device has room for; `None` if there is none.
     pub(super) fn step(&self, target: &Target, room: &WorkgroupLimits, up: bool) -> Option<Target> {
         let now = self.of(target);
         let usable = |&value: &u32| {
@@ -129,7 +129,7 @@ impl Tunable {
     }
 }
 
-/// The target with the other kind of sort, as its best known row has it.
+/// The target with the other kind of sort, with the parameters of the best known row of that kind.
 pub(super) fn other_sort(target: &Target, room: &WorkgroupLimits) -> Target {
     let row = if target.sort.serial { Row::Portable } else { Row::Cpu };
     Target { sort: row.target(room).sort, ..target.clone() }

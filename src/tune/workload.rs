@@ -1,4 +1,4 @@
-//! What is timed, and what it must answer.
+//! The work that is timed, and the answers that it must give.
 
 use super::search::Work;
 use crate::build::{BadCells, DeviceMesh, Tree};
@@ -18,14 +18,14 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
-/// Points to locate.
+/// Number of points to locate.
 const POINTS: u32 = 1 << 16;
-/// Width and height of the picture, and voxels of a row of the slice.
+/// Width and height of the picture, and voxels per row of the slice.
 const PIXELS: u32 = 192;
-/// Meshes up to this size are compared with the reference as well.
+/// Meshes of up to this many tetrahedra are also compared with the reference implementation.
 const REFERENCE_TETS: usize = 300_000;
 
-/// A mesh, and the questions about it.
+/// A mesh and the queries over it.
 pub struct Workload<'a> {
     gpu: Gpu,
     mesh: &'a Mesh,
@@ -34,11 +34,11 @@ pub struct Workload<'a> {
     plan: Plan,
     voxels: VoxelGrid,
     expected: Answers,
-    /// Mesh and trees under the last two targets.
+    /// Mesh and trees for the two targets used last.
     prepared: RefCell<Vec<Rc<Prepared>>>,
 }
 
-/// A mesh and its trees, built under a target.
+/// A mesh and its trees, built with a target.
 struct Prepared {
     target: Target,
     mesh: DeviceMesh,
@@ -46,7 +46,7 @@ struct Prepared {
     boundary: Tree,
 }
 
-/// What must not depend on a target.
+/// Everything that must not depend on the target.
 #[derive(Default, PartialEq)]
 struct Answers {
     neighbours: Vec<[u32; 4]>,
@@ -59,15 +59,17 @@ struct Answers {
 }
 
 impl<'a> Workload<'a> {
-    /// The answers under the target of `gpu`, which for meshes that are not too large are compared with the reference first.
+    /// Computes the expected answers with the target of `gpu`; for meshes that are not too large, these are compared
+    /// with the reference implementation.
     ///
     /// # Errors
-    /// [`Error::Mismatch`] if the device gives other answers than the reference, [`Error::Memory`] and the like if it cannot hold the mesh.
+    /// [`Error::Mismatch`] if the device gives other answers than the reference implementation, [`Error::Memory`] or
+    /// another error if it cannot hold the mesh.
     pub fn new(gpu: &Gpu, mesh: &'a Mesh) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let bounds = Bounds::from(device.grid());
         let Bounds { lo, hi } = bounds;
-        // Fractions of multiples of the golden ratio and its kin: in no order, and spread evenly.
+        // Fractional parts of multiples of a generalised golden ratio: in no order, and spread evenly.
         let at = |i: u32, share: f64, c: usize| lo[c] + (hi[c] - lo[c]) * (f64::from(i) * share).fract() as f32;
         let points = (0..POINTS).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();
         let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
@@ -99,7 +101,7 @@ impl<'a> Workload<'a> {
         Ok(())
     }
 
-    /// Stage 0 and both constructions under a target, with their stages.
+    /// Runs stage 0 and both constructions with a target, and returns the times of their stages.
     fn construct(&self, target: &Target) -> Result<(Prepared, Vec<StageTime>)> {
         let gpu = self.gpu.with_target(target.clone())?;
         let mesh = DeviceMesh::upload(&gpu, self.mesh, BadCells::Skip)?;
@@ -109,7 +111,7 @@ impl<'a> Workload<'a> {
         Ok((Prepared { target: target.clone(), mesh, whole, boundary }, stages))
     }
 
-    /// Mesh and trees of a target, from before if they are still there.
+    /// Mesh and trees for a target, from the cache if they are there.
     fn prepared(&self, target: &Target) -> Result<Rc<Prepared>> {
         if let Some(found) = self.prepared.borrow().iter().find(|p| p.target == *target) {
             return Ok(found.clone());
@@ -121,7 +123,7 @@ impl<'a> Workload<'a> {
         Ok(made)
     }
 
-    /// Every query; its answers go to `answers`.
+    /// Runs every query; stores the answers in `answers` and returns the times of the stages.
     fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<Vec<StageTime>> {
         let silent = &|_, _| {};
         let mut stages = Vec::new();
@@ -186,7 +188,7 @@ impl Work for Workload<'_> {
         if any(&["mesh.", "build."]) {
             times.extend(self.construct(target)?.1);
         }
-        // Without timestamps the clock of the host has to do, for all stages together.
+        // Without timestamps, the host's clock is used for all stages together.
         let wall =
             StageTime { name: stages.first().copied().unwrap_or_default().into(), milliseconds: begin.elapsed().as_secs_f64() * 1e3 };
         Ok(if times.iter().any(|s| s.milliseconds > 0.0) { times } else { vec![wall] })

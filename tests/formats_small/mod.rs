@@ -1,6 +1,7 @@
-//! Small mesh files of every format, made on the spot: a cube of 8 points and 6 tetrahedra with a point field `s` and a cell field `c`.
-#![allow(dead_code)] // Not every test uses all of it.
-#![allow(clippy::format_push_string, clippy::format_collect, clippy::unwrap_used)] // Plain is better than fast here.
+//! Small mesh files of every format, made in memory: a cube of 8 points and 6 tetrahedra with a point field `s` and a
+//! cell field `c`.
+#![allow(dead_code)] // not every test uses all of it
+#![allow(clippy::format_push_string, clippy::format_collect, clippy::unwrap_used)] // simple code matters more than speed here
 
 use std::path::{Path, PathBuf};
 
@@ -8,7 +9,7 @@ pub const POINTS: [[f64; 3]; 8] =
     [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.], [1., 1., 1.25]];
 pub const TETS: [[u32; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
-/// The folder with the shared meshes, if it is there; says loudly when it is not.
+/// The folder with the shared meshes, if it exists; prints a message if it does not.
 pub fn shared(folder: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
     let root = if root.is_dir() { root } else { Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes") };
@@ -23,7 +24,7 @@ fn join<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
     values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }
 
-/// Every spelling: file name, content; a companion file follows its main file.
+/// Every spelling, as file name and content. A companion file follows its main file.
 pub fn all() -> Vec<(&'static str, Vec<u8>)> {
     vec![
         ("ascii.vtu", vtu_ascii()),
@@ -47,7 +48,7 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
-/// One of the small files with other bytes in the place of some.
+/// One of the small files, with the bytes `old` replaced by `new`.
 pub fn replace(name: &str, old: &[u8], new: &[u8]) -> Vec<u8> {
     let mut bytes = all().into_iter().find(|f| f.0 == name).unwrap().1;
     let at = bytes.windows(old.len()).position(|w| w == old).unwrap();
@@ -203,7 +204,8 @@ fn msh_22_binary() -> Vec<u8> {
     out
 }
 
-/// With a volume of the physical groups 11 and 12, which is the entity of all elements; points have a box in this version.
+/// Version 4.0. One volume, with the physical groups 11 and 12, is the entity of all elements; points have a box in
+/// this version.
 fn msh_40() -> Vec<u8> {
     let nodes: String = POINTS.iter().enumerate().map(|(i, p)| format!("{} {}\n", 10 * (i + 1), join(p))).collect();
     let cells: String = TETS.iter().enumerate().map(|(i, t)| format!("{} {}\n", 10 * (i + 1), join(t.map(|v| 10 * (v + 1))))).collect();

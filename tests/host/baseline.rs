@@ -1,4 +1,4 @@
-//! The baselines' construction and location, recorded.
+//! Construction of the baselines and location in them, recorded.
 
 use olbvh::baseline::{LbvhScratch, RayMethod, Rays, cmd_build_lbvh, cmd_locate_lbvh};
 use olbvh::build::{BadCells, DeviceMesh};
@@ -7,7 +7,7 @@ use olbvh::mesh::Mesh;
 use olbvh::primitives::Arena;
 use olbvh::query::{BinaryTree, LocateOutput, PointInput, Rounds};
 
-/// Memory of both baselines over a mesh, whose points are asked for.
+/// The memory of both baselines over a mesh, whose points are located.
 pub struct Baseline {
     pub output: LocateOutput,
     pub unfinished: BufferRef,
@@ -15,7 +15,7 @@ pub struct Baseline {
     points: Buffer,
     tree: BinaryTree,
     scratch: LbvhScratch,
-    /// Where the device traces rays.
+    /// One per method by which the device traces rays.
     rays: Vec<Rays>,
     _memory: Buffer,
 }
@@ -35,7 +35,7 @@ impl Baseline {
         Self { output, unfinished, mesh, points, tree, scratch, rays, _memory: memory }
     }
 
-    /// How many ways of tracing rays are recorded.
+    /// The number of methods of tracing rays that are recorded.
     pub fn ray_methods(&self) -> usize {
         self.rays.len()
     }

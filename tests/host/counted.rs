@@ -1,11 +1,12 @@
-//! A device that counts the calls which recording must not make.
+//! A device that counts the calls that recording must not make.
 
 use ash::vk;
 use std::cell::Cell;
 use std::ffi::c_void;
 use std::sync::OnceLock;
 
-/// The device's own functions; those that make, allocate, map, submit or wait are counted in `CALLS` of a thread that is `ARMED`.
+/// The device's own functions. Those that create, allocate, map, submit or wait are counted in `CALLS` on a thread that
+/// is `ARMED`.
 static TABLE: OnceLock<ash::DeviceFnV1_0> = OnceLock::new();
 thread_local! {
     pub static ARMED: Cell<bool> = const { Cell::new(false) };
@@ -16,7 +17,7 @@ macro_rules! counted {
     ($($name:ident($first:ty $(, $arg:ident: $kind:ty)*);)*) => {
         $(unsafe extern "system" fn $name(first: $first $(, $arg: $kind)*) -> vk::Result {
             CALLS.set(CALLS.get() + u32::from(ARMED.get()));
-            // SAFETY: the arguments are passed on as they came.
+            // SAFETY: the arguments are passed on unchanged.
             unsafe { (TABLE.get().unwrap().$name)(first $(, $arg)*) }
         })*
 

@@ -1,4 +1,4 @@
-//! A device that knows how many objects of its own are alive, and fails where it is told to.
+//! A device that counts its live objects, and whose functions fail on request.
 
 use ash::vk;
 use std::cell::Cell;
@@ -8,14 +8,14 @@ use std::sync::{Mutex, OnceLock};
 
 /// The device's own functions.
 static TABLE: OnceLock<ash::DeviceFnV1_0> = OnceLock::new();
-/// Objects made and not destroyed, by device.
+/// The number of objects made and not destroyed, by device.
 static LIVE: Mutex<BTreeMap<vk::Device, i64>> = Mutex::new(BTreeMap::new());
 thread_local! {
-    /// The function of this thread's that fails, and how often it goes well before.
+    /// The function that fails on this thread, and how many calls of it succeed before.
     pub static FAILING: Cell<(&'static str, u32)> = const { Cell::new(("", 0)) };
 }
 
-/// Objects of a watched device that are alive.
+/// The number of live objects of a watched device.
 pub fn live(device: &ash::Device) -> i64 {
     LIVE.lock().unwrap().get(&device.handle()).copied().unwrap_or(0)
 }
@@ -38,7 +38,7 @@ macro_rules! watched {
             if fails(stringify!($name)) {
                 return vk::Result::ERROR_OUT_OF_HOST_MEMORY;
             }
-            // SAFETY: the arguments are passed on as they came.
+            // SAFETY: the arguments are passed on unchanged.
             let result = unsafe { (TABLE.get().unwrap().$name)(device $(, $arg)*) };
             count(device, if result == vk::Result::SUCCESS { $made } else { 0 });
             result
@@ -58,7 +58,7 @@ macro_rules! watched {
             ash::Device::from_parts_1_3(device.handle(), table, one, two, three)
         }
 
-        /// What can be made to fail.
+        /// The functions that can be made to fail.
         pub const FALLIBLE: &[&str] = &[$(stringify!($name)),*];
     };
 }

@@ -1,4 +1,4 @@
-//! A program with a Vulkan device of its own, and what it records every frame.
+//! A program with its own Vulkan device, and what it records every frame.
 
 #![allow(dead_code, unsafe_code, reason = "each test uses a part; a device is made by hand")]
 
@@ -17,8 +17,9 @@ use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate};
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 
-/// An instance and a device as a host makes them, without anything that the engine merely prefers except buffer addresses and, if asked for, rays.
-/// Under a validation layer one message of it fails the test, when the device is destroyed.
+/// An instance and a device as a host makes them, without anything that this crate merely prefers, except buffer
+/// addresses and, if asked for, ray tracing. Under a validation layer, any message fails the test when the device is
+/// destroyed.
 pub struct Host {
     pub entry: ash::Entry,
     pub instance: ash::Instance,
@@ -41,7 +42,8 @@ unsafe extern "system" fn collect(
     data: *const vk::DebugUtilsMessengerCallbackDataEXT<'_>,
     user: *mut c_void,
 ) -> vk::Bool32 {
-    // SAFETY: the layer's data hold a string; `user` is the box of the host, which outlives the messenger.
+    // SAFETY: `data` is the layer's valid callback data, with a string; `user` is the box of the host, which outlives
+    // the messenger.
     let (text, messages) = unsafe { ((*data).message_as_c_str(), &*user.cast::<Messages>()) };
     messages.lock().unwrap().push(text.unwrap_or_default().to_string_lossy().into_owned());
     vk::FALSE
@@ -52,13 +54,13 @@ impl Host {
         Self::with(false)
     }
 
-    /// With everything that rays are traced with, if the device has it.
+    /// With everything that ray tracing needs, if the device has it.
     pub fn tracing() -> Self {
         Self::with(true)
     }
 
     fn with(rays: bool) -> Self {
-        // SAFETY: plain creation; `drop` destroys device and instance once.
+        // SAFETY: objects are created as Vulkan asks for; `drop` destroys device and instance once.
         unsafe {
             let entry = ash::Entry::load().unwrap();
             let application = vk::ApplicationInfo::default().api_version(vk::API_VERSION_1_2);
@@ -123,7 +125,7 @@ impl Host {
     }
 
     pub fn queue(&self) -> Arc<Mutex<vk::Queue>> {
-        // SAFETY: the family has a queue, it was asked for above.
+        // SAFETY: the family has a queue, which was requested above.
         Arc::new(Mutex::new(unsafe { self.device.get_device_queue(self.family, 0) }))
     }
 
@@ -143,7 +145,7 @@ impl Host {
 
 impl Drop for Host {
     fn drop(&mut self) {
-        // SAFETY: whatever was made from the device is gone.
+        // SAFETY: everything made from the device is already destroyed.
         unsafe {
             self.device.destroy_device(None);
             if let Some((functions, messenger)) = &self.watched {
@@ -156,7 +158,7 @@ impl Drop for Host {
     }
 }
 
-/// What a frame of a host does: mesh, tree, location, all within memory that is there.
+/// A frame of a host: mesh, tree and location, all within memory that exists already.
 pub struct Frame {
     pub input: MeshInput,
     pub arrays: MeshArrays,
@@ -170,7 +172,7 @@ pub struct Frame {
 }
 
 impl Frame {
-    /// For meshes with the points and cells of this one.
+    /// A frame for meshes with as many points and tetrahedra as this one.
     pub fn new(gpu: &Gpu, mesh: &Mesh) -> Self {
         let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
         let positions = gpu.upload("olbvh.test.positions", &mesh.points).unwrap();

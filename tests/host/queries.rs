@@ -1,4 +1,5 @@
-//! Points in sorted order and all their owners, values at what was located, slicing, a picture, and overlap with a second mesh, recorded behind a [`Frame`].
+//! Queries recorded after a [`Frame`]: points in sorted order and all their owners, values at the located points,
+//! slicing, a picture, and overlap with a second mesh.
 
 use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
@@ -14,7 +15,7 @@ use olbvh::query::{
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 
-/// Memory of the queries of a frame, and what they ask.
+/// The memory of the queries of a frame, and their input.
 pub struct Queries {
     pub points: PointInput,
     pub order: PointOrder,
@@ -36,17 +37,17 @@ pub struct Queries {
     pub memory: Buffer,
     field: Buffer,
     ranges: BufferRef,
-    /// View, transfer function, values that it shows, normals.
+    /// View, transfer function, values that it shows, and normals.
     drawn: [Buffer; 4],
     scene: Scene,
 }
 
 impl Queries {
-    /// Behind `frame`, whose mesh has those values on its points, with room for so many pairs.
+    /// Queries after `frame`, whose mesh has the values `field` on its points, with room for `room` pairs.
     pub fn new(gpu: &Gpu, frame: &Frame, field: &[f32], other: &Mesh, room: u64) -> Self {
         let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
         let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
-        // Pairs are found by lists, and once by those of boxes.
+        // Pairs are found in lists, and each once in lists of `Aabb`.
         let options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, ..BuildOptions::default() };
         let other_tree = Tree::build(gpu, &other, &options).unwrap();
         let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
@@ -80,7 +81,7 @@ impl Queries {
         let drawn = [
             gpu.upload("olbvh.test.view", &[plan.view()]).unwrap(),
             gpu.upload("olbvh.test.table", &plan.table).unwrap(),
-            // One more than there are, which shows nothing.
+            // One range more than there are, which shows nothing.
             gpu.upload("olbvh.test.drawn", &[&plan.drawn[..], &[[f32::INFINITY; 2]]].concat()).unwrap(),
             gpu.upload("olbvh.test.normals", &normals).unwrap(),
         ];
@@ -135,7 +136,7 @@ impl Queries {
     }
 }
 
-/// A small picture of values in the middle of their range, seen from beyond where the meshes move to.
+/// The plan of a small picture of values in the middle of their range, seen from farther away than the meshes move.
 fn plan(values: &[f32]) -> Plan {
     let transfer = TransferFunction::default().with_opacity(vec![(0.0, 0.0), (0.4, 0.0), (0.5, 0.3), (0.6, 0.0), (1.0, 0.0)]).unwrap();
     let settings = RenderSettings { size: [37, 30], transfer, ..RenderSettings::default() };

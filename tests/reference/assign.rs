@@ -1,3 +1,5 @@
+//! The assignments `Planes` and `Exact`: no cell that a tetrahedron touches is dropped, and few others are kept.
+
 use super::{Random, prepared};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn_jittered};
@@ -7,12 +9,13 @@ use olbvh::reference::boundary::Topology;
 use olbvh::reference::grid::{Grid, MAX_LEVEL};
 use olbvh::reference::vertices::Vertices;
 
-/// Whether a tetrahedron and a box touch, in double precision without any allowance but `margin` (relative to the products).
+/// Whether a tetrahedron and a box touch, in double precision without any allowance but `margin` (relative to the
+/// products).
 fn touches_exactly(v: [[f64; 3]; 4], centre: [f64; 3], half: [f64; 3], edges: bool, margin: f64) -> bool {
     let sub = |a: [f64; 3], b: [f64; 3]| [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
     let cross = |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];
     let dot = |a: [f64; 3], b: [f64; 3]| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    // Per axis: whether the box is on one side of all of the tetrahedron; face planes separate on their outer side only.
+    // Whether the axis separates them. The normal of a face separates only on its outer side.
     let apart = |axis: [f64; 3], both: bool, opposite: usize| {
         let t = v.map(|p| dot(axis, sub(p, centre)));
         let r = dot(axis.map(f64::abs), half);
@@ -54,7 +57,7 @@ impl Stage {
         &self.topology.grid
     }
 
-    /// Candidates, hits and hits without allowance of all primitives.
+    /// The numbers of candidates of all tetrahedra, of those kept, and of those that touch without any allowance.
     fn compare(&self, level: u32, assign: Assign) -> [u64; 3] {
         let mut n = [0; 3];
         let h = half_cell(self.grid(), level);
@@ -102,7 +105,7 @@ fn no_touched_cell_is_dropped_in_strange_meshes() {
     }
 }
 
-/// The second promise: whatever floating point calls inside has its cell.
+/// The second promise: a tetrahedron keeps the cell of every point that floating point puts inside it.
 #[test]
 fn no_cell_with_a_point_inside_is_dropped() {
     let mut random = Random(3);
@@ -114,7 +117,7 @@ fn no_cell_with_a_point_inside_is_dropped() {
         for i in 0..4000 {
             let p = random.point(&stage.mesh, &stage.topology, 1 + i % 4);
             let (cell, x) = (stage.grid().quantize(p), stage.grid().normalise(p));
-            // Its own tetrahedron and whichever else.
+            // Random tetrahedra, which may contain the point as well.
             for _ in 0..8 {
                 let t = random.below(stage.mesh.tets.len());
                 check_point(&stage, t, cell, x, case.name);
@@ -145,7 +148,7 @@ fn check_point(stage: &Stage, t: usize, cell: [u32; 3], x: [f32; 3], name: &str)
     }
 }
 
-/// Slivers of every thinness, turned every way: points that rounding calls inside spread far along them.
+/// Slivers of every thinness and orientation: points that rounding puts inside spread far along them.
 #[test]
 fn no_cell_with_a_point_inside_a_sliver_is_dropped() {
     let mut random = Random(5);
@@ -161,7 +164,7 @@ fn no_cell_with_a_point_inside_a_sliver_is_dropped() {
             1 => vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(0.0, 1.0, 0.0), corner(0.3, 0.3, 1.0)],
             _ => vec![corner(0.0, 0.0, 0.0), corner(1.0, 0.0, 0.0), corner(1.0, thin, 0.0), corner(1.0, 0.0, 1.0)],
         };
-        // A second cell widens the grid.
+        // A second tetrahedron widens the grid.
         let wide = [[-2.0, -2.0, -2.0], [2.0, -2.0, -2.0], [-2.0, 2.0, -2.0], [-2.0, -2.0, 2.0]];
         let stage = Stage::new(Mesh::new(points.into_iter().chain(wide).collect(), vec![[0, 1, 2, 3], [4, 5, 6, 7]]));
         let tet = stage.vertices.tet([0, 1, 2, 3]);

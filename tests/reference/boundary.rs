@@ -1,3 +1,5 @@
+//! Neighbours, boundary tetrahedra and bad tetrahedra.
+
 use super::prepared;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
@@ -8,7 +10,7 @@ fn named(name: &str) -> (Mesh, Topology) {
     prepared(cases().unwrap().into_iter().find(|c| c.name == name).unwrap().mesh)
 }
 
-/// Neighbours by a map from faces to cells.
+/// Neighbours, by a map from faces to tetrahedra.
 fn naive_neighbours(mesh: &Mesh, topology: &Topology) -> Vec<[u32; 4]> {
     let face = |t: usize, i: usize| {
         let mut f: Vec<u32> = (0..4).filter(|&k| k != i).map(|k| mesh.tets[t][k]).collect();
@@ -84,7 +86,7 @@ fn negative_cells_are_counted_in_the_order_of_the_caller() {
 
 #[test]
 fn folds_and_flat_cells_are_boundary() {
-    // A closed shell of cells round a core, so that no cell has an open face but the core's own fold shows.
+    // A fold, and a flat tetrahedron between two others.
     let (_, topology) = named("fold");
     assert_eq!(topology.neighbours, [[NONE, NONE, NONE, 1], [NONE, NONE, 0, NONE]]);
     let (_, topology) = named("flat-between");
@@ -92,7 +94,8 @@ fn folds_and_flat_cells_are_boundary() {
     assert!(topology.is_boundary(2));
     assert_eq!(topology.neighbours[2].map(|n| n == NONE), [false; 4]);
 
-    // In the middle of a grid: a vertex pushed through the opposite face turns cells over; they and their neighbours become boundary.
+    // In the middle of a grid, a vertex pushed through the opposite face turns tetrahedra over. These and their
+    // neighbours become boundary.
     let clean = kuhn([5; 3]).unwrap();
     let mut tangled = clean.clone();
     let centre = tangled.points.iter().position(|p| *p == [2.0, 2.0, 2.0]).unwrap();
@@ -153,7 +156,7 @@ fn identical_cells_and_crowded_faces_have_no_neighbours() {
     assert_eq!(topology.counts.boundary, 1000);
     let (_, topology) = named("three-on-a-face");
     assert!(topology.neighbours.iter().all(|n| *n == [NONE; 4]));
-    // Two of the same share all faces and are a fold four times over.
+    // Two equal tetrahedra share all four faces, each of which is a fold.
     let (_, topology) = prepared(Mesh::new(named("single").0.points, vec![[0, 1, 2, 3], [3, 2, 0, 1]]));
     assert_eq!(topology.neighbours, [[1; 4], [0; 4]]);
     assert_eq!(topology.counts.boundary, 2);

@@ -1,3 +1,5 @@
+//! The construction: depth, capacities, and the rules of a tree.
+
 use super::{ALPHAS, options, prepared, tree};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
@@ -50,7 +52,7 @@ fn measured_sizes_are_those_of_the_trees() {
     }
 }
 
-/// Eq. 11 and 12 in the paper's own arithmetic.
+/// Eq. 11 and 12, in the paper's own arithmetic.
 #[test]
 fn the_level_is_that_of_the_formula() {
     for n in [1u32, 2, 3, 5, 11, 20] {
@@ -87,7 +89,7 @@ fn a_capacity_makes_the_tree_coarser_and_is_never_exceeded() {
 
 #[test]
 fn cells_of_very_different_size_get_a_coarser_tree() {
-    // Most cells are points, which call for level 10, where the others fill 5,368,709,720 leaves.
+    // Most tetrahedra are points, which call for level 10, where the others would fill 5,368,709,720 leaves.
     let mut points = vec![[0.5; 3]; 4];
     points.extend([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     let mut tets = vec![[0, 1, 2, 3]; 600];
@@ -126,7 +128,7 @@ fn an_empty_mesh_is_one_empty_leaf() {
     }
 }
 
-/// Levels of a single node each.
+/// Every level has a single node.
 #[test]
 fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
     let (mesh, topology) = prepared(cases().unwrap().into_iter().find(|c| c.name == "point").unwrap().mesh);
@@ -138,7 +140,7 @@ fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
     }
 }
 
-/// The claim that the applications rest on: a leaf without the flag is full of mesh.
+/// The claim that the queries rest on: a leaf without the boundary flag is full of mesh.
 #[test]
 fn leaves_without_the_flag_are_inside_the_mesh() {
     let (mesh, topology) = prepared(kuhn_jittered([12; 3], 0.2, 7).unwrap());

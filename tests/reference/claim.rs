@@ -1,4 +1,5 @@
-//! A leaf without the boundary flag lies inside the mesh as a whole (SPEC 2.3), also where the boxes of inner cells reach out of the mesh.
+//! A leaf without the boundary flag lies inside the mesh as a whole (SPEC 2.3), even where the boxes of inner
+//! tetrahedra reach out of the mesh.
 
 use super::{Random, prepared, tree};
 use olbvh::mesh::kuhn_jittered;

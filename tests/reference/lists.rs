@@ -1,4 +1,4 @@
-//! `Lists::Boundary`: trees that keep every rule, and the same owners as with `Lists::All`, on the way of a walk.
+//! `Lists::Boundary`: its trees keep every rule, and walks find the same owners as `Lists::All`.
 
 use super::{Random, options, prepared};
 use olbvh::mesh::cases::cases;
@@ -11,7 +11,7 @@ use olbvh::reference::walk::{DETOURS, STEPS};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
-/// The same tree with either kind of lists.
+/// The tree with either kind of lists.
 fn both(mesh: &Mesh, topology: &Topology, alpha: f32, assign: Assign) -> [TreeArrays; 2] {
     Lists::EVERY.map(|lists| build(mesh, topology, &BuildOptions { lists, ..options(alpha, assign) }).unwrap())
 }
@@ -25,7 +25,7 @@ fn trees_keep_every_rule() {
                 let [all, tree] = both(&mesh, &topology, alpha, assign);
                 let stats = tree.validate(&mesh, &topology).unwrap_or_else(|e| panic!("{} α {alpha} {assign}: {e}", case.name));
                 assert_eq!(all.grid.level, tree.grid.level);
-                // What the boundary touches is listed as before.
+                // Cells that the boundary touches still have lists.
                 for leaf in tree.leaves().filter(|&j| tree.is_boundary(j)) {
                     assert!(!tree.primitives(leaf).is_empty());
                 }
@@ -42,7 +42,8 @@ fn entries_grow_with_the_surface() {
         let [all, tree] = both(&mesh, &topology, 0.0, Assign::Aabb);
         let full = tree.leaves().filter(|&j| !tree.is_boundary(j));
         assert!(full.clone().all(|j| tree.entries(j).len() == 1));
-        // A full leaf's list may begin with primitives that do not touch it, and only the first are asked.
+        // With `Lists::All`, the list of a leaf that is full of mesh may start with tetrahedra that do not touch its
+        // cell, and only the first ones are tested.
         assert!(full.count() >= all.leaves().filter(|&j| !all.is_boundary(j)).count());
         tree.p.len() as f64 / all.p.len() as f64
     };
@@ -50,7 +51,7 @@ fn entries_grow_with_the_surface() {
     assert!(shares[0] > shares[1] && shares[1] > shares[2] && shares[2] < 0.35, "{shares:?}");
 }
 
-/// Points on faces, edges and vertices, an ulp away from them, along edges' extensions, and anywhere.
+/// Points on faces, edges and vertices, an ulp away from them, along the extensions of edges, and anywhere.
 fn adversarial(mesh: &Mesh, topology: &Topology, seed: u64, n: usize) -> Vec<[f32; 3]> {
     let mut random = Random(seed);
     let grid = &topology.grid;
@@ -69,7 +70,7 @@ fn adversarial(mesh: &Mesh, topology: &Topology, seed: u64, n: usize) -> Vec<[f3
                 [0, 1, 2].map(|c| (a[c] + t * (b[c] - a[c])).clamp(grid.lo[c], grid.hi[c]))
             }
             6 => {
-                // Between the centres of neighbouring cells of the finest grid: on the sides and centres of leaves.
+                // Multiples of half a cell of the finest grid: on the sides and centres of leaves.
                 [0, 1, 2].map(|c| grid.lo[c] + (random.below(2049) as f32 / 2048.0) * (grid.hi[c] - grid.lo[c]))
             }
             _ => [0, 1, 2].map(|c| grid.lo[c] + random.next() * (grid.hi[c] - grid.lo[c])),
@@ -110,7 +111,7 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
     (steps, detours)
 }
 
-/// No walk circles or loses its point. `OLBVH_TEST_POINTS=100000000` asks for so many, in a larger mesh.
+/// No walk circles or loses its point. `OLBVH_TEST_POINTS=100000000` asks for this many points, in a larger mesh.
 #[test]
 fn every_walk_ends() {
     let asked = std::env::var("OLBVH_TEST_POINTS").ok().and_then(|n| n.parse::<usize>().ok());
@@ -122,7 +123,7 @@ fn every_walk_ends() {
     for chunk in 0..n.div_ceil(1 << 20) {
         let points = adversarial(&mesh, &topology, 23 + chunk as u64, (n - (chunk << 20)).min(1 << 20));
         let walk = |p: &[f32; 3]| {
-            // What is an ulp away may lie outside, by more than the tolerance where cells are flat.
+            // A point that was moved by an ulp may lie outside, by more than the tolerance where tetrahedra are flat.
             let p = [0, 1, 2].map(|c| p[c].clamp(topology.grid.lo[c], topology.grid.hi[c]));
             assert_ne!(locator.locate(p).owner, NONE, "{p:?} is lost");
             let Some(walk) = locator.walk(p) else { return (0, 0, 0) };

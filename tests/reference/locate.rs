@@ -1,3 +1,5 @@
+//! Point location: owners, hints, tolerance and values.
+
 use super::{Random, prepared, tree};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
@@ -8,7 +10,7 @@ use olbvh::reference::locate::{Location, Locator};
 use olbvh::reference::vertices::Vertices;
 use rayon::prelude::*;
 
-/// Points on vertices, edges, faces and inside of cells, in and around the bounds, and nowhere.
+/// Points on vertices, edges and faces, inside of tetrahedra, in and around the bounds, and nowhere.
 fn points(mesh: &Mesh, topology: &Topology, n: usize, seed: u64) -> Vec<[f32; 3]> {
     let mut random = Random(seed);
     let grid = &topology.grid;
@@ -42,7 +44,7 @@ fn owners_are_those_of_brute_force() {
                     if let Some(&first) = expected.first() {
                         assert_eq!((found.owner, &owners), (first, expected), "{}", name());
                     } else {
-                        // Nothing contains it: nobody, or one that comes near.
+                        // No tetrahedron contains it: it has no owner, or one that it comes near.
                         assert_eq!(owners, found.found().into_iter().collect::<Vec<_>>(), "{}", name());
                     }
                     for stack in [0, 3, 100] {
@@ -58,7 +60,8 @@ fn owners_are_those_of_brute_force() {
     }
 }
 
-/// A quarter of a million points of a closed mesh: all found, with one owner whatever the tree. (A part of them where leaves list thousands.)
+/// A quarter of a million points of a closed mesh are all found, with one owner whatever the tree. (Only a part of them
+/// is located where leaves list thousands of entries.)
 #[test]
 fn no_point_of_a_mesh_is_lost() {
     let n = 24;
@@ -100,7 +103,7 @@ fn no_point_of_a_mesh_is_lost() {
     }
 }
 
-/// The order of vertices in a cell changes nothing but the order of its coordinates.
+/// The order of the vertices of a tetrahedron changes nothing but the order of the barycentric coordinates.
 #[test]
 fn the_owner_does_not_depend_on_the_order_of_vertices() {
     let (mesh, topology) = prepared(kuhn_jittered([6; 3], 0.2, 11).unwrap());
@@ -144,14 +147,15 @@ fn a_hint_gives_the_owner() {
     let mut last = NONE;
     for p in points(&mesh, &topology, 5000, 6) {
         let expected = locator.locate(p);
-        // Other owners of a point on a face, an edge or a vertex are the hints most likely to win wrongly.
+        // The other tetrahedra that contain a point on a face, an edge or a vertex are the hints most likely to win
+        // wrongly.
         let others = locator.owners(p);
         for hint in others.into_iter().chain([last, random.below(mesh.tets.len()) as u32, expected.owner, NONE, mesh.tets.len() as u32]) {
             assert_eq!(locator.locate_near(p, hint), expected, "{p:?}, hint {hint}");
         }
         last = expected.owner;
     }
-    // Cells that are bad are no hints.
+    // Bad tetrahedra do not serve as hints.
     let (mesh, topology) = prepared(cases().unwrap().into_iter().find(|c| c.name == "bad-some").unwrap().mesh);
     let tree = super::tree(&mesh, &topology, 0.0, Assign::Aabb);
     let locator = Locator::new(&mesh, &topology, &tree);

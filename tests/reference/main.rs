@@ -1,4 +1,4 @@
-//! The CPU reference against its own definitions and against brute force.
+//! The CPU reference, tested against its own definitions and against brute force.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 mod assign;
@@ -21,7 +21,7 @@ use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::tree::TreeArrays;
 
-/// Values of α that the tests go through.
+/// Values of α that the tests use.
 const ALPHAS: [f32; 7] = [0.0, 0.5, 1.0, 2.0, 4.0, 7.25, 10.0];
 
 fn options(alpha: f32, assign: Assign) -> BuildOptions {
@@ -38,7 +38,7 @@ fn prepared(mesh: Mesh) -> (Mesh, Topology) {
     (mesh, topology)
 }
 
-/// Reproducible random numbers in 0…1.
+/// Reproducible random numbers from 0 to 1.
 struct Random(u64);
 
 impl Random {
@@ -51,7 +51,7 @@ impl Random {
         ((f64::from(self.next()) * n as f64) as usize).min(n - 1)
     }
 
-    /// Barycentric coordinates on a corner (1), edge (2), face (3) or inside (4) of a tetrahedron.
+    /// Barycentric coordinates of a point on a corner (1), edge (2) or face (3), or inside (4), of a tetrahedron.
     fn weights(&mut self, corners: usize) -> [f32; 4] {
         let mut w = [0.0; 4];
         let first = self.below(4);
@@ -62,7 +62,7 @@ impl Random {
         w.map(|x| x / sum)
     }
 
-    /// A point of a valid tetrahedron of `mesh`: on a vertex, an edge, a face or inside, by turns.
+    /// A point of a random valid tetrahedron of `mesh`: on a vertex, an edge or a face, or inside, as `corners` says.
     fn point(&mut self, mesh: &Mesh, topology: &Topology, corners: usize) -> [f32; 3] {
         loop {
             let t = self.below(mesh.tets.len());

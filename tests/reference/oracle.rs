@@ -1,4 +1,4 @@
-//! Separations in double precision by brute force, to judge slices and overlaps by.
+//! Separations in double precision by brute force, against which slices and overlaps are judged.
 
 /// A point.
 pub type P = [f64; 3];
@@ -23,8 +23,8 @@ fn edges(v: &[P; 4]) -> Vec<P> {
     (0..4).flat_map(|i| (0..i).map(move |j| (i, j))).map(|(i, j)| sub(v[i], v[j])).collect()
 }
 
-/// Largest gap that an axis shows between two sets of points; below 0 they overlap by that much along every axis. Axes of next to no length
-/// say nothing.
+/// The largest gap between two sets of points along any of the axes; if it is negative, they overlap by that much along
+/// every axis. Axes of almost no length are ignored.
 fn gap(axes: impl Iterator<Item = P>, a: &[P], b: &[P], size: f64) -> f64 {
     let mut largest = f64::NEG_INFINITY;
     for axis in axes {
@@ -40,11 +40,11 @@ fn gap(axes: impl Iterator<Item = P>, a: &[P], b: &[P], size: f64) -> f64 {
     largest
 }
 
-/// Gap between a tetrahedron and the box `centre ± half`.
+/// The gap between a tetrahedron and the box `centre ± half`.
 pub fn box_gap(v: &[P; 4], centre: P, half: &[P; 3]) -> f64 {
     let corner = |i: usize| [0, 1, 2].map(|c| (0..3).fold(centre[c], |x, a| if i >> a & 1 == 0 { x - half[a][c] } else { x + half[a][c] }));
     let corners: Vec<P> = (0..8).map(corner).collect();
-    // The axes of space alone tell most pairs apart.
+    // The coordinate axes alone separate most pairs.
     let quick = gap([[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]].into_iter(), v, &corners, 0.0);
     if quick > 0.0 {
         return quick;
@@ -55,14 +55,14 @@ pub fn box_gap(v: &[P; 4], centre: P, half: &[P; 3]) -> f64 {
     gap(axes, v, &corners, 0.0)
 }
 
-/// Gap between two tetrahedra.
+/// The gap between two tetrahedra.
 pub fn tet_gap(a: &[P; 4], b: &[P; 4], size: f64) -> f64 {
     let (ea, eb) = (edges(a), edges(b));
     let products = ea.iter().flat_map(|&x| eb.iter().map(move |&y| cross(x, y)));
     gap(normals(a).into_iter().chain(normals(b)).chain(products), a, b, size)
 }
 
-/// Distance of a point to a tetrahedron's surface.
+/// The distance of a point from the surface of a tetrahedron.
 pub fn distance(v: &[P; 4], p: P) -> f64 {
     let v = v.map(|x| sub(x, p));
     let segment = |a: P, b: P| {

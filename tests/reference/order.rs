@@ -1,3 +1,5 @@
+//! Meshes in the order of a Z curve, and answers over them.
+
 use super::{Random, options, prepared};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -9,7 +11,7 @@ use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{OverlapSide, overlap};
 use olbvh::tree::TreeArrays;
 
-/// The mesh with its points and cells in no order, and fields that number them.
+/// The mesh with its points and tetrahedra in random order, and fields that number them.
 fn shuffled(mesh: Mesh, seed: u64) -> Mesh {
     let mut random = Random(seed);
     let mut order = |n: usize| {
@@ -39,7 +41,7 @@ fn every_mesh_comes_in_the_order_of_the_curve() {
             all.sort_unstable();
             assert!(all.into_iter().eq(0..n as u32), "{name}");
         }
-        // Bits, as there is NaN.
+        // Bits are compared, since there are NaN.
         let bits = |p: [f32; 3]| p.map(f32::to_bits);
         assert!(mesh.points.iter().zip(&points).all(|(&p, &old)| bits(p) == bits(source.points[old as usize])), "{name}");
         let named = |v: u32| points.get(v as usize).copied().unwrap_or(v);
@@ -47,7 +49,8 @@ fn every_mesh_comes_in_the_order_of_the_curve() {
         for (field, ids) in mesh.fields.iter().zip([&points, &cells]) {
             assert!(field.values.iter().zip(ids).all(|(&v, &id)| v as u32 == id), "{name} {}", field.name);
         }
-        // Good cells first and along the curve, then the bad ones as they were, with the source's names for their points.
+        // Valid tetrahedra come first, along the curve; then the bad ones as they were, with the numbers that the
+        // source gives to their points.
         let good = topology.valid_cells() as usize;
         let codes: Vec<u32> = mesh.tets[..good]
             .iter()
@@ -90,7 +93,7 @@ impl Built {
 
 #[test]
 fn answers_name_the_callers_cells() {
-    // Five tetrahedra to a cell of the source, as where hexahedra are split.
+    // Five tetrahedra per file cell, as where hexahedra are split.
     let mut source = shuffled(kuhn_jittered([6, 5, 4], 0.3, 1).unwrap(), 3);
     source.cell_ids = Some((0..source.tets.len() as u32).map(|t| t / 5).collect());
     let mut other = kuhn_jittered([4; 3], 0.3, 2).unwrap();
@@ -103,7 +106,7 @@ fn answers_name_the_callers_cells() {
             let p = random.point(&given.0, &given.1, 4);
             let [a, b] = [0, 1].map(|i| locators[i].locate(p));
             assert_eq!(given.0.cell_id(a.owner), sorted.0.cell_id(b.owner), "{p:?}");
-            // The vertices of a cell keep their order.
+            // The vertices of a tetrahedron keep their order.
             assert!((0..4).all(|i| (a.barycentric[i] - b.barycentric[i]).abs() < 1e-4), "{a:?} {b:?}");
             for (i, built) in [&given, &sorted].into_iter().enumerate() {
                 let value = locators[i].value(&built.0.fields[1], &[a, b][i]);

@@ -1,4 +1,4 @@
-//! Overlaps: equal to brute force in all poses, the same from every tree, symmetric.
+//! Overlaps equal those of brute force in all poses, do not depend on the tree, and are symmetric.
 
 use super::oracle::{P, tet_gap};
 use super::{Random, prepared, tree};
@@ -35,7 +35,7 @@ fn posed(mesh: &Mesh, random: &mut Random, reach: f32) -> Mesh {
     mesh
 }
 
-/// Each answer must hold what certainly intersects, and nothing that is certainly apart.
+/// Every answer must contain what certainly intersects, and nothing that is certainly apart.
 fn check(name: &str, a: &Prepared, b: &Prepared, found: &Overlap) {
     let tets = |m: &Prepared| -> Vec<Option<[P; 4]>> {
         let of = |(t, ids): (u32, &[u32; 4])| m.1.is_valid(t).then(|| ids.map(|i| m.0.points[i as usize].map(f64::from)));
@@ -123,7 +123,7 @@ fn contained_touching_identical_apart() {
             let found = run(&big, &inner, 0.0, assign, pairs);
             assert_eq!(found.b, all(&inner));
             check("contained", &big, &inner, &found);
-            // Exact in floating point, so touching counts whatever the band.
+            // This contact is exact in floating point, so it counts whatever the band.
             let beside = cube(4, [4.0, 0.0, 0.0], 1.0);
             let found = run(&big, &beside, 0.0, assign, pairs);
             check("touching", &big, &beside, &found);
@@ -137,6 +137,19 @@ fn contained_touching_identical_apart() {
             let apart = run(&big, &cube(4, [4.01, 0.0, 0.0], 1.0), 0.0, assign, pairs);
             assert!(apart.a.is_empty() && apart.b.is_empty());
         }
+    }
+}
+
+/// Rounding cannot part what has a vertex in common: whatever the shapes are, all such pairs are found.
+#[test]
+fn a_common_vertex_always_touches() {
+    let mesh = prepared(kuhn_jittered([5, 4, 4], 0.35, 3).unwrap());
+    let tets = &mesh.0.tets;
+    let common = |a: u32, b: u32| tets[a as usize].iter().any(|v| tets[b as usize].contains(v));
+    for assign in Assign::EVERY {
+        let found = run(&mesh, &mesh, 0.0, assign, true).pairs.unwrap();
+        let count = (0..tets.len() as u32).flat_map(|a| (0..tets.len() as u32).map(move |b| (a, b))).filter(|&(a, b)| common(a, b)).count();
+        assert!(count > 10_000 && found.iter().filter(|p| common(p[0], p[1])).count() == count, "{assign}: {count}");
     }
 }
 
@@ -161,7 +174,7 @@ fn bad_meshes_have_answers() {
         for pairs in [false, true] {
             for (alpha, assign) in [(0.0, Assign::Aabb), (2.0, Assign::Exact)] {
                 let found = run(&cube, &mesh, alpha, assign, pairs);
-                // Flat cells have no interior that axes could show.
+                // Flat tetrahedra have no interior that axes could show.
                 if !flat.contains(&case.name) {
                     check(case.name, &cube, &mesh, &found);
                 }

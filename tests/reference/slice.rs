@@ -1,4 +1,5 @@
-//! Slices: nothing that is touched is empty, nothing that is not is filled, the closest owner, the same voxels from every tree.
+//! Slices: no voxel that the mesh touches is empty, no other voxel is filled, owners are the closest ones, and voxels
+//! do not depend on the tree.
 
 use super::oracle::{P, box_gap, distance};
 use super::{prepared, tree};
@@ -63,7 +64,7 @@ fn check(name: &str, mesh: &Mesh, topology: &Topology, tree: &TreeArrays, voxels
     let (lo, hi) = bounds(tree);
     let size = (0..3).map(|c| f64::from(hi[c]) - f64::from(lo[c])).fold(0.0, f64::max);
     let extent = voxels.half.iter().map(|h| h.iter().map(|&x| f64::from(x).abs()).sum::<f64>()).fold(0.0, f64::max);
-    // Far from 0 the centre of a voxel is as coarse as the coordinates there.
+    // Far from 0, the centre of a voxel is as coarse as the coordinates there.
     let slack = 4e-6 * (size + extent);
     let half = voxels.half.map(wide);
     let locator = Locator::new(mesh, topology, tree);
@@ -100,7 +101,8 @@ fn check(name: &str, mesh: &Mesh, topology: &Topology, tree: &TreeArrays, voxels
     }
 }
 
-/// Two halves of the cells know together what all of them know: one has the centre, either may have the closest primitive.
+/// Two halves of the octree cells together find what all of them find: one has the centre of a voxel, either may have
+/// the closest tetrahedron.
 fn check_parts(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, voxels: VoxelGrid, band: &Band) {
     let low = CellRange { hi: [511, 1023, 1023], ..CellRange::WHOLE };
     let high = CellRange { lo: [512, 0, 0], ..CellRange::WHOLE };
@@ -139,7 +141,7 @@ fn slices_are_conservative_and_the_same_from_every_tree() {
             if case.name != "near-denormal" {
                 check(case.name, &mesh, &topology, &first, &voxels, &band);
             }
-            // Where cells overlap, the owner of a centre may depend on the tree.
+            // Where tetrahedra overlap, the owner of a centre may depend on the tree.
             let tangled =
                 topology.counts.boundary > 0 && ["soup", "kuhn-tangled", "three-on-a-face", "fold", "flat-between"].contains(&case.name);
             if !tangled && first.grid.level > 0 && i % 3 == 0 {

@@ -1,6 +1,6 @@
-//! Slices of mesh files against brute force: every cell with every voxel that its box may reach.
+//! Slices of mesh files against brute force: every tetrahedron with every voxel that its box may reach.
 //!
-//! The files of the repository, and with `OLBVH_TEST_MESHES=FOLDER` all that this folder and those in it hold.
+//! The files of the repository and, with `OLBVH_TEST_MESHES=FOLDER`, all files in this folder and its subfolders.
 
 use super::oracle::{P, box_gap};
 use super::prepared;
@@ -17,12 +17,12 @@ fn dot(a: P, b: P) -> f64 {
     (0..3).map(|c| a[c] * b[c]).sum()
 }
 
-/// Voxels along the axis `step` (numbered from `origin`, `half` of a box reaching that far) that a tetrahedron may meet, `n` there are; `slack`: the
-/// allowance of a touch.
+/// The voxels along an axis that a tetrahedron may meet, out of `n`. They are `step` apart, numbered from `origin`, and
+/// their boxes reach `half` along the axis; `slack` is the allowance of a touch.
 fn reached(v: &[P; 4], origin: P, step: P, half: P, n: u32, slack: f64) -> std::ops::Range<u32> {
     let length = dot(step, step);
     let places = v.map(|p| dot([0, 1, 2].map(|c| p[c] - origin[c]), step) / length);
-    // The allowance of a touch, and far from 0 the rounding of centres, may be more than a voxel is wide.
+    // The allowance of a touch and, far from 0, the rounding of centres may be more than the width of a voxel.
     let rounding = origin.iter().fold(0.0, |most: f64, x| most.max(x.abs())) * 1e-6;
     let reach = dot(half, step).abs() / length + 0.01 + (rounding + slack) / length.sqrt();
     let lo = places.into_iter().fold(f64::MAX, f64::min) - reach;
@@ -30,13 +30,13 @@ fn reached(v: &[P; 4], origin: P, step: P, half: P, n: u32, slack: f64) -> std::
     lo.ceil().clamp(0.0, f64::from(n)) as u32..(hi.floor() + 1.0).clamp(0.0, f64::from(n)) as u32
 }
 
-/// The smallest gap between each voxel and the tetrahedra that come near to it.
+/// The smallest gap between each voxel and the tetrahedra that come near it.
 fn gaps(voxels: &VoxelGrid, tets: &[[P; 4]], slack: f64) -> Vec<f64> {
     let [w, h] = voxels.size;
     let half = voxels.half.map(wide);
     let origin = wide(voxels.origin);
     let extent = [0, 1, 2].map(|c| half.iter().map(|h| h[c].abs()).sum::<f64>());
-    // What the box of a cell leaves out, by more than the allowance of a touch, is apart.
+    // A voxel outside of the box of a tetrahedron by more than the allowance of a touch is apart from it.
     let meets = |lo: P, hi: P, centre: P| (0..3).all(|c| lo[c] - extent[c] - slack <= centre[c] && centre[c] <= hi[c] + extent[c] + slack);
     let normal = |layers: u32| if layers > 1 { voxels.up } else { voxels.half[2] };
     let near = |v: &[P; 4]| {
@@ -62,7 +62,7 @@ fn gaps(voxels: &VoxelGrid, tets: &[[P; 4]], slack: f64) -> Vec<f64> {
     least
 }
 
-/// Slices of `finer` times as many voxels per axis.
+/// Checks slices with `finer` times as many voxels per axis.
 fn check(file: &Path, finer: u32, tally: &mut Tally) {
     let mesh = match load(file, &LoadOptions::default()) {
         Ok(loaded) => loaded.mesh,

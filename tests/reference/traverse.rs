@@ -1,3 +1,5 @@
+//! Traversal with a short stack visits the leaves that a recursion visits.
+
 use super::{prepared, tree};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::kuhn_jittered;
@@ -8,7 +10,7 @@ use olbvh::reference::traverse::{Node, full_stack, traverse, traverse_leaves};
 use olbvh::tree::TreeArrays;
 use std::ops::ControlFlow;
 
-/// What a recursion visits.
+/// The leaves that a recursion visits.
 fn recursive(tree: &TreeArrays, node: Node, f_n: &dyn Fn(Node) -> bool, found: &mut Vec<Node>) {
     if f_n(node) {
         if node.level == tree.grid.level {
@@ -107,7 +109,8 @@ fn primitives_come_leaf_by_leaf_until_a_break() {
     assert_eq!(few, tree.p[..100]);
 }
 
-/// A short stack has predicates asked again after a restart, but never more than the path to the next sibling.
+/// With a short stack, predicates are asked again after a restart, but never for more than the path to the next
+/// sibling.
 #[test]
 fn a_full_stack_asks_every_node_once() {
     let (mesh, topology) = prepared(kuhn_jittered([9; 3], 0.3, 2).unwrap());

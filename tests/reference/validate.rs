@@ -15,7 +15,7 @@ fn valid(assign: Assign) -> (Mesh, Topology, TreeArrays) {
     (mesh, topology, tree)
 }
 
-/// Breaks a tree and expects a message that contains `text`.
+/// Breaks a tree, and expects a message that contains `text`.
 fn breaks(assign: Assign, text: &str, change: impl FnOnce(&mut TreeArrays)) {
     let (mesh, topology, mut tree) = valid(assign);
     change(&mut tree);
@@ -23,7 +23,7 @@ fn breaks(assign: Assign, text: &str, change: impl FnOnce(&mut TreeArrays)) {
     assert!(matches!(&error, Error::BrokenTree(m) if m.contains(text)), "expected `{text}`, found: {error}");
 }
 
-/// A leaf that lists at least `n` primitives.
+/// A leaf that lists at least `n` tetrahedra.
 fn leaf(tree: &TreeArrays, n: usize) -> u32 {
     tree.leaves().find(|&j| tree.primitives(j).len() >= n).unwrap()
 }
@@ -109,7 +109,7 @@ fn lists() {
             let (first, last) = (t.entries(t.leaves().start), t.entries(t.nodes() - 1));
             t.p[first.end - 1] = t.p[last.end - 1];
         });
-        // One entry less, everything else in order.
+        // One entry is missing; everything else is in order.
         breaks(assign, "entries, the assignment", |t| {
             let j = leaf(t, 2);
             let slots = t.entries(j);
@@ -119,7 +119,7 @@ fn lists() {
             }
         });
     }
-    // Entries of a weaker assignment than the one named.
+    // Entries of another assignment than the one named.
     breaks(Assign::Aabb, "by the assignment exact it does not belong there", |t| t.assign = Assign::Exact);
     breaks(Assign::Exact, "the assignment aabb makes", |t| t.assign = Assign::Aabb);
 }
@@ -151,7 +151,8 @@ fn boxes() {
 
 type Pick = fn(&mut TreeArrays) -> &mut Vec<u32>;
 
-/// Whatever single word is changed to whatever, validation ends without a panic; and where it finds nothing, nothing was changed.
+/// Whichever single word is changed, and to whatever value, validation ends without a panic, and if it reports nothing,
+/// nothing was changed.
 #[test]
 fn no_change_of_a_word_goes_unnoticed() {
     let (mesh, topology) = prepared(kuhn_jittered([2, 3, 2], 0.2, 4).unwrap());

@@ -1,5 +1,5 @@
 #version 460
-// The inside of the body: every fragment asks the tree which tetrahedron it lies in, and shows the field there.
+// The inside of the body: every fragment asks the tree for the tetrahedron that contains it, and shows the field there.
 #include "olbvh.glsl"
 #include "colour.glsl"
 layout(location = 0) in vec3 place;

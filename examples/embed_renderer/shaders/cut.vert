@@ -1,5 +1,5 @@
 #version 460
-// A square in the plane of the cut, two triangles.
+// A square in the plane of the cut, drawn as two triangles.
 layout(location = 0) out vec3 place;
 layout(push_constant) uniform Push { mat4 camera; vec4 plane; vec4 corner; vec4 right; uvec2 tree; };
 

@@ -1,4 +1,5 @@
 #version 460
+// The surface of the body, lit and coloured by the field.
 #include "colour.glsl"
 layout(location = 0) in vec3 place;
 layout(location = 1) in float shown;

@@ -1,5 +1,5 @@
 #version 460
-// The surface of the body, its near side cut away.
+// The surface of the body, with its near side cut away.
 layout(location = 0) in vec3 position;
 layout(location = 1) in float value;
 layout(location = 0) out vec3 place;

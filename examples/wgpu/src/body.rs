@@ -1,4 +1,4 @@
-//! The body: a mesh that wgpu moves, with olbvh's arrays beside it, and the pixels of a cut through it.
+//! The body: a mesh that wgpu moves, the arrays of olbvh for it, and the pixels of a cut through it.
 
 use anyhow::{Context, Result};
 use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
@@ -8,7 +8,7 @@ use olbvh::options::BuildOptions;
 use olbvh::primitives::Arena;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_interpolate, cmd_locate};
 
-/// Pixels; rows are multiples of 256 bytes, as wgpu copies them.
+/// The size of the picture. Its rows are multiples of 256 bytes, as wgpu copies them.
 pub const SIZE: [u32; 2] = [320, 240];
 
 pub struct Body {
@@ -17,7 +17,7 @@ pub struct Body {
     pub values: Buffer,
     /// The points of the pixels, row by row.
     pub places: Vec<[f32; 3]>,
-    /// From 0 to 1.
+    /// One value per point, from 0 to 1.
     pub field: Vec<f32>,
     pub centre: [f32; 3],
     pub radius: f32,
@@ -27,7 +27,7 @@ pub struct Body {
     options: BuildOptions,
     input: PointInput,
     output: LocateOutput,
-    /// Cells, field, places, and everything that olbvh makes of them.
+    /// Field, cells, places, and everything that olbvh computes.
     held: [Buffer; 4],
 }
 
@@ -55,7 +55,8 @@ impl Body {
         let asked = gpu.upload("wgpu_frame.places", &places)?;
         let on_device = gpu.upload("wgpu_frame.field", &field)?;
 
-        // Sizes first: what most trees need. Where the moved body would need more, the device builds a coarser one.
+        // Sizes come first: those that most trees need. If the tree of the moved body needs more, the device builds a
+        // coarser one.
         let (options, capacity) = (BuildOptions::default(), Capacity::usual(tets, 7));
         let carve = |a: &mut Arena| {
             let (arrays, tree) = (MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?);
@@ -87,10 +88,11 @@ impl Body {
         })
     }
 
-    /// Records what olbvh does in a frame. Reads the positions and writes owners and values, all in compute shaders.
+    /// Records the work of olbvh in a frame. It reads the positions and writes owners and values, all in compute
+    /// shaders.
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         let Self { scene, input, output, .. } = self;
-        // The memory is that of the frame before.
+        // The frame before used the same memory.
         r.barrier("frame.before → frame.mesh");
         cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");

@@ -1,4 +1,4 @@
-//! wgpu's device, opened with what olbvh likes to have, and lent to it.
+//! wgpu's device, opened with what olbvh would like to have enabled, and lent to olbvh.
 
 use anyhow::{Context, Result, ensure};
 use ash::vk;
@@ -14,7 +14,7 @@ pub struct Device {
 }
 
 impl Device {
-    /// `addresses`: with buffer addresses, which wgpu itself has no use for.
+    /// Opens the device; with `addresses`, it has buffer addresses, which wgpu itself does not use.
     pub fn open(addresses: bool) -> Result<Self> {
         let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
         descriptor.backends = wgpu::Backends::VULKAN;
@@ -40,12 +40,13 @@ impl Device {
         }
     }
 
-    /// olbvh on this device.
+    /// A handle of olbvh for this device.
     ///
     /// # Safety
-    /// The device outlives the answer and all made from it. While a function of olbvh submits (those that record do not), nobody else does.
+    /// The device must outlive the handle and everything made from it. While a function of olbvh submits (recording
+    /// functions do not), no other thread may submit.
     pub unsafe fn gpu(&self) -> Result<Gpu> {
-        // SAFETY: the handles are living ones and belong together; the rest is the caller's.
+        // SAFETY: the handles are alive and belong together; the caller ensures the rest.
         unsafe {
             let device = self.device.as_hal::<Vulkan>().context("not a device of Vulkan's")?;
             let instance = device.shared_instance();
@@ -70,7 +71,7 @@ impl Device {
     }
 }
 
-/// What validation layers say, which wgpu passes on to the log.
+/// The messages of validation layers, which wgpu passes on to the log.
 pub struct Messages(Mutex<Vec<String>>);
 
 static MESSAGES: Messages = Messages(Mutex::new(Vec::new()));
@@ -98,7 +99,7 @@ impl Messages {
         log::set_logger(&MESSAGES).map_err(|e| anyhow::anyhow!("{e}"))
     }
 
-    /// Fails if there were any.
+    /// Fails if there were any messages.
     pub fn none() -> Result<()> {
         let messages = MESSAGES.0.lock().unwrap();
         ensure!(messages.is_empty(), "validation: {}", messages.join("\n"));

@@ -1,4 +1,5 @@
-// What wgpu does in a frame: moves the points of the body before its tree is built, and draws what was found at the pixels of a cut.
+// The part of wgpu in a frame: it moves the points of the body before the tree is built, and draws the results at the
+// pixels of a cut.
 
 struct Frame {
     centre: vec3f,
@@ -43,7 +44,7 @@ fn colour(@builtin(position) at: vec4f) -> @location(0) vec4f {
     }
     let t = values[i];
     let colour = mix(mix(vec3f(0.1, 0.2, 0.6), vec3f(0.9, 0.85, 0.7), min(2.0 * t, 1.0)), vec3f(0.75, 0.1, 0.1), max(2.0 * t - 1.0, 0.0));
-    // The edges of the cells.
+    // Darkens the edges of the tetrahedra.
     let last = arrayLength(&owners) - 1;
     let edge = owners[min(i + 1, last)] != owner || owners[min(i + frame.width, last)] != owner;
     return vec4f(select(colour, 0.75 * colour, edge), 1.0);

@@ -1,5 +1,6 @@
-//! A program whose Vulkan device belongs to wgpu builds trees on it. In each frame wgpu moves the points of a body, olbvh records the construction of
-//! its tree and the location of every pixel of a cut into a command buffer of wgpu's, and wgpu draws the cut from what was found; one submission.
+//! A program whose Vulkan device belongs to wgpu builds trees on it. In each frame, wgpu moves the points of a body,
+//! olbvh records the construction of its tree and the location of every pixel of a cut into a command buffer of wgpu,
+//! and wgpu draws the cut from the results, all in one submission.
 //!
 //! ```text
 //! cargo run --manifest-path examples/wgpu/Cargo.toml --target-dir target/wgpu -- [FRAMES] [OUT.png] [--descriptors]
@@ -27,18 +28,18 @@ fn main() -> Result<()> {
     let out = words.get(1).map_or("wgpu_frame.png", String::as_str);
     Messages::collect()?;
     let host = Device::open(!descriptors)?;
-    // SAFETY: `host` outlives everything that is made from `gpu`, and this thread alone submits.
+    // SAFETY: `host` outlives everything that is made from `gpu`, and only this thread submits.
     let gpu = unsafe { host.gpu() }?;
     let mesh = olbvh::mesh::graded(20)?;
     draw(&host, &gpu, &mesh, frames, out)?;
     Messages::none()
 }
 
-/// What wgpu has of a storage buffer of olbvh's.
+/// A buffer of wgpu that shares a storage buffer of olbvh.
 fn share(device: &wgpu::Device, label: &str, buffer: &olbvh::gpu::Buffer) -> wgpu::Buffer {
     let usage = wgpu::BufferUsages::STORAGE;
     let descriptor = wgpu::BufferDescriptor { label: Some(label), size: buffer.size(), usage, mapped_at_creation: false };
-    // SAFETY: the buffer is one of this device, a storage buffer, and outlives its use by wgpu, which does not destroy it.
+    // SAFETY: the buffer is a storage buffer of this device, and outlives its use by wgpu, which does not destroy it.
     unsafe {
         let shared = wgpu::hal::vulkan::Buffer::from_raw_externally_owned(buffer.all().buffer(), Box::new(|| ()));
         device.create_buffer_from_hal::<Vulkan>(shared, &descriptor)
@@ -109,7 +110,7 @@ fn draw(host: &Device, gpu: &Gpu, mesh: &Mesh, frames: u32, out: &str) -> Result
     let bytes = u64::from(4 * SIZE[0] * SIZE[1]);
     let readback = device.create_buffer(&wgpu::BufferDescriptor { label: Some("readback"), size: bytes, usage, mapped_at_creation: false });
 
-    // What a frame records is rehearsed once: afterwards nothing is made any more.
+    // The recording of a frame is rehearsed once, so that nothing is created later.
     let mut rehearsal = Recorder::rehearse(gpu);
     body.record(&mut rehearsal)?;
     rehearsal.finish()?;
@@ -133,16 +134,16 @@ fn draw(host: &Device, gpu: &Gpu, mesh: &Mesh, frames: u32, out: &str) -> Result
         pass.set_bind_group(0, &moved, &[]);
         pass.dispatch_workgroups((mesh.points.len() as u32).div_ceil(64), 1, 1);
         drop(pass);
-        // wgpu is told what happens to the buffers behind its back, and sets its barriers accordingly.
+        // wgpu must know what olbvh does to the buffers, so that it sets its barriers accordingly.
         let (read, written) = (wgpu::BufferUses::STORAGE_READ_ONLY, wgpu::BufferUses::STORAGE_READ_WRITE);
         let used = [(&positions, read), (&owners, written), (&values, written)];
         before.transition_resources(used.map(|(buffer, state)| wgpu::BufferTransition { buffer, state }).into_iter(), std::iter::empty());
 
-        // SAFETY: the encoder records nothing of wgpu's own; the pools are reset when the frame is done.
+        // SAFETY: the encoder records no commands of wgpu; the pools are reset after the frame is done.
         unsafe {
             ours.as_hal_mut::<Vulkan, _, Result<()>>(|encoder| {
                 let commands = encoder.context("no command buffer of Vulkan's")?.raw_handle();
-                let mut recorder = Recorder::new(gpu, commands, None).with_pools(&mut pools);
+                let mut recorder = Recorder::new(gpu, commands, None).with_pools(&mut pools)?;
                 body.record(&mut recorder)?;
                 Ok(recorder.finish()?)
             })
@@ -172,7 +173,7 @@ fn draw(host: &Device, gpu: &Gpu, mesh: &Mesh, frames: u32, out: &str) -> Result
     Ok(writer.finish()?)
 }
 
-/// Holds what the last frame found against the owning functions, for the points where wgpu moved them to.
+/// Compares the results of the last frame with those of the owning functions, for the points as wgpu moved them.
 fn check(gpu: &Gpu, mesh: &Mesh, body: &Body) -> Result<()> {
     let moved: Vec<[f32; 3]> = gpu.download(&body.positions, body.positions.all())?;
     ensure!(moved.len() == mesh.points.len() && moved.iter().zip(&mesh.points).any(|(a, b)| a != b), "nothing has moved");

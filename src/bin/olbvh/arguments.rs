@@ -1,19 +1,19 @@
-//! Values of arguments that several subcommands have.
+//! Parsers of argument values that several subcommands share.
 
 use olbvh::error::Error;
 
-/// Something with a name; the message says no more than is wrong with it.
+/// Parses a named value; the error message holds only what is wrong with it.
 pub fn named<T: std::str::FromStr<Err = Error>>(text: &str) -> Result<T, String> {
     text.parse().map_err(|e| if let Error::Invalid(message) = e { message } else { e.to_string() })
 }
 
-/// Three finite numbers.
+/// Parses three finite numbers, `X,Y,Z`.
 pub fn vector(text: &str) -> Result<[f64; 3], String> {
     let numbers: Option<Vec<f64>> = text.split(',').map(|n| n.trim().parse().ok().filter(|n: &f64| n.is_finite())).collect();
     numbers.and_then(|n| n.try_into().ok()).ok_or_else(|| "three numbers, such as 1,0,0.5".into())
 }
 
-/// `LO:HI`.
+/// Parses a range `LO:HI`.
 pub fn range(text: &str) -> Result<[f32; 2], String> {
     let numbers = text.split_once(':').map(|(lo, hi)| (lo.trim().parse::<f32>(), hi.trim().parse::<f32>()));
     match numbers {

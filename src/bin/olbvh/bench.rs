@@ -1,4 +1,4 @@
-//! `olbvh bench`.
+//! The subcommand `olbvh bench`.
 
 use crate::common::{Common, Failure, Outcome};
 use crate::{engine, input, output};
@@ -8,7 +8,8 @@ use olbvh::formats::OutputFormat;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Measure the octree against an LBVH and the device's own ray tracing, as the paper does, on one device.
+/// Measure the octree on one device and compare it with an LBVH and with the device's hardware ray tracing, as the
+/// paper does.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -27,38 +28,42 @@ related to the rate at which the device copies, by the bytes that they must read
 --compare runs nothing. It tells every ratio of times that both files have, the range that the repetitions allow, what only one of them has, and \
 whatever differs in device, driver, target, program and settings.")]
 pub struct Args {
-    /// Meshes instead of those of the suite.
+    /// Mesh files or procedural meshes to measure instead of those of the suite.
     mesh: Vec<PathBuf>,
-    /// How much is measured.
+    /// Selection of meshes and query sizes.
     #[arg(long, default_value = "quick", value_name = "quick|paper|full|scaling")]
     suite: Suite,
-    /// Where the results go: a .json or .md file, or a folder for both and the plots.
+    /// Output: a .json or .md file, or a folder for both and the plots. Default: only the text on standard output.
     #[arg(short, long, value_name = "OUT")]
     output: Option<PathBuf>,
-    /// Points to locate; by default as many as the suite does.
+    /// Number of points to locate, up to 67,108,864 (2^26). Default: set by the suite (quick 16,384, paper and full
+    /// 1,048,576, scaling 262,144).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
     points: Option<u32>,
-    /// Width and height of the picture, and voxels of a row of the slice; by default those of the suite.
+    /// Width and height of the picture in pixels, and voxels per row of the slice, up to 8,192. Default: set by the
+    /// suite (quick 96 and 256, paper and full 1,024 and 999, scaling none).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192))]
     pixels: Option<u32>,
-    /// Most repetitions of a measurement.
+    /// Maximum number of repetitions of a measurement. Default: set by the suite (quick, paper and full 50, scaling
+    /// 15).
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     repeat: Option<u32>,
-    /// Seconds after which a measurement is not repeated again.
+    /// Time in seconds after which a measurement is not repeated again. Default: set by the suite (quick 0.05, others
+    /// 5).
     #[arg(long, value_name = "S")]
     seconds: Option<f64>,
-    /// Compare two files of results (.json) instead of measuring.
+    /// Compare two .json result files instead of measuring.
     #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds"])]
     compare: Option<Vec<PathBuf>>,
 }
 
-/// What OUT is.
+/// Kind of output that OUT names.
 enum Target {
     Folder,
     File(OutputFormat),
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if let Some([a, b]) = args.compare.as_deref() {
         return run_compare([a, b], args.output.as_deref(), common);
@@ -89,7 +94,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let mesh = input::mesh(&path, common)?.mesh;
         let measured = measure(&gpu, &name, &mesh, &report, &|line| common.remark(line))?;
         report.push(measured);
-        // So that a long run that is stopped has told something.
+        // Results are written after every mesh, so that a long run that is stopped leaves those it has.
         if let (Some(path), Some(target)) = (&args.output, &target) {
             write(path, target, &report)?;
         }
@@ -98,7 +103,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     output::summary(common, &json, &text(&report))
 }
 
-/// Compares two files; the result goes to a file as well, if one is named.
+/// Compares two result files; the comparison is also written to a file, if one is named.
 fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outcome {
     let format = out.map(|path| output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[a, b])).transpose()?;
     let comparison = compare([a, b]).map_err(Failure::input)?;
@@ -110,7 +115,7 @@ fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outco
     output::summary(common, &json, &comparison.text())
 }
 
-/// Announces the result before long work.
+/// Determines the kind of output and announces it, before long work.
 fn target(path: &Path) -> Outcome<Target> {
     if path.extension().is_some() {
         return output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[]).map(Target::File);
@@ -134,7 +139,8 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
     files.iter().try_for_each(|(path, content)| output::write_text(path, content))
 }
 
-/// The commit that the sources of this program are at now, if they are still there and under Git; `-dirty` with changes that are not committed.
+/// The commit of this program's sources as they are now, if they still exist and are under Git; ends with `-dirty` if
+/// there are uncommitted changes.
 fn commit() -> Option<String> {
     let told = Command::new("git").args(["-C", env!("CARGO_MANIFEST_DIR"), "describe", "--always", "--dirty"]).output().ok()?;
     let name = String::from_utf8(told.stdout).ok()?.trim().to_owned();

@@ -1,30 +1,31 @@
-//! Arguments that every subcommand has, and how a failure becomes an exit code.
+//! Arguments that all subcommands share, and the exit codes of failures.
 
 use olbvh::error::Error;
 use std::process::ExitCode;
 
-/// Arguments that every subcommand has.
+/// Arguments that all subcommands share.
 #[derive(clap::Args)]
 #[allow(clippy::struct_excessive_bools, reason = "each is a flag of its own")]
 pub struct Common {
     /// Print one JSON object on standard output instead of text.
     #[arg(long, global = true, help_heading = "Global options")]
     pub json: bool,
-    /// Where to compute: part of a device's name or its number (see `olbvh devices`), or `cpu` for the reference implementation, which needs no
-    /// Vulkan and is slower.
+    /// Device that computes: a part of its name or its number (`olbvh devices` lists them), or `cpu` for the reference
+    /// implementation, which needs no Vulkan and is slower. Default: the best suitable Vulkan device.
     #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|INDEX|cpu")]
     pub device: Option<String>,
-    /// Shapes of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh tune` saved. By default those of the
-    /// device's own profile, or of its kind; results are the same with all.
+    /// Tuning parameters of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh
+    /// tune` saved. They affect speed only, never results. Default: the profile that `olbvh tune` saved for the device,
+    /// otherwise the parameters for its kind of device.
     #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|FILE", env = "OLBVH_TARGET", hide_env_values = true)]
     pub target: Option<String>,
-    /// Do not look for a profile of the device that `olbvh tune` has saved.
+    /// Ignore the profile that `olbvh tune` saved for the device.
     #[arg(long, global = true, help_heading = "Global options", env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = clap::builder::FalseyValueParser::new())]
     pub no_profile: bool,
-    /// No progress and no remarks, errors only.
+    /// Print errors only: no progress bar, no remarks.
     #[arg(long, short, global = true, help_heading = "Global options", conflicts_with = "verbose")]
     pub quiet: bool,
-    /// Tell what is being done.
+    /// Print what is being done, in detail.
     #[arg(long, short, global = true, help_heading = "Global options")]
     pub verbose: bool,
 }
@@ -40,12 +41,12 @@ impl Common {
         env_logger::Builder::new().filter_level(level).format_timestamp(None).init();
     }
 
-    /// Whether `--device` means the reference implementation.
+    /// Whether `--device` selects the reference implementation.
     pub fn means_cpu(&self) -> bool {
         self.device.as_deref().is_some_and(|device| device.eq_ignore_ascii_case("cpu"))
     }
 
-    /// A remark on standard error, unless `--quiet`.
+    /// Prints a remark on standard error, unless `--quiet` is given.
     pub fn remark(&self, message: impl std::fmt::Display) {
         if !self.quiet {
             output_line(&format!("{message}"));
@@ -53,24 +54,24 @@ impl Common {
     }
 }
 
-/// A line on standard error; a closed one is no reason to fail.
+/// Prints a line on standard error; a closed standard error is not a failure.
 fn output_line(line: &str) {
     use std::io::Write as _;
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
-/// Why the program ends, by its exit code.
+/// Why the program ends; the numbers are exit codes.
 #[derive(Debug)]
 pub enum Failure {
-    /// 1: anything else.
+    /// 1: any other failure.
     Failed(String),
-    /// 2: the arguments make no sense.
+    /// 2: wrong usage, that is invalid arguments.
     Usage(String),
-    /// 3: an input file is not what it should be.
+    /// 3: an input file cannot be read or is invalid.
     Input(String),
-    /// 4: no device.
+    /// 4: no suitable device.
     Device(String),
-    /// 0: whoever reads standard output has had enough.
+    /// 0: standard output was closed by its reader.
     Closed,
 }
 
@@ -95,7 +96,7 @@ impl From<Error> for Failure {
 }
 
 impl Failure {
-    /// An error while an input file was read.
+    /// Converts an error that occurred while an input file was read.
     pub fn input(error: Error) -> Self {
         match error {
             Error::Io { .. } | Error::TooLarge(_) => Self::Input(error.to_string()),
@@ -103,7 +104,7 @@ impl Failure {
         }
     }
 
-    /// Says why on standard error and gives the exit code.
+    /// Prints the reason on standard error and returns the exit code.
     pub fn report(self) -> ExitCode {
         let (code, message) = match self {
             Self::Closed => return ExitCode::SUCCESS,

@@ -1,4 +1,4 @@
-//! `olbvh conformance`.
+//! The subcommand `olbvh conformance`.
 
 use crate::common::{Common, Failure, Outcome};
 use crate::output::{self, Progress};
@@ -10,11 +10,11 @@ use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Compare a device, kernel by kernel, with the reference implementation.
+/// Compare the results of a device, kernel by kernel, with the reference implementation.
 ///
-/// Every primitive, every stage of the construction and every query is run on inputs that the program makes itself, and compared word by word
-/// with the same computation on the processor. A case that fails names the kernel or stage, the array, the first index that differs, what was
-/// expected and what was found.
+/// Every primitive, every stage of the construction and every query runs on inputs that the program generates, and its
+/// results are compared word by word with those of the same computation on the CPU. For a case that fails, the report
+/// names the kernel or stage, the array, the first index that differs, the expected value and the value found.
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   olbvh conformance --filter quick                   under two minutes on a software device
@@ -25,28 +25,30 @@ use std::time::Duration;
 
 Exit codes: 0 all passed, 1 a case failed, 2 wrong usage, 4 no suitable device.")]
 pub struct Args {
-    /// Meshes (files or kuhn:NX,NY,NZ) to run the cases of instead of the built-in ones. The reference takes its time on large ones.
+    /// Mesh files or procedural meshes (kuhn:NX,NY,NZ) to use instead of the built-in ones. The reference
+    /// implementation is slow on large meshes.
     meshes: Vec<PathBuf>,
-    /// List the cases and run none.
+    /// List the cases without running them.
     #[arg(long)]
     list: bool,
-    /// Cases whose name contains this; or a group: quick, full (all but large), large.
+    /// Run only the cases whose name contains S, or those of a group: quick, full (all but large) or large. Default:
+    /// full.
     #[arg(long, value_name = "S")]
     filter: Option<String>,
-    /// How kernels get their buffers; both where the device can.
+    /// How kernels receive their buffers. Default: both ways, if the device supports them.
     #[arg(long, value_enum, default_value_t = Bindings::Both)]
     binding: Bindings,
-    /// Write a `JUnit` report to this file as well.
+    /// Also write a `JUnit` report (XML) to this file.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
 }
 
-/// Bindings to run.
+/// Ways of binding buffers to test.
 #[derive(Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum Bindings {
     /// Every case by address and by descriptors.
     Both,
-    /// By address only.
+    /// By device address only.
     Address,
     /// By descriptors only.
     Descriptors,
@@ -59,7 +61,7 @@ fn name(binding: Binding) -> &'static str {
     }
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let all = if args.meshes.is_empty() { cases() } else { cases_of_meshes(&args.meshes, common)? };
     let chosen: Vec<Case> = all.into_iter().filter(|c| c.matches(args.filter.as_deref())).collect();
@@ -82,7 +84,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     finish(args, common, &device, &runs)
 }
 
-/// The cases of files, each named by its file.
+/// The cases of mesh files; each is named after its file.
 fn cases_of_meshes(meshes: &[PathBuf], common: &Common) -> Outcome<Vec<Case>> {
     let mut all = Vec::new();
     for file in meshes {
@@ -92,14 +94,14 @@ fn cases_of_meshes(meshes: &[PathBuf], common: &Common) -> Outcome<Vec<Case>> {
     Ok(all)
 }
 
-/// Runs the cases by each binding.
+/// Runs the cases with each binding.
 fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, Vec<(Binding, Report)>)> {
     let mut bindings = match args.binding {
         Bindings::Both => vec![Binding::Address, Binding::Descriptors],
         Bindings::Address => vec![Binding::Address],
         Bindings::Descriptors => vec![Binding::Descriptors],
     };
-    // The shapes that other subcommands would use; cases that name a row have its own.
+    // The target that other subcommands would use; cases that name a row use that row.
     let target = engine::shapes(common)?.target;
     let options = GpuOptions { device: common.device.clone(), target: Some(target), ..GpuOptions::default() };
     let lab = |binding| Lab::new(&GpuOptions { binding: Some(binding), ..options.clone() });
@@ -107,7 +109,7 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
     let mut device = Value::Null;
     let progress = Progress::new(common, "cases");
     if args.binding == Bindings::Both {
-        // The device's own choice tells whether it has addresses.
+        // The binding that the device chooses by itself shows whether it has addresses.
         let any = Lab::new(&options)?;
         if any.device().binding() == Binding::Descriptors {
             common.remark("The device has no buffer addresses: cases run by descriptors only.");
@@ -123,7 +125,7 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
         });
         for case in chosen {
             if common.verbose {
-                // Before it runs: a driver that crashes takes the program with it.
+                // Printed before the case runs, because a driver that crashes takes the program with it.
                 common.remark(format!("running {} ({})", case.name, name(binding)));
             }
             runs.push((binding, lab.run(case)));
@@ -133,7 +135,7 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
     Ok((device, runs))
 }
 
-/// Reports, and fails if a case has failed.
+/// Prints the results, and returns a failure if a case has failed.
 fn finish(args: &Args, common: &Common, device: &Value, runs: &[(Binding, Report)]) -> Outcome {
     let count = |wanted: fn(&Ending) -> bool| runs.iter().filter(|r| wanted(&r.1.outcome)).count();
     let passed = count(|o| matches!(o, Ending::Passed));
@@ -184,9 +186,9 @@ fn entry((binding, report): &(Binding, Report)) -> Value {
     entry
 }
 
-/// Writes the report that CI systems read.
+/// Writes the `JUnit` report, which CI systems read.
 fn write_junit(file: &Path, runs: &[(Binding, Report)]) -> Outcome {
-    // XML has no control characters.
+    // XML allows no control characters.
     let escape = |text: &str| {
         text.replace(char::is_control, " ").replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
     };

@@ -1,4 +1,4 @@
-//! `olbvh devices`.
+//! The subcommand `olbvh devices`.
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{Origin, Shapes};
@@ -8,21 +8,21 @@ use olbvh::gpu::{RayTracing, list_devices};
 use serde_json::json;
 use std::fmt::Write as _;
 
-/// List every Vulkan device, whether it can be used, and if not, what it lacks.
+/// List all Vulkan devices: whether each can be used and, if not, what it lacks.
 #[derive(clap::Args)]
 #[command(
     after_help = "Examples:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1\n  olbvh devices -v         with the shapes of the kernels, and the profile they come from"
 )]
 pub struct Args {}
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(_: &Args, common: &Common) -> Outcome {
     if common.device.is_some() {
         common.remark("--device chooses for other commands; these are all devices");
     }
     let devices = match list_devices() {
         Ok(devices) => devices,
-        // No loader is no failure of a listing: there are no devices, and why is said.
+        // A missing Vulkan loader is not a failure here: the list is empty, and the reason is printed.
         Err(error @ Error::NoVulkan(_)) => {
             common.remark(&error);
             Vec::new()

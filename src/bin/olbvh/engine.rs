@@ -1,4 +1,4 @@
-//! The seam between the subcommands and what computes.
+//! The interface between the subcommands and the Vulkan device or CPU that computes.
 
 mod cpu;
 mod gpu;
@@ -19,25 +19,26 @@ use olbvh::render::Bounds;
 use olbvh::slicing::Band;
 use olbvh::tree::TreeBytes;
 
-/// So much of so much is done.
+/// Receives progress: how much of how much is done.
 pub type Report<'a> = &'a (dyn Fn(u64, u64) + Sync);
 
-/// Takes the bands of a stack of slices.
+/// Receives the bands of a stack of slices.
 pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;
 
-/// Something that builds trees. Bytes of device memory, where a question takes them, are the most that may be used; without, all there are.
+/// Builds and queries trees. `memory`, where a query takes it, is the maximum number of bytes of device memory to use;
+/// `None`: all the device has.
 pub trait Engine {
-    /// What it is called in results.
+    /// The name of the engine in results.
     fn name(&self) -> String;
-    /// The shapes of its kernels, and where they come from; nothing without kernels.
+    /// The target of its kernels and where it comes from; `None` if it has no kernels.
     fn target(&self) -> Option<&Shapes>;
-    /// Marks the boundary, builds the tree, and tells what they are like.
+    /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
-    /// Builds a tree over a mesh and finds owner, barycentric coordinates and value of each point.
+    /// Builds a tree over a mesh and finds the owner, barycentric coordinates and field value of each point.
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>>;
-    /// The same, but finds every tetrahedron that contains each point.
+    /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
-    /// Builds a tree over each of two meshes and finds out where they overlap.
+    /// Builds a tree over each of two meshes and finds where they overlap.
     fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>>;
@@ -45,13 +46,13 @@ pub trait Engine {
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks>;
 }
 
-/// A picture and what was found out for it.
+/// A picture and the values that were derived for it.
 pub struct Drawn {
     /// The picture.
     pub picture: Picture,
     /// The field's values at the ends of the transfer function.
     pub range: [f32; 2],
-    /// Distance of two samples.
+    /// Distance between two samples on a ray.
     pub step: f32,
 }
 
@@ -60,63 +61,63 @@ pub struct Drawn {
 pub struct Located {
     /// Tetrahedron of the mesh, or `u32::MAX`.
     pub owner: u32,
-    /// Barycentric coordinates in it, 0 outside the mesh.
+    /// Barycentric coordinates in it; 0 outside the mesh.
     pub bary: [f32; 4],
-    /// The field's value, NaN outside the mesh or without field.
+    /// Value of the field; NaN outside the mesh or without a field.
     pub value: f32,
 }
 
-/// A mesh and its tree in figures.
+/// Figures about a mesh and its tree.
 #[derive(Clone, Debug)]
 pub struct Summary {
-    /// Cells by kind.
+    /// Number of tetrahedra of each kind.
     pub counts: Counts,
-    /// Bad cells, as tetrahedra of the mesh.
+    /// Invalid tetrahedra of the mesh, with the reason.
     pub bad: Vec<(u32, Fault)>,
-    /// Bounds of the valid cells, relative to the mesh's origin.
+    /// Bounds of the valid tetrahedra, relative to the mesh's origin.
     pub bounds: Bounds,
     /// Level of the leaves.
     pub level: u32,
-    /// The level that alpha asks for, or the options.
+    /// Level that alpha or the options ask for.
     pub wanted: u32,
-    /// Entries.
+    /// Number of entries.
     pub entries: u64,
-    /// Nodes.
+    /// Number of nodes.
     pub nodes: u64,
-    /// Leaves.
+    /// Number of leaves.
     pub leaves: u64,
     /// Bytes of each array.
     pub memory: TreeBytes,
-    /// Bytes as the paper counts them.
+    /// Bytes by the paper's formula.
     pub paper_bytes: u64,
-    /// Bytes of the neighbour table, which is the mesh's, not the tree's.
+    /// Bytes of the neighbour table, which belongs to the mesh, not to the tree.
     pub neighbour_bytes: u64,
-    /// Milliseconds for neighbours and boundary.
+    /// Milliseconds to find neighbours and boundary.
     pub topology_ms: f64,
-    /// Milliseconds for the tree.
+    /// Milliseconds to build the tree.
     pub build_ms: f64,
     /// Milliseconds of each stage, in order; empty where stages are not timed.
     pub stages: Vec<(String, f64)>,
 }
 
-/// The Vulkan device that `--device` names, for measurements.
+/// Opens the Vulkan device that `--device` names, for measurements.
 pub fn device(common: &Common) -> Outcome<Gpu> {
     if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
     }
     let device = gpu::Device::open(common)?;
     let gpu = device.gpu();
-    // What is measured is repeated: the memory of one repetition waits for the next.
+    // Measurements are repeated, so the pool keeps the memory of one repetition for the next.
     Ok(gpu.with_pool(gpu.report().memory / 4))
 }
 
-/// The shapes that kernels have on the device that `--device` names.
+/// The target of the kernels on the device that `--device` names.
 pub fn shapes(common: &Common) -> Outcome<Shapes> {
     let gpu = Gpu::new(&GpuOptions { device: common.device.clone(), trust: true, ..GpuOptions::default() })?;
     Shapes::of(common, gpu.report())
 }
 
-/// The engine that `--device` names: the best Vulkan device without one.
+/// Opens the engine that `--device` names; without the option, the best Vulkan device.
 pub fn open(common: &Common) -> Outcome<Box<dyn Engine>> {
     if !common.means_cpu() {
         return Ok(Box::new(gpu::Device::open(common)?));

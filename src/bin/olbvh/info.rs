@@ -1,4 +1,4 @@
-//! `olbvh info`.
+//! The subcommand `olbvh info`.
 
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Engine, Shapes, Summary};
@@ -12,7 +12,7 @@ use olbvh::reference::grid::MAX_LEVEL;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
-/// Show what is in a mesh, and build its tree and show what that is like.
+/// Show the contents of a mesh, build the tree over it, and show the tree's properties.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -25,16 +25,16 @@ Examples:
 Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no \
 volume, or overlap a neighbour. Negative cells have their vertices in the other order, which does no harm.")]
 pub struct Args {
-    /// Mesh file, or kuhn:NX,NY,NZ.
+    /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
     #[command(flatten)]
     tree: TreeArgs,
-    /// List every bad cell and why it is one.
+    /// List every bad cell with the reason.
     #[arg(long)]
     bad_cells: bool,
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options(true)?;
     let engine = engine::open(common)?;

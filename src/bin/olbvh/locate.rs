@@ -1,4 +1,4 @@
-//! `olbvh locate`.
+//! The subcommand `olbvh locate`.
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
@@ -15,7 +15,7 @@ use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Find the cell that each point lies in, and the value of a field there.
+/// Find the cell that contains each point, and interpolate a field there.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -30,23 +30,25 @@ Where there is a point to every two cells or more, each is looked for near the o
 saves the sorting. The answers are the same, and stand in the order of the points in any case. \
 With --all the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
 pub struct Args {
-    /// Mesh file, or kuhn:NX,NY,NZ.
+    /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// Points: .npy (n×3) or .csv (x,y,z).
+    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers) or .csv (x,y,z).
     points: PathBuf,
-    /// Where the result goes; the ending says how: .npy, .npz, .csv, .vtu, .json.
+    /// Output file; its extension selects the format: .npy, .npz, .csv, .vtu or .json (with --all .csv, .npy or .json).
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Field to interpolate; by default the first field of points.
+    /// Name of the field to interpolate. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Option<String>,
-    /// Every cell that contains a point, not just its owner.
+    /// Find every cell that contains a point, not only its owner.
     #[arg(long, conflicts_with = "field")]
     all: bool,
-    /// How far outside the surface a point still counts, as a barycentric coordinate below 0.
+    /// How far outside the surface a point may lie and still count as inside: its smallest barycentric coordinate may
+    /// be down to -T. T is between 0 and 1, without unit.
     #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
-    /// Each point lies near the one before, as samples of a line or a scan do; without, no order is assumed.
+    /// Take the points in the given order, in which each lies near the one before, as the samples of a line or scan do.
+    /// Default: no order is assumed.
     #[arg(long, conflicts_with = "all")]
     coherent: bool,
     #[command(flatten)]
@@ -55,13 +57,13 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
-/// What is said in the end.
+/// What the summary at the end reports.
 struct Done {
     found: usize,
     took: InBlocks,
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if !(0.0..=1.0).contains(&args.tolerance) {
         return Err(Failure::Usage(format!("a tolerance of {}; it lies between 0 and 1", args.tolerance)));
@@ -74,7 +76,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mesh = &loaded.mesh;
     let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
     let points = load_points(&args.points).map_err(Failure::input)?;
-    // The difference in double precision: that is what the mesh's origin is for.
+    // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
     let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
     let asked = Points { mesh, options, points: &local, how: LocateOptions { path, tolerance: args.tolerance } };
@@ -104,7 +106,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "device": engine.name(),
     });
-    // Of few points most of the time goes by before the first.
+    // With few points, most of the time passes before the first one, so no rate is printed.
     let rate = if points.len() < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };
     let text = format!(
         "{}: {}, {} of them in the mesh; {} on {}{rate}{}\n",
@@ -118,7 +120,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     output::summary(common, &json, &text)
 }
 
-/// Writes every owner of every point as rows (point, cell); how many points have any.
+/// Writes every owner of every point as rows (point, cell); returns how many points have an owner.
 fn every_owner(args: &Args, format: OutputFormat, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
     let cells = |tets: &Vec<u32>| {
         let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
@@ -136,7 +138,7 @@ fn every_owner(args: &Args, format: OutputFormat, mesh: &Mesh, owners: &[Vec<u32
     Ok(owners.iter().filter(|o| !o.is_empty()).count())
 }
 
-/// A table of rows (point, cell).
+/// Writes a table of rows (point, cell).
 fn write_rows(path: &Path, rows: &[[u32; 2]]) -> Outcome {
     let mut file = OutputFile::create(path)?;
     let mut write = || {

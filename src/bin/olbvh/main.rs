@@ -1,4 +1,5 @@
-//! The command line: one file per subcommand, [`engine`] between them and the devices.
+//! The command-line program: one file per subcommand. The subcommands compute through [`engine`], which hides whether a
+//! Vulkan device or the CPU does the work.
 
 mod arguments;
 mod bench;
@@ -37,7 +38,8 @@ Examples:
 
 Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device.";
 
-/// Builds octree bounding volume hierarchies over tetrahedral meshes on the GPU, and answers with them: pictures, values at points.
+/// Build octree linear bounding volume hierarchies (OLBVH) over tetrahedral meshes on the GPU, and query them: locate
+/// points and interpolate fields, render pictures, slice into voxels, find the overlap of two meshes.
 #[derive(Parser)]
 #[command(name = "olbvh", version, after_help = AFTER_HELP, propagate_version = true, max_term_width = 120)]
 struct Cli {

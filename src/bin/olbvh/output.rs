@@ -1,4 +1,4 @@
-//! Results: standard output, files, progress.
+//! Output of results on standard output and in files, and progress bars.
 
 use crate::common::{Common, Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
@@ -8,7 +8,7 @@ use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
 
-/// Prints text (with its last newline) on standard output.
+/// Prints text, which ends with a newline, on standard output.
 pub fn print(text: &str) -> Outcome {
     let mut out = std::io::stdout().lock();
     out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| match e.kind() {
@@ -17,15 +17,16 @@ pub fn print(text: &str) -> Outcome {
     })
 }
 
-/// Prints the JSON object with `--json`, else the text.
+/// Prints the JSON object with `--json`, otherwise the text.
 pub fn result(common: &Common, json: &serde_json::Value, text: &str) -> Outcome {
     if common.json { print(&format!("{json:#}\n")) } else { print(text) }
 }
 
-/// Results that are being written.
+/// Results that have been announced and may be incomplete.
 static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
-/// After Ctrl-C: nothing of an unfinished result stays behind, exit code 130 as shells have it.
+/// Makes Ctrl-C remove the temporary files of unfinished results and end the program with code 130, as is usual for
+/// shells.
 pub fn clean_up_on_interrupt() {
     let handler = || {
         for path in PENDING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
@@ -39,7 +40,7 @@ pub fn clean_up_on_interrupt() {
     }
 }
 
-/// Removes the files that stand for `path` until it is complete, `.NAME.*.part` beside it.
+/// Removes the temporary files of `path`, `.NAME.*.part` in the same folder.
 fn remove_parts(path: &Path) {
     let name = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
     for entry in std::fs::read_dir(folder(path)).into_iter().flatten().flatten() {
@@ -54,13 +55,13 @@ fn folder(path: &Path) -> &Path {
     path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."))
 }
 
-/// Announces a result, before long work: as [`announce_file`], and its ending must be one of `formats`.
+/// Announces a result before long work, like [`announce_file`]; its extension must be that of one of `formats`.
 pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outcome<OutputFormat> {
     announce_file(path, inputs)?;
     Ok(OutputFormat::of(path, formats)?)
 }
 
-/// Announces a result of any ending: its folder must exist, and it must not be one of the `inputs`.
+/// Announces a result with any extension: its folder must exist, and it must not be one of the `inputs`.
 pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     if path == Path::new("-") || path.starts_with("/dev") {
         return Err(Failure::Usage(format!("{}: results go to files, not to streams or devices", path.display())));
@@ -76,23 +77,23 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     Ok(())
 }
 
-/// Notes a file of a result that is of several, before it is written.
+/// Registers a file of a result that consists of several files, before it is written.
 pub fn begin(path: &Path) {
     PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
 }
 
-/// Writes a file of text, complete or not at all.
+/// Writes a text file, completely or not at all.
 pub fn write_text(path: &Path, text: &str) -> Outcome {
     let mut file = OutputFile::create(path)?;
     file.write_all(text.as_bytes()).map_err(|source| Error::Io { path: path.into(), source })?;
     Ok(file.commit()?)
 }
 
-/// A progress bar on standard error, if that is a terminal; it appears once work takes long.
+/// A progress bar on standard error, if that is a terminal and `--quiet` is not given.
 pub struct Progress(Option<ProgressBar>);
 
 impl Progress {
-    /// For work called `label`.
+    /// Makes a progress bar with the label `label`.
     pub fn new(common: &Common, label: &'static str) -> Self {
         let shown = !common.quiet && std::io::stderr().is_terminal();
         Self(shown.then(|| {
@@ -102,7 +103,7 @@ impl Progress {
         }))
     }
 
-    /// So much of the work is done.
+    /// Shows that `done` of `total` units of work are finished.
     pub fn set(&self, done: u64, total: u64) {
         if let Some(bar) = &self.0 {
             bar.set_length(total);
@@ -119,7 +120,7 @@ impl Drop for Progress {
     }
 }
 
-/// As [`result`], but with `--quiet` the text is left out: the result itself is in a file.
+/// Prints a summary like [`result`], except that `--quiet` suppresses the text: the result itself is in a file.
 pub fn summary(common: &Common, json: &serde_json::Value, text: &str) -> Outcome {
     if common.quiet && !common.json { Ok(()) } else { result(common, json, text) }
 }

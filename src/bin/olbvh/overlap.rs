@@ -1,4 +1,4 @@
-//! `olbvh overlap`.
+//! The subcommand `olbvh overlap`.
 
 use crate::arguments::vector;
 use crate::common::{Common, Outcome};
@@ -16,7 +16,7 @@ use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
 
-/// Find the cells of two meshes that intersect the other mesh.
+/// Find the cells of each of two meshes that intersect the other mesh.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,20 +29,21 @@ The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascend
 B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not, \
 but the same on every device.")]
 pub struct Args {
-    /// Mesh A: a file, or kuhn:NX,NY,NZ.
+    /// Mesh A: a file, or a procedural mesh such as kuhn:NX,NY,NZ.
     a: PathBuf,
-    /// Mesh B.
+    /// Mesh B, likewise.
     b: PathBuf,
-    /// Where the result goes: .json, or .vtu for the cells of A that intersect B.
+    /// Output file: .json, or .vtu for the cells of A that intersect B as a mesh.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Find all pairs of intersecting cells.
+    /// Also find all pairs of intersecting cells (.json output).
     #[arg(long)]
     pairs: bool,
-    /// Move B.
+    /// Move B by this vector, in units of the mesh.
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true)]
     move_b: Option<[f64; 3]>,
-    /// Turn B about an axis (x, y, z or a direction) by an angle in degrees, counter-clockwise.
+    /// Rotate B counter-clockwise by an angle in degrees about an axis (x, y, z or a direction X,Y,Z) through the
+    /// centre of its bounds, before it is moved.
     #[arg(long, value_name = "AXIS,DEGREES", value_parser = rotation, allow_hyphen_values = true)]
     rotate_b: Option<(DVec3, f64)>,
     #[command(flatten)]
@@ -51,12 +52,12 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
     let mut options = args.tree.suited(Fineness::Points)?;
     if args.pairs {
-        // Pairs are found by lists, by those of boxes only once.
+        // Pairs are found through lists; only lists by bounding box find each pair once.
         options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, fineness: Fineness::Alpha, ..options };
     }
     let engine = engine::open(common)?;
@@ -116,7 +117,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     output::summary(common, &json, &text)
 }
 
-/// Brings the points of B into the coordinates of A: turned, moved, relative to A's origin.
+/// Transforms the points of B into the coordinates of A: rotated, moved, and relative to A's origin.
 fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
     let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
     let wide = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
@@ -139,7 +140,7 @@ fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
     if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("B is moved beyond all bounds".into()).into()) }
 }
 
-/// Some cells of a mesh, in the order of their ids, with its points and fields.
+/// A mesh of some of the cells, in the order of their ids, with all points and fields.
 fn part(mesh: &Mesh, tets: &[u32]) -> Mesh {
     let mut part = mesh.clone();
     let mut tets = tets.to_vec();
@@ -152,7 +153,7 @@ fn part(mesh: &Mesh, tets: &[u32]) -> Mesh {
     part
 }
 
-/// `z,30` or `1,1,0,45`.
+/// Parses an axis and an angle such as `z,30` or `1,1,0,45`.
 fn rotation(text: &str) -> Result<(DVec3, f64), String> {
     let wrong = || "an axis and an angle in degrees, such as z,30 or 1,1,0,45".to_owned();
     let (axis, degrees) = text.rsplit_once(',').ok_or_else(wrong)?;

@@ -1,4 +1,4 @@
-//! `olbvh render`.
+//! The subcommand `olbvh render`.
 
 use crate::arguments::{range, vector};
 use crate::common::{Common, Failure, Outcome};
@@ -31,57 +31,63 @@ The camera sees the whole mesh unless told otherwise. --opacity and the last col
 mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step. \
 Where the opacity is 0 nothing is looked at: octree nodes with no other values are skipped, so pictures of few values are quick.";
 
-/// Draw a field of a mesh as a volume, into a PNG file.
+/// Draw a field of a mesh as a volume or as iso-surfaces, into a PNG file.
 #[derive(clap::Args)]
 #[command(after_help = EXAMPLES, after_long_help = long_help())]
 pub struct Args {
-    /// Mesh file, or kuhn:NX,NY,NZ.
+    /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// The picture, a .png file.
+    /// Output file, a .png picture.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
-    /// Field to draw; by default the first field of points.
+    /// Name of the field to draw. Default: the first field of points, or else of cells; without any field, the height
+    /// z.
     #[arg(long)]
     field: Option<String>,
-    /// Width and height in pixels; one number for a square.
+    /// Width and height in pixels; a single number gives a square.
     #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size)]
     size: [u32; 2],
-    /// Distance of two samples on a ray, in units of the mesh; by default 1/512 of its diagonal.
+    /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
+    /// bounds.
     #[arg(long)]
     step: Option<f64>,
-    /// View and settings separated by commas, such as `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (--help tells all).
+    /// View and settings, separated by commas, for example `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (angles in
+    /// degrees; --help lists all).
     #[arg(long, default_value = "iso", allow_hyphen_values = true, long_help = olbvh::render::camera::HELP)]
     camera: CameraSpec,
-    /// Colours and opacities: a colour map or a .json file (--help tells the maps and the form of the file).
+    /// Colours and opacities: the name of a colour map, or a .json file (--help lists the maps and describes the file).
     #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP|FILE.json")]
     tf: String,
-    /// Opacity: one number, or PLACE:OPACITY pairs over the field's range (0 to 1); by default what
-    /// fits the field, so that rare values show through common ones.
+    /// Opacity, from 0 to 1, per 1/100 of the mesh's diagonal: one number, or PLACE:OPACITY pairs, where PLACE goes
+    /// from 0 to 1 over --range. Default: opacities that fit the field, so that rare values show through common ones.
     #[arg(long, value_name = "A|P:A,P:A,…", value_parser = |text: &str| TransferFunction::parse_opacity(text).map(Opacity))]
     opacity: Option<Opacity>,
-    /// Iso-surfaces of a field of points at these values (up to 8) instead of the volume; opaque, or each as opaque as
-    /// --opacity says.
+    /// Draw iso-surfaces of a field of points at these values (up to 8) instead of the volume. They are opaque, unless
+    /// --opacity gives their opacities.
     #[arg(long, value_name = "V,V,…", value_parser = iso, allow_hyphen_values = true)]
     iso: Option<Iso>,
-    /// The field's values at the two ends of the transfer function; by default the smallest and largest there are.
+    /// Values of the field at the two ends of the transfer function. Default: the range in the .json file of --tf if it
+    /// has one, otherwise the smallest and largest value of the field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Factor on the opacity: 2 is as opaque as a mesh of twice the size.
+    /// Factor on the opacity: 2 makes the mesh as opaque as if it were twice as large.
     #[arg(long, default_value_t = 1.0, value_name = "S")]
     opacity_scale: f32,
-    /// white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM.
+    /// Background: white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM for a gradient. Default: white.
     #[arg(long, value_name = "COLOR")]
     background: Option<Background>,
-    /// Colours as they are, without light.
+    /// Show colours without lighting.
     #[arg(long)]
     no_shading: bool,
-    /// Opacity of surfaces seen from the side, 0 to 1: outlines stay crisp where the field is faint.
+    /// Minimum opacity, from 0 to 1, of lit surfaces that are seen edge-on: it keeps outlines crisp where the field is
+    /// faint. 0: no outlines.
     #[arg(long, default_value_t = 0.35, value_name = "A")]
     outline: f32,
-    /// Direction to the light: right, up, towards the viewer.
+    /// Direction to the light, of any length, as seen in the picture: right, up, towards the viewer. Default:
+    /// -0.45,0.65,1.
     #[arg(long, value_name = "R,U,T", value_parser = vector, allow_hyphen_values = true)]
     light: Option<[f64; 3]>,
-    /// A ray ends once it is this opaque.
+    /// Opacity at which a ray ends, above 0 and up to 1.
     #[arg(long, default_value_t = 0.99, value_name = "A")]
     termination: f32,
     #[command(flatten)]
@@ -90,15 +96,15 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
-/// Opacity points (a type of its own, lest a list be taken for repeated arguments).
+/// Opacity points. They have a type of their own, because clap takes a list for repeated arguments.
 #[derive(Clone)]
 struct Opacity(Vec<(f32, f32)>);
 
-/// Values of surfaces, a type of its own for the same reason.
+/// Values of iso-surfaces, a type of their own for the same reason.
 #[derive(Clone)]
 struct Iso(Vec<f32>);
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
     let mut options = args.tree.suited(Fineness::Pictures)?;
@@ -108,7 +114,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let [width, height] = settings.size.map(|n| n as usize);
     if options.fineness == Fineness::Pictures && 2 * width * height < loaded.mesh.tets.len() {
-        options.fineness = Fineness::Points; // a second build over so many cells would take longer than it spares
+        options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves
     }
     let field = args.field(&loaded.mesh, common)?;
     if let (false, Some([lo, hi])) = (settings.iso.is_empty(), field.range())
@@ -176,7 +182,7 @@ impl Args {
         })
     }
 
-    /// The field to draw. A mesh without fields is drawn by height, so that there is something to see.
+    /// The field to draw. A mesh without fields is coloured by height, so that there is something to see.
     fn field(&self, mesh: &Mesh, common: &Common) -> Outcome<Field> {
         if let Some(field) = input::field(mesh, self.field.as_deref())? {
             return Ok(field.clone());
@@ -186,7 +192,7 @@ impl Args {
     }
 }
 
-/// `WxH` or `N`.
+/// Parses `WxH`, or `N` for a square.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let (w, h) = text.split_once(['x', 'X', '×']).unwrap_or((text, text));
     match (w.trim().parse(), h.trim().parse()) {
@@ -195,13 +201,13 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-/// `V,V,…`.
+/// Parses values `V,V,…`.
 fn iso(text: &str) -> Result<Iso, String> {
     let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse()).collect();
     values.map(Iso).map_err(|_| "values of surfaces are numbers separated by commas, such as 120,180".into())
 }
 
-/// Examples, colour maps, the form of a transfer function in a file.
+/// Examples, colour maps, and the format of a transfer function file.
 fn long_help() -> String {
     let mut maps = crate::text::Page::default();
     for map in MAPS {

@@ -1,4 +1,4 @@
-//! `olbvh slice`.
+//! The subcommand `olbvh slice`.
 
 use crate::arguments::{range, vector};
 use crate::common::{Common, Failure, Outcome};
@@ -33,48 +33,54 @@ of the mesh's closest boundary cell (or, with --extrapolate linear, that cell's 
 transparent. Rows and layers run upwards; pictures show the highest row on top. More than one layer makes pictures NAME-0000.png, NAME-0001.png, … \
 An .svx package has its origin and voxels in metres (see --unit); its x and y are those of the layers.")]
 pub struct Args {
-    /// Mesh file, or kuhn:NX,NY,NZ.
+    /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// Where the result goes; the ending says how: .npy, .vti, .png, .svx.
+    /// Output file; its extension selects the format: .npy, .vti, .png or .svx.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Axis perpendicular to the layers.
     #[arg(long, default_value = "z", value_name = "x|y|z", value_parser = axis)]
     axis: usize,
-    /// Direction perpendicular to the layers, instead of an axis.
+    /// Direction perpendicular to the layers, of any length, instead of an axis.
     #[arg(long, value_name = "X,Y,Z", value_parser = vector, allow_hyphen_values = true, conflicts_with = "axis")]
     normal: Option<[f64; 3]>,
-    /// Place of the first layer along the axis (or unit normal); by default the layers are centred on the mesh.
+    /// Position of the centre of the first layer along the axis (or unit normal), in units of the mesh. Default: the
+    /// layers are centred on the mesh.
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     at: Option<f64>,
-    /// Number of layers; by default one, for .svx as many as fill the mesh.
+    /// Number of layers. Default: 1; for .svx as many as fill the mesh.
     #[arg(long, value_name = "N")]
     layers: Option<u32>,
-    /// Voxels per row and rows over the bounds of the mesh; one number: that many per row, square ones.
+    /// Size of a layer, which covers the bounds of the mesh: voxels per row x rows. A single number is voxels per row;
+    /// voxels are then square.
     #[arg(long, default_value = "512", value_name = "WxH|W", value_parser = size)]
     size: [u32; 2],
-    /// Height of a voxel perpendicular to the layers; by default the --spacing, or what fills the mesh; with one layer or --at the width of a voxel.
+    /// Height of a voxel perpendicular to the layers, in units of the mesh. Default: --spacing if given; otherwise,
+    /// with one layer or with --at, the width of a voxel; otherwise what fills the mesh.
     #[arg(long, value_name = "T", allow_hyphen_values = true)]
     thickness: Option<f64>,
-    /// Distance of the layers' centres, below 0 downwards; by default the thickness.
+    /// Distance between the centres of two layers, in units of the mesh; negative: layers are stacked downwards.
+    /// Default: the thickness.
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     spacing: Option<f64>,
-    /// Field to slice, per point or per cell; by default the first field of points.
+    /// Name of the field to slice. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Option<String>,
-    /// What touched voxels get: the value at the closest point, or the closest cell's field continued to their centre.
+    /// Value of voxels that the mesh only touches. nearest: that at the closest point of the mesh. linear: the field of
+    /// the closest cell, extrapolated to the centre of the voxel.
     #[arg(long, default_value = "nearest", value_name = "nearest|linear", value_parser = extrapolate)]
     extrapolate: Extrapolate,
-    /// Also write each voxel's cell, NAME.owner.npy or an array of the .vti.
+    /// Also write the cell id of each voxel: to NAME.owner.npy, or as an array of the .vti.
     #[arg(long)]
     owners: bool,
-    /// Colour map of pictures, as for `render`; by default viridis.
+    /// Colour map of .png pictures, as for `render --tf`. Default: viridis.
     #[arg(long, value_name = "MAP")]
     tf: Option<String>,
-    /// Values at the two ends of the colour map (and of an .svx value channel); by default the field's.
+    /// Values of the field at the two ends of the colour map (and of the value channel of an .svx package). Default:
+    /// the smallest and largest value of the field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
-    /// Metres per unit of the mesh, for .svx; by default 0.001, millimetres.
+    /// Metres per unit of the mesh, for .svx. Default: 0.001, that is the mesh is in millimetres.
     #[arg(long, value_name = "M", value_parser = unit)]
     unit: Option<f64>,
     #[command(flatten)]
@@ -83,12 +89,12 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
-/// Terabytes.
+/// Maximum number of voxels; their files would have terabytes.
 const MOST_VOXELS: u64 = 1 << 40;
 
 const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, OutputFormat::Png, OutputFormat::Svx];
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &FORMATS, &[&args.mesh])?;
     if format == OutputFormat::Npy {
@@ -191,7 +197,7 @@ fn extrapolate(text: &str) -> Result<Extrapolate, String> {
     }
 }
 
-/// `WxH`, or `W` for square voxels.
+/// Parses `WxH`, or `W` for square voxels.
 fn size(text: &str) -> Result<[u32; 2], String> {
     let parts: Vec<Option<u32>> = text.split(['x', 'X', '×']).map(|n| n.trim().parse().ok().filter(|&n| n > 0)).collect();
     match parts[..] {
@@ -201,7 +207,7 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
-/// A length.
+/// Parses metres per unit.
 fn unit(text: &str) -> Result<f64, String> {
     text.parse().ok().filter(|&m: &f64| m > 0.0 && m.is_finite()).ok_or_else(|| "metres, above 0, such as 0.001 for millimetres".into())
 }

@@ -1,4 +1,4 @@
-//! Where the layers of `olbvh slice` go: arrays, an image for `ParaView`, pictures, a package of voxels.
+//! Output of the layers of `olbvh slice`: arrays, an image for `ParaView`, pictures, or a package of voxels.
 
 use super::output;
 use olbvh::error::{Error, Result};
@@ -8,21 +8,21 @@ use olbvh::render::TransferFunction;
 use olbvh::slicing::{Band, EMPTY, VoxelGrid};
 use std::path::{Path, PathBuf};
 
-/// How values are shown.
+/// How values are shown in pictures and packages.
 pub struct Appearance {
-    /// Colours over the range.
+    /// Colour map over the range.
     pub colors: TransferFunction,
-    /// Values at the ends.
+    /// Values at the two ends of the range.
     pub range: [f32; 2],
-    /// Metres per unit.
+    /// Metres per unit of the mesh.
     pub unit: f64,
-    /// The field, if there is one.
+    /// Name of the field, if there is one.
     pub field: Option<String>,
-    /// The materials that it numbers, if it does, for packages.
+    /// For packages: the materials that the field numbers, if it does.
     pub materials: Option<Vec<u8>>,
 }
 
-/// The materials that a field numbers: a whole number from 1 to 255 in each cell.
+/// The materials that a field numbers, if every cell has a whole number from 1 to 255.
 pub fn materials(field: &Field) -> Option<Vec<u8>> {
     let number = |&v: &f32| (v.fract() == 0.0 && (1.0..=255.0).contains(&v)).then_some(v as u8);
     let all: Option<std::collections::BTreeSet<u8>> = field.values.iter().map(number).collect();
@@ -30,7 +30,7 @@ pub fn materials(field: &Field) -> Option<Vec<u8>> {
 }
 
 impl Appearance {
-    /// Place of a value in the range, 0…1.
+    /// Position of a value in the range, from 0 to 1.
     fn place(&self, value: f32) -> f32 {
         let [lo, hi] = self.range;
         if hi > lo && value.is_finite() { ((value - lo) / (hi - lo)).clamp(0.0, 1.0) } else { 0.5 }
@@ -43,7 +43,7 @@ enum Target {
     Package(Box<VoxelWriter>),
 }
 
-/// Gathers bands into layers and writes them one by one.
+/// Collects bands into layers and writes these one by one.
 pub struct Layers<'a> {
     target: Target,
     mesh: &'a Mesh,
@@ -56,14 +56,14 @@ pub struct Layers<'a> {
 }
 
 impl<'a> Layers<'a> {
-    /// Begins the result.
+    /// Creates the output.
     pub fn create(path: &Path, format: OutputFormat, voxels: &VoxelGrid, mesh: &'a Mesh, owners: bool, look: Appearance) -> Result<Self> {
         let [w, h] = voxels.size;
         let size = [w, h, voxels.layers];
         let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
         let origin = [0, 1, 2].map(|c| mesh.origin[c] + f64::from(voxels.origin[c]));
         let steps = [voxels.across, voxels.down, voxels.up];
-        // The layers' direction is that of the half axis, where there is no distance of layers.
+        // The direction of the layers is that of the half axis, since the distance between layers may be 0.
         let axes = [voxels.half[0], voxels.half[1], voxels.half[2]].map(|v| v.map(|x| f64::from(x) / length(v)));
         let upside = steps[2].iter().zip(&axes[2]).map(|(&a, b)| f64::from(a) * b).sum::<f64>() < 0.0;
         let spacing = [length(steps[0]), length(steps[1]), if upside { -length(steps[2]) } else { length(steps[2]) }];
@@ -88,7 +88,7 @@ impl<'a> Layers<'a> {
         Ok(Self { target, mesh, size: [w, h], count: voxels.layers, done: 0, owners, look, pending: Band::default() })
     }
 
-    /// Takes a band; writes the layers that are complete.
+    /// Adds a band, and writes the layers that are complete.
     pub fn band(&mut self, band: Band) -> Result<()> {
         let all = &mut self.pending;
         if all.kinds.is_empty() {
@@ -157,7 +157,7 @@ impl<'a> Layers<'a> {
         Ok(())
     }
 
-    /// Completes the result.
+    /// Completes the output.
     pub fn finish(self) -> Result<()> {
         if self.done != self.count {
             return Err(Error::Invalid(format!("{} of {} layers were sliced", self.done, self.count)));
@@ -170,7 +170,7 @@ impl<'a> Layers<'a> {
     }
 }
 
-/// `NAME-0007.png`.
+/// The file of layer `i`, for example `NAME-0007.png`.
 fn numbered(path: &Path, i: u32) -> PathBuf {
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
     path.with_file_name(format!("{stem}-{i:04}.png"))

@@ -1,24 +1,24 @@
-//! Aligned text for people.
+//! Formatting of text for people.
 
 use olbvh::blocks::InBlocks;
 use std::fmt::Write as _;
 
-/// Longest label that values are aligned behind; a longer one moves its own value only.
+/// Longest label to which values are aligned; a longer label shifts only its own value.
 const ALIGNED: usize = 40;
 
-/// Sections of labelled values, aligned.
+/// Sections of labelled, aligned values.
 #[derive(Default)]
 pub struct Page {
     rows: Vec<(String, String)>,
 }
 
 impl Page {
-    /// A heading.
+    /// Adds a heading.
     pub fn section(&mut self, title: &str) {
         self.rows.push((title.to_owned(), String::new()));
     }
 
-    /// A labelled value.
+    /// Adds a labelled value.
     pub fn row(&mut self, label: impl std::fmt::Display, value: impl std::fmt::Display) {
         self.rows.push((format!("  {label}"), value.to_string()));
     }
@@ -35,7 +35,7 @@ impl std::fmt::Display for Page {
     }
 }
 
-/// 12290298 as 12,290,298.
+/// Formats 12290298 as 12,290,298.
 pub fn grouped(n: impl Into<u64>) -> String {
     let digits = n.into().to_string();
     let mut text = String::new();
@@ -48,12 +48,12 @@ pub fn grouped(n: impl Into<u64>) -> String {
     text
 }
 
-/// `1 point`, `2 points`.
+/// Formats a count with its noun: `1 point`, `2 points`.
 pub fn counted(n: u64, what: &str) -> String {
     format!("{} {what}{}", grouped(n), if n == 1 { "" } else { "s" })
 }
 
-/// Bytes in the largest binary unit below.
+/// Formats bytes in the largest binary unit that gives a value of at least 1.
 pub fn bytes(n: u64) -> String {
     let units = ["B", "KiB", "MiB", "GiB", "TiB"];
     let mut value = n as f64;
@@ -65,7 +65,7 @@ pub fn bytes(n: u64) -> String {
     if unit == 0 { format!("{n} B") } else { format!("{value:.2} {}", units[unit]) }
 }
 
-/// A duration in a readable unit.
+/// Formats a duration in a readable unit.
 pub fn milliseconds(ms: f64) -> String {
     match ms {
         _ if ms >= 60_000.0 => format!("{:.1} min", ms / 60_000.0),
@@ -74,7 +74,7 @@ pub fn milliseconds(ms: f64) -> String {
     }
 }
 
-/// How a mesh was taken in blocks, behind other text; nothing where it was not.
+/// Text, to be appended, that says how many blocks a mesh was split into; empty if it was not split.
 pub fn in_blocks(took: &InBlocks) -> String {
     let InBlocks { trees, peak, build_seconds, .. } = *took;
     if trees > 1 {
@@ -84,7 +84,7 @@ pub fn in_blocks(took: &InBlocks) -> String {
     }
 }
 
-/// Numbers separated by ` × ` or the like.
+/// Joins values with a separator such as ` × `.
 pub fn joined<T: std::fmt::Display>(values: &[T], separator: &str) -> String {
     let mut text = String::new();
     for (i, value) in values.iter().enumerate() {

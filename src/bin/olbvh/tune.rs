@@ -1,4 +1,4 @@
-//! `olbvh tune`.
+//! The subcommand `olbvh tune`.
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{self, Origin};
@@ -12,7 +12,8 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-/// Find the shapes of the kernels (workgroup sizes, items per invocation, sort) that are fastest on this device, and keep them.
+/// Find the tuning parameters of the kernels (workgroup sizes, items per invocation, kind of sort) that are fastest on
+/// this device, and save them as its profile.
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
@@ -29,15 +30,15 @@ pub struct Args {
     /// Mesh to tune with: a file or a procedural mesh.
     #[arg(default_value = "kuhn:32,32,32,jitter=0.3")]
     mesh: PathBuf,
-    /// Seconds after which no further candidate is tried.
+    /// Time in seconds after which no further candidate is tried.
     #[arg(long, value_name = "S", default_value_t = 60.0)]
     seconds: f64,
-    /// Where the profile goes (.json) instead of the configuration folder.
+    /// File for the profile (.json). Default: a file in the user's configuration folder, which later runs find.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
 }
 
-/// Runs it.
+/// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if !(args.seconds.is_finite() && (0.0..=1e6).contains(&args.seconds)) {
         return Err(Failure::Usage(format!("--seconds {}; it is a time, up to a million seconds", args.seconds)));
@@ -64,12 +65,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     };
     let tuned = tune(&work, &gpu.report().room, gpu.target(), Duration::from_secs_f64(args.seconds), &report)?;
     drop(progress);
-    // Without a gain there is nothing to keep, unless a file was asked for.
+    // Without a gain there is nothing to save, unless a file was requested.
     let saved = (tuned.kept > 0 || args.output.is_some()).then(|| save(&gpu, args, &tuned, &file)).transpose()?;
     finish(common, &gpu, &tuned, (&file, saved.is_some()), matches!(origin.origin, Origin::Profile(_)))
 }
 
-/// Every candidate with `--verbose`; what is kept or refused in any case.
+/// Reports candidates: all of them with `--verbose`, otherwise only those that are kept or refused.
 fn tell(event: &Event, common: &Common) {
     match event {
         Event::Tried { change, ratio, kept: true } => common.remark(format_args!("{change}: {:.0} % of the time, kept", 100.0 * ratio)),
@@ -96,7 +97,7 @@ fn save(gpu: &Gpu, args: &Args, tuned: &Tuned, file: &Path) -> Outcome {
     Ok(profile.write(file)?)
 }
 
-/// What was gained, stage by stage, and where it is kept.
+/// Prints what was gained, stage by stage, and where the profile is.
 fn finish(common: &Common, gpu: &Gpu, tuned: &Tuned, (file, saved): (&Path, bool), had_profile: bool) -> Outcome {
     let Tuned { target, kept, tried, refused, complete, gains } = tuned;
     let start = gpu.target();

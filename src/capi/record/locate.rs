@@ -1,4 +1,4 @@
-//! Location of points, all their owners, and values there.
+//! The C interface to point location, to all owners of points, and to values at points.
 
 use super::scene::OlbvhScene;
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, recorded};
@@ -9,52 +9,56 @@ use crate::query::{
     cmd_locate, cmd_sort_points,
 };
 
-/// Points to locate, and where the answers go.
+/// Points to locate, and where the results go.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhLocation {
-    /// 32-bit floats, three of each point.
+    /// Points, three 32-bit floats each.
     pub points: OlbvhBuffer,
-    /// Floats from one point to the next, at least 3.
+    /// Distance from one point to the next in floats, at least 3.
     pub stride: u32,
-    /// Points.
+    /// Number of points.
     pub count: u32,
-    /// As `olbvh_locate` takes it.
+    /// Tolerance, as for `olbvh_locate`.
     pub tolerance: f32,
-    /// 0: each point by itself. 1: each around the owner of the one before, for more points than half the tetrahedra, of which each lies near the one
-    /// before. 2: so too, for points in no order, which are sorted first.
+    /// How points are located. 0: each one independently. 1: each one starting at the owner of the point before it;
+    /// this pays from one point per four tetrahedra on, if each point lies near the one before. 2: like 1,
+    /// for points in no order, which are sorted first.
     pub path: u32,
-    /// For path 0, if not of no bytes: a word per point, a valid tetrahedron to begin with, such as the owner of the frame before, or 0xffffffff.
+    /// For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
+    /// owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh.
     pub hints: OlbvhBuffer,
-    /// For path 2: memory to sort in, of `olbvh_location_parts`.
+    /// For path 2: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
     pub memory: OlbvhBuffer,
-    /// A word per point: its owner, or 0xffffffff.
+    /// A word per point: its owner, or `UINT32_MAX` if there is none.
     pub owners: OlbvhBuffer,
-    /// Four floats per point, in the order of the cell's vertices; zeroes without an owner.
+    /// Four floats per point: barycentric coordinates in the order of the tetrahedron's vertices; zeroes if there is no
+    /// owner.
     pub barycentrics: OlbvhBuffer,
 }
 
-/// What memory location takes.
+/// Size of the scratch memory for point location.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhLocationParts {
-    /// Bytes of `olbvh_location.memory`: 0 but for path 2.
+    /// Size of `olbvh_location.memory` in bytes: 0 except for path 2.
     pub bytes: u64,
 }
 
-/// Memory of all owners of points, and where in it the answers are.
+/// Memory for all owners of points, and where in it the results are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhOwnerParts {
-    /// Bytes of the memory.
+    /// Size of the memory in bytes.
     pub bytes: u64,
-    /// A word per point: the lowest of its owners, as location gives it.
+    /// A word per point: the lowest of its owners, as `olbvh_cmd_locate` writes it.
     pub owners: OlbvhBuffer,
-    /// Four floats per point: coordinates in that one.
+    /// Four floats per point: barycentric coordinates in that owner.
     pub barycentrics: OlbvhBuffer,
-    /// A word per point: where its owners end in the list; they begin where those of the point before end, the first at 0.
+    /// A word per point: where its owners end in the list. They start where those of the point before end; those of the
+    /// first point start at 0.
     pub ends: OlbvhBuffer,
-    /// A word: how many owners all points have together, whether or not there was room for them.
+    /// A word: the total number of owners of all points, even if there was not room for all of them.
     pub total: OlbvhBuffer,
 }
 
@@ -71,7 +75,7 @@ impl OlbvhLocation {
 
     fn input(&self) -> Result<PointInput> {
         let n = u64::from(self.count);
-        let points = self.points.holds(if n == 0 { 0 } else { 4 * (u64::from(self.stride) * (n - 1) + 3) }, "points")?;
+        let points = self.points.holds(if n == 0 { 0 } else { (u64::from(self.stride) * (n - 1) + 3).saturating_mul(4) }, "points")?;
         Ok(PointInput { points, stride: self.stride, count: self.count, hints: self.hints.optional(4 * n, "hints")?, order: None })
     }
 
@@ -81,7 +85,7 @@ impl OlbvhLocation {
     }
 }
 
-/// Tells what memory the location takes besides the answers.
+/// Reports how much scratch memory the location needs besides the results.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_location_parts(
     scene: *const OlbvhScene,
@@ -116,7 +120,8 @@ pub extern "C" fn olbvh_cmd_locate(
     })
 }
 
-/// Tells what memory all owners of the points take, and where in `memory` (of no bytes, as long as there is none) the answers are.
+/// Reports how much memory all owners of the points need, and where in `memory` (size 0 if it does not exist yet) the
+/// results are.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_owner_parts(
     scene: *const OlbvhScene,
@@ -133,8 +138,9 @@ pub extern "C" fn olbvh_owner_parts(
     })
 }
 
-/// Records all owners of points: the tetrahedra that contain each, ascending, point by point, a word each in `found`. As many are written as that
-/// holds; `ends` and `total` of `olbvh_owner_parts` are right in any case. Of the location, points, stride, count and tolerance are read.
+/// Records the search for all owners of points, that is for all tetrahedra that contain each of them: a word each in
+/// `found`, point by point, ascending for each point. Only as many as fit `found` are written; `ends` and `total` of
+/// `olbvh_owner_parts` are correct in any case. Of `location`, only points, stride, count and tolerance are used.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_owners(
     recording: *mut OlbvhRecording,
@@ -153,8 +159,8 @@ pub extern "C" fn olbvh_cmd_owners(
     })
 }
 
-/// Records the values of a field at points that have been located: a float each in `values`, NaN without an owner. Of the location, count, owners and
-/// barycentrics are read, by compute shaders.
+/// Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point
+/// without an owner. Of `location`, only count, owners and barycentrics are used; compute shaders read the latter two.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_interpolate(
     recording: *mut OlbvhRecording,

@@ -1,33 +1,35 @@
-//! Overlap of two meshes: which tetrahedra meet the other mesh, and the pairs that meet.
+//! The C interface to the overlap of two meshes: which tetrahedra intersect the other mesh, and which pairs intersect.
 
 use super::scene::OlbvhScene;
 use super::{OlbvhBuffer, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::query::{OverlapMemory, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap};
 
-/// Memory of the overlap of two meshes, and where in it the answers are.
+/// Memory for the overlap of two meshes, and where in it the results are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhOverlapParts {
-    /// Bytes of the memory.
+    /// Size of the memory in bytes.
     pub bytes: u64,
-    /// For A and for B a bit per tetrahedron, the lowest of a word first: it intersects the other mesh.
+    /// For A and for B: one bit per tetrahedron, lowest bit of a word first, set if it intersects the other mesh.
     pub hits: [OlbvhBuffer; 2],
-    /// For A and for B; the fifth word of either counts the tetrahedra that need another round, whose bits are 0.
+    /// For A and for B: the fifth word counts the tetrahedra that need another round; their bits are 0 until then.
     pub status: [OlbvhBuffer; 2],
 }
 
-/// Memory of the pairs of two meshes, and where in it the answers are.
+/// Memory for the pairs of two meshes, and where in it the results are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhPairParts {
-    /// Bytes of the memory.
+    /// Size of the memory in bytes.
     pub bytes: u64,
-    /// Words 4 and 5: tetrahedra of A that need another round to be counted, and to have their pairs written. Words 8 and 9: pairs, the lower first.
+    /// Words, counted from 0. Word 4: tetrahedra of A that need another round of counting. Word 5: tetrahedra of A that
+    /// need another round for their pairs to be written. Words 8 and 9: number of pairs, lower word first.
     pub status: OlbvhBuffer,
 }
 
-/// Tells what memory the overlap of two meshes takes, and where in `memory` (of no bytes, as long as there is none) the answers are.
+/// Reports how much memory the overlap of two meshes needs, and where in `memory` (size 0 if it does not exist yet) the
+/// results are.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_overlap_parts(
     a: *const OlbvhScene,
@@ -42,7 +44,8 @@ pub extern "C" fn olbvh_overlap_parts(
     })
 }
 
-/// Records which tetrahedra of A intersect B and which of B intersect A; the points of both lie in one space. Three rounds are enough for most.
+/// Records the search for the tetrahedra of A that intersect B, and of B that intersect A. The points of both meshes
+/// are in the same coordinate system. Three rounds are enough for most meshes.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_overlap(
     recording: *mut OlbvhRecording,
@@ -58,7 +61,8 @@ pub extern "C" fn olbvh_cmd_overlap(
     })
 }
 
-/// Tells what memory the pairs of A with another mesh take, and where in `memory` (of no bytes, as long as there is none) the status is.
+/// Reports how much memory the pairs of A with another mesh need, and where in `memory` (size 0 if it does not exist
+/// yet) the status is.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_pair_parts(a: *const OlbvhScene, memory: OlbvhBuffer, out: *mut OlbvhPairParts) -> OlbvhStatus {
     border(|| {
@@ -68,8 +72,8 @@ pub extern "C" fn olbvh_pair_parts(a: *const OlbvhScene, memory: OlbvhBuffer, ou
     })
 }
 
-/// Records how many pairs of a tetrahedron of A and one of B touch; the tree over B has all lists (`lists` 0). But for `assign` 0, a pair counts once per
-/// leaf that lists both.
+/// Records the counting of the pairs of a tetrahedron of A and one of B that touch. The tree over B must have full
+/// lists (`lists` 0). Unless its `assign` is 0, a pair is counted once for every leaf that lists both.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_count_pairs(
     recording: *mut OlbvhRecording,
@@ -85,8 +89,9 @@ pub extern "C" fn olbvh_cmd_count_pairs(
     })
 }
 
-/// Records the pairs themselves, once they are counted: two words each in `found`, the tetrahedron of A and that of B, ascending by A. As many are written
-/// as that holds. Begins with a barrier; if it goes on where an earlier recording ended, with a transfer write of the status.
+/// Records the writing of the pairs, after they have been counted: two words each in `found`, the tetrahedron of A and
+/// that of B, ascending by A. Only as many as fit `found` are written. Starts with a barrier; if it continues where an
+/// earlier recording ended, it starts with a transfer write of the status.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_list_pairs(
     recording: *mut OlbvhRecording,

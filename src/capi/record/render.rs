@@ -1,4 +1,4 @@
-//! Pictures, and the ranges of values by which their nodes are skipped.
+//! The C interface to pictures, and to the ranges of values by which nodes are skipped.
 
 use super::scene::OlbvhScene;
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
@@ -11,55 +11,63 @@ use crate::query::{RenderInput, RenderMemory, Scene, Shown, StructureView, cmd_r
 use crate::render::{Bounds, Plan};
 use std::mem::offset_of;
 
-/// What a picture shows, for the device: `olbvh_view_make` fills it, and the host copies it as it is to where `olbvh_picture.view` lies.
+/// What a picture shows, in the form that the device reads. `olbvh_view_make` fills it; the host copies it unchanged to
+/// `olbvh_picture.view`.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhView {
-    /// Rays, light, step, range of values, iso-surfaces.
+    /// Rays, light, step, range of values, and values of iso-surfaces.
     pub frame: [u32; 64],
     /// The transfer function over the range of values: colour, and opacity of one step or of one surface.
     pub table: [[f32; 4]; 1024],
-    /// Ranges of values outside of which nothing is to be seen, ascending and apart; behind the last stand such as no value lies in.
+    /// Ranges of values outside of which nothing is visible, ascending and disjoint. Unused ranges at the end contain
+    /// no value.
     pub drawn: [[f32; 2]; 512],
-    /// How many of them there are.
+    /// Number of ranges in `drawn` that are used.
     pub drawn_count: u32,
 }
 
-/// What is drawn, and where. Contents are read when the commands are executed, so a new view or new values need no new recording.
+/// What is drawn, and where. The contents of the buffers are read when the commands are executed, so a new view or new
+/// values need no new recording.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhPicture {
-    /// Pixels in a row.
+    /// Width in pixels.
     pub width: u32,
-    /// Rows.
+    /// Height in pixels.
     pub height: u32,
-    /// Not 0: the iso-surfaces that the view has, instead of the volume.
+    /// Not 0: the iso-surfaces of the view are drawn instead of the volume.
     pub iso: u32,
-    /// With ranges: ranges of the view that are looked at, its `drawn_count` or more, up to 512.
+    /// Used if `ranges` is given: how many ranges of the view are considered, at least its own `drawn_count`, up to
+    /// 512.
     pub drawn_count: u32,
-    /// An `olbvh_view`.
+    /// Buffer with an `olbvh_view`.
     pub view: OlbvhBuffer,
-    /// What is shown.
+    /// The field that is drawn.
     pub field: OlbvhField,
-    /// Three floats per point of the mesh, normals of length up to 1 by which the volume is lit. Of no bytes: it is not lit.
+    /// Optional (size 0: no lighting): three floats per point of the mesh, normals of length up to 1 by which the
+    /// volume is lit.
     pub normals: OlbvhBuffer,
-    /// The ranges of the field that `olbvh_cmd_ranges` records: nodes without a value to be seen are skipped. Of no bytes: nothing is. The picture is the same.
+    /// Optional (size 0: nothing is skipped): the ranges that `olbvh_cmd_ranges` records for the field, by which nodes
+    /// without visible values are skipped. The picture is the same either way.
     pub ranges: OlbvhBuffer,
-    /// Memory of `olbvh_picture_parts`.
+    /// Memory of the size that `olbvh_picture_parts` reports.
     pub memory: OlbvhBuffer,
-    /// A round takes up to 1,024 samples of every ray. No round, from the beginning, prepares the picture and leaves it empty.
+    /// A round takes up to 1,024 samples of every ray. A `count` of 0 without `resume` prepares the picture and leaves
+    /// it empty.
     pub rounds: OlbvhRounds,
 }
 
-/// Memory of a picture, and where in it the answers are.
+/// Memory for a picture, and where in it the results are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhPictureParts {
-    /// Bytes of the memory.
+    /// Size of the memory in bytes.
     pub bytes: u64,
-    /// Per pixel, the upper row first, four floats: colour, multiplied by its opacity, and opacity.
+    /// Four floats per pixel, upper row first: colour multiplied by its opacity, and opacity.
     pub colors: OlbvhBuffer,
-    /// Words: samples taken, those in the mesh, those skipped, two words each, the lower first; then rays that need another round.
+    /// Three numbers of two words each, lower word first: samples taken, samples in the mesh, samples skipped. Then a
+    /// word: rays that need another round.
     pub status: OlbvhBuffer,
 }
 
@@ -70,8 +78,9 @@ impl OlbvhPicture {
     }
 }
 
-/// Works out what a picture shows of a mesh whose points lie within the box from `lo` to `hi`, three floats each: the camera is placed by it, and lengths are
-/// measured by its diagonal. Without a range in the settings, values reach from 0 to 1.
+/// Computes what a picture shows of a mesh whose points lie in the box from `lo` to `hi`, three floats each. The camera
+/// is placed relative to this box, and default lengths are fractions of its diagonal. If the settings give no range of
+/// values, it is 0 to 1.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_view_make(
     settings: *const OlbvhPictureSettings,
@@ -86,21 +95,22 @@ pub extern "C" fn olbvh_view_make(
         let frame = plan.view();
         view.frame.iter_mut().zip(bytemuck::cast_slice(std::slice::from_ref(&frame))).for_each(|(to, word)| *to = *word);
         view.table.iter_mut().zip(&plan.table).for_each(|(to, entry)| *to = *entry);
-        // Ranges apart have three entries of the table each, so there is room for all.
+        // Disjoint ranges take at least three entries of the table each, so there is room for all.
         view.drawn.iter_mut().zip(&plan.drawn).for_each(|(to, range)| *to = *range);
         view.drawn_count = plan.drawn.len() as u32;
         put(out, view)
     })
 }
 
-/// Tells how many bytes the ranges of a field take.
+/// Reports how many bytes the ranges of a field take.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_range_bytes(scene: *const OlbvhScene, out: *mut u64) -> OlbvhStatus {
     border(|| put(out, range_bytes(handle(scene, "scene")?.scene.tree.capacity.nodes)))
 }
 
-/// Records the smallest and the largest value of a field in every node of the tree into `ranges`; new values need this alone, not a new tree. Begins with a
-/// transfer write, ends with a barrier as `olbvh_cmd_barrier` records it.
+/// Records the computation of the smallest and the largest value of a field in every node of the tree, into `ranges`.
+/// New values of the field need only this, not a new tree. Starts with a transfer write and ends with a barrier like
+/// that of `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_ranges(
     recording: *mut OlbvhRecording,
@@ -115,7 +125,8 @@ pub extern "C" fn olbvh_cmd_ranges(
     })
 }
 
-/// Tells what memory a picture takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+/// Reports how much memory a picture needs, and where in its `memory` (size 0 if it does not exist yet) the results
+/// are.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_picture_parts(scene: *const OlbvhScene, picture: *const OlbvhPicture, out: *mut OlbvhPictureParts) -> OlbvhStatus {
     border(|| {
@@ -125,7 +136,7 @@ pub extern "C" fn olbvh_picture_parts(scene: *const OlbvhScene, picture: *const 
     })
 }
 
-/// Records the drawing of a picture. Where nodes are skipped, the tree is read by transfers as well.
+/// Records the drawing of a picture. If nodes are skipped, transfers read the tree as well.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const OlbvhScene, picture: *const OlbvhPicture) -> OlbvhStatus {
     recorded(recording, |r| {

@@ -1,4 +1,4 @@
-//! A mesh and its tree in memory of a host's, and their construction.
+//! The C interface to a mesh and its tree in the host's memory, and to their construction.
 
 use super::{OlbvhBuffer, OlbvhRecording, recorded};
 use crate::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
@@ -11,43 +11,46 @@ use crate::primitives::Arena;
 use crate::query::Scene;
 use crate::reference::grid::MAX_LEVEL;
 
-/// Entries per tetrahedron that there is room for where nothing else is asked for and lists are whole.
+/// Entries per tetrahedron for which there is room by default, if all leaves have full lists.
 const ENTRIES: u32 = 24;
 
-/// What is known of a mesh and its tree before there is memory for them.
+/// What must be known of a mesh and its tree before memory is allocated for them.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhPlan {
-    /// Points.
+    /// Number of points.
     pub points: u32,
-    /// 32-bit floats from one point to the next, at least 3.
+    /// Distance from one point to the next in 32-bit floats, at least 3.
     pub stride: u32,
-    /// Tetrahedra.
+    /// Number of tetrahedra.
     pub tets: u32,
-    /// Deepest level that the leaves may have, up to 10.
+    /// Deepest level that the leaves may have, at most 10.
     pub level: u32,
-    /// At least the entries of the longest leaf, 0: any number. Location takes a dispatch for every 16,384 of them.
+    /// Upper bound on the number of entries of a leaf; 0: unknown. If it is too low, points are lost. Location records
+    /// one dispatch for every 16,384 entries, at most 16 dispatches.
     pub longest_leaf: u32,
-    /// How to build. Without a capacity there is room for 8 entries per tetrahedron (24 where all are listed), or for what the budget allows; trees that need more
-    /// get coarser.
+    /// How to build the tree. If both a capacity and a budget are given, the smaller one holds. If neither is given,
+    /// there is room for 8 entries per tetrahedron, or 24 if all leaves have full lists. A tree that would need more is
+    /// made coarser.
     pub build: OlbvhBuildOptions,
 }
 
-/// What memory a plan wants.
+/// Memory that a plan needs.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhPlanSizes {
-    /// Bytes of mesh and tree, kept as long as the tree is asked.
+    /// Bytes for mesh and tree, kept as long as the tree is queried.
     pub memory: u64,
-    /// Bytes in use while building only; frames in flight on one queue can share them.
+    /// Bytes used only during construction; frames in flight on one queue can share them.
     pub scratch: u64,
-    /// Offsets of parts are multiples of this.
+    /// Offsets of parts of buffers must be multiples of this.
     pub alignment: u64,
-    /// `VkBufferUsageFlags` of every buffer, with buffer addresses `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT` among them.
+    /// `VkBufferUsageFlags` that every buffer needs; where buffer addresses are used, they include
+    /// `VK_BUFFER_USAGE_SHADER_DEVICE_ADDRESS_BIT`.
     pub usage: u32,
 }
 
-/// A mesh and its tree in memory of the host's.
+/// A mesh and its tree in the host's memory.
 pub struct OlbvhScene {
     pub(super) gpu: Gpu,
     pub(super) scene: Scene,
@@ -56,19 +59,21 @@ pub struct OlbvhScene {
     build_scratch: BuildScratch,
 }
 
-/// Where the arrays of a scene are: what olbvh.glsl gets.
+/// Where the arrays of a scene are, as olbvh.glsl needs them.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhSceneArrays {
-    /// The content of the buffer whose address `olbvh_open` gets. By descriptors that buffer is the first of the bindings.
+    /// Content of the buffer whose address is passed to `olbvh_open`. With descriptors, this buffer is the first
+    /// binding.
     pub addresses: [u32; 22],
-    /// The buffers of the other bindings, in order.
+    /// Buffers of the other bindings, in order.
     pub bindings: [OlbvhBuffer; 10],
-    /// What was built, in words: level of the leaves, level that was asked for, candidates, entries, nodes, internal nodes, leaves, …
+    /// What was built, in words: level of the leaves, level that was requested, candidates, entries, nodes, internal
+    /// nodes, leaves, …
     pub status: OlbvhBuffer,
 }
 
-/// What a plan means.
+/// A plan with its defaults resolved.
 struct Planned {
     options: BuildOptions,
     capacity: Capacity,
@@ -81,7 +86,11 @@ impl OlbvhPlan {
             return Err(Error::Invalid(format!("level {} is beyond {MAX_LEVEL}", self.level)));
         }
         let capacity = match (options.capacity, options.budget.take()) {
-            (Some(entries), _) => Capacity::for_entries(entries, self.level),
+            (Some(entries), Some(bytes)) => {
+                let within = Capacity::for_bytes(bytes, self.level, &options)?;
+                if within.entries < entries { within } else { Capacity::for_entries(entries, self.level) }
+            }
+            (Some(entries), None) => Capacity::for_entries(entries, self.level),
             (None, Some(bytes)) => Capacity::for_bytes(bytes, self.level, &options)?,
             (None, None) if options.lists == Lists::Boundary => Capacity::usual(self.tets, self.level),
             (None, None) => Capacity::for_entries(self.tets.saturating_mul(ENTRIES), self.level),
@@ -99,7 +108,7 @@ impl OlbvhPlan {
     }
 }
 
-/// Tells what memory a plan wants.
+/// Reports how much memory a plan needs.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPlan, out: *mut OlbvhPlanSizes) -> OlbvhStatus {
     border(|| {
@@ -115,8 +124,9 @@ pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPla
     })
 }
 
-/// A scene of that plan: `positions` and `cells` (four indices per tetrahedron) are read whenever it is built, `memory` and `scratch` are of the sizes
-/// measured. The host keeps the buffers as long as it records with the scene.
+/// Makes a scene for a plan. `positions` and `cells` (four indices per tetrahedron) are read whenever its tree is
+/// built; `memory` and `scratch` have the sizes that `olbvh_plan_measure` reported. The host keeps the buffers as long
+/// as it records with the scene.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_scene_place(
     gpu: *const OlbvhGpu,
@@ -130,7 +140,7 @@ pub extern "C" fn olbvh_scene_place(
     border(|| {
         let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
         let OlbvhPlan { points, stride, tets, .. } = *plan;
-        let needed = (4 * (u64::from(stride) * u64::from(points.saturating_sub(1)) + 3), 16 * u64::from(tets));
+        let needed = ((u64::from(stride) * u64::from(points.saturating_sub(1)) + 3).saturating_mul(4), 16 * u64::from(tets));
         if positions.size < needed.0 || cells.size < needed.1 {
             let text =
                 format!("{} bytes of positions and {} of cells; the plan has {} and {}", positions.size, cells.size, needed.0, needed.1);
@@ -147,26 +157,27 @@ pub extern "C" fn olbvh_scene_place(
     })
 }
 
-/// Lets a scene go, but not its buffers; null is allowed.
+/// Frees a scene, but not its buffers; null is allowed.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_scene_free(scene: *mut OlbvhScene) {
     release(scene);
 }
 
-/// Tells where the arrays of a scene are. `field`, a float per point, may be null.
+/// Reports where the arrays of a scene are. `field`, a float per point, may be null.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const OlbvhBuffer, out: *mut OlbvhSceneArrays) -> OlbvhStatus {
     border(|| {
         let scene = &handle(scene, "scene")?.scene;
-        // SAFETY: the caller passes null or a buffer.
+        // SAFETY: the caller passes null or a valid `OlbvhBuffer`.
         let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, unsafe { field.as_ref() }.map(OlbvhBuffer::part));
         let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
         put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status: scene.tree.status.into() })
     })
 }
 
-/// Records the construction of a scene's tree for the positions there are then. Reads positions and cells in compute shaders, uses memory and scratch in
-/// compute shaders and transfers, and ends with a barrier as `olbvh_cmd_barrier` records it.
+/// Records the construction of a scene's tree for the positions at the time of execution. Reads positions and cells in
+/// compute shaders, uses memory and scratch in compute shaders and transfers, and ends with a barrier like that of
+/// `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
     recorded(recording, |r| {

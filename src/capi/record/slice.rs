@@ -1,4 +1,4 @@
-//! Slices.
+//! The C interface to slices.
 
 use super::scene::OlbvhScene;
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
@@ -7,7 +7,7 @@ use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::query::{SliceInput, SliceMemory, StructureView, cmd_slice};
 use crate::slicing::{Extrapolate, Rows};
 
-/// Which voxels are sliced, and where the answers go.
+/// Which voxels are sliced, and where the results go.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhSlicing {
@@ -15,37 +15,40 @@ pub struct OlbvhSlicing {
     pub voxels: OlbvhVoxels,
     /// Layer of the first row that is sliced now.
     pub layer: u32,
-    /// Number of that row in its layer.
+    /// Number of this row in its layer.
     pub first: u32,
-    /// Rows; behind the last of a layer comes the first of the next. In whole layers, or parts of one that begin at multiples of 64 rows, voxels have the same
-    /// owners as in the whole stack where cells overlap, too.
+    /// Number of rows; the last row of a layer is followed by the first row of the next. If whole layers are sliced, or
+    /// parts of one layer that start at multiples of 64 rows, voxels have the same owners as in the whole stack even
+    /// where tetrahedra overlap.
     pub rows: u32,
-    /// As `olbvh_slice` takes it.
+    /// Which value touched voxels get, as for `olbvh_slice`.
     pub linear: u32,
-    /// The field, or one whose values are of no bytes: none.
+    /// Optional (`values` of size 0: none): the field.
     pub field: OlbvhField,
-    /// Memory of `olbvh_slicing_parts`.
+    /// Memory of the size that `olbvh_slicing_parts` reports.
     pub memory: OlbvhBuffer,
-    /// One is enough but where leaves hold thousands of tetrahedra.
+    /// Rounds of the search; one is enough unless leaves hold thousands of tetrahedra.
     pub rounds: OlbvhRounds,
 }
 
-/// Memory of a slice, and where in it the answers are.
+/// Memory for a slice, and where in it the results are.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhSlicingParts {
-    /// Bytes of the memory: 29 per voxel, and 32 per run of 64 voxels below each other in a layer.
+    /// Size of the memory in bytes: 29 per voxel, and 32 per run of 64 voxels in the same column of a layer.
     pub bytes: u64,
-    /// A word per voxel, row by row, as `olbvh_slice` gives it.
+    /// A word per voxel, row by row, as for `olbvh_slice`.
     pub answers: OlbvhBuffer,
-    /// A float per voxel: the value, NaN where it is empty; not written without a field.
+    /// A float per voxel: the value, NaN if the voxel is empty; not written without a field.
     pub values: OlbvhBuffer,
-    /// Words: runs of voxels and voxels that need another round, and until there are none nothing else is to be used; why all are empty (1: the boxes are flat,
-    /// 2: they are more than twice as large as the mesh), or 0; voxels with their centre in the mesh, those that it merely touches, those that it does not.
+    /// Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
+    /// used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are more than twice as
+    /// large as the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
+    /// touches, voxels that it does not touch.
     pub status: OlbvhBuffer,
 }
 
-/// Tells what memory a slice takes, and where in its `memory` (of no bytes, as long as there is none) the answers are.
+/// Reports how much memory a slice needs, and where in its `memory` (size 0 if it does not exist yet) the results are.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut OlbvhSlicingParts) -> OlbvhStatus {
     border(|| {
@@ -57,7 +60,7 @@ pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut Ol
     })
 }
 
-/// Records the slicing of rows of voxels. The status is written by transfers as well.
+/// Records the slicing of rows of voxels. Transfers write the status as well.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const OlbvhScene, slicing: *const OlbvhSlicing) -> OlbvhStatus {
     recorded(recording, |r| {

@@ -1,4 +1,4 @@
-//! Every query as a C program asks it, recorded and owned: the same bytes as from Rust.
+//! Tests of every query, recorded and owning, as a C program calls it: the results are the same bytes as from Rust.
 
 use super::*;
 use crate::capi::query::*;
@@ -35,7 +35,7 @@ fn values(mesh: &Mesh) -> Vec<f32> {
     mesh.points.iter().map(|p| p[0] - 0.5 * p[2]).collect()
 }
 
-/// What Rust finds.
+/// Results of the Rust interface.
 struct Expected {
     colors: Vec<[f32; 4]>,
     answers: Vec<u32>,
@@ -79,7 +79,7 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
     }
 }
 
-/// A scene of the host's, and the buffers it stands on.
+/// A scene in the host's memory, and its buffers.
 struct Stage {
     scene: *mut OlbvhScene,
     positions: Buffer,
@@ -89,7 +89,7 @@ struct Stage {
 fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
     let device = &handle(gpu, "gpu").unwrap().0;
     let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
-    // Lists of boxes, by which pairs are found once.
+    // Lists by bounding box, with which every pair is found once.
     let build = OlbvhBuildOptions { lists: 0, assign: 0, ..olbvh_default_build_options() };
     let plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build };
     let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
@@ -112,7 +112,7 @@ fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
     all
 }
 
-/// All of it in one command buffer, after a rehearsal, twice.
+/// Records all queries in one command buffer, after a rehearsal, twice.
 pub fn recorded(gpu: *mut OlbvhGpu) {
     let device = &handle(gpu, "gpu").unwrap().0;
     let meshes = meshes();
@@ -125,7 +125,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
 
     let [a, b] = meshes.each_ref().map(|mesh| stage(gpu, mesh));
     let count = meshes[0].points.len() as u32;
-    // SAFETY: a view is made of words.
+    // SAFETY: a view consists of 32-bit words without padding.
     let words = unsafe { std::slice::from_raw_parts((&raw const view).cast::<u32>(), size_of_val(&view) / 4) };
     let view = device.upload("olbvh.test.view", words).unwrap();
     let (values, normals) = (device.upload("olbvh.test.field", &values(&meshes[0])), device.upload("olbvh.test.normals", &normals));
@@ -243,7 +243,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     pairs.sort_unstable();
     assert!(pairs.len() > 100 && pairs == expected.pairs);
 
-    // Too small is told beforehand.
+    // Buffers that are too small are refused during recording.
     slicing.memory.size -= 256;
     location.owners.size -= 1;
     ok(olbvh_recording_begin(recording, 0, 0, 0));
@@ -255,7 +255,8 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     olbvh_scene_free(b.scene);
 }
 
-/// As in Rust; and of a mesh in another order, which is brought back, the same but for who owns what is shared.
+/// Compares the owning calls with the Rust interface. With a reordered mesh the results are mapped back to the caller's
+/// numbers and differ only in the owners of shared faces, edges and vertices.
 pub fn owned(gpu: *mut OlbvhGpu) {
     let device = &handle(gpu, "gpu").unwrap().0;
     let [mesh, other] = meshes();

@@ -1,4 +1,4 @@
-//! Pictures.
+//! Writer for pictures.
 
 use std::io::Write as _;
 use std::path::Path;
@@ -9,7 +9,7 @@ use crate::error::{Error, Result};
 /// Writes a PNG of 8-bit RGBA pixels, row by row from the top.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the size does not fit the pixels, [`Error::Io`] if it cannot be written.
+/// [`Error::Invalid`] if the number of pixels does not match the size, [`Error::Io`] if the file cannot be written.
 pub fn write_png(path: impl AsRef<Path>, width: u32, height: u32, rgba: &[u8]) -> Result<()> {
     let path = path.as_ref();
     if rgba.len() as u64 != 4 * u64::from(width) * u64::from(height) || rgba.is_empty() {

@@ -1,4 +1,4 @@
-//! Results of point location.
+//! Writer for the results of point location.
 
 use std::io::Write;
 use std::path::Path;
@@ -16,7 +16,7 @@ use crate::formats::npy;
 pub struct Located<'a> {
     /// The points, in the coordinates of the mesh file.
     pub points: &'a [[f64; 3]],
-    /// Cell that owns each point; `0xFFFF_FFFF`: none.
+    /// Id of the cell that owns each point; `u32::MAX`: none.
     pub owner: &'a [u32],
     /// Barycentric coordinates in that cell.
     pub bary: &'a [[f32; 4]],
@@ -25,7 +25,7 @@ pub struct Located<'a> {
 }
 
 impl Located<'_> {
-    /// Formats that [`write_located`] knows.
+    /// Formats that [`write_located`] supports.
     pub const FORMATS: [OutputFormat; 5] = [OutputFormat::Npy, OutputFormat::Npz, OutputFormat::Csv, OutputFormat::Vtu, OutputFormat::Json];
 
     fn value(&self, i: usize) -> f32 {
@@ -33,12 +33,14 @@ impl Located<'_> {
     }
 }
 
-/// Writes owners, barycentric coordinates and values by the ending of `path`: `.npy` (an array of records `owner` u4, `bary` 4×f4, `value`
-/// f4), `.npz` (arrays `owner`, `bary` and, with a field, `value`), `.csv` (owner, b0 to b3, value), `.vtu` (the points as vertices)
-/// or `.json`. Without a field the values are NaN (`null` in JSON).
+/// Writes owners, barycentric coordinates and values in the format that the extension of `path` selects: `.npy` (an
+/// array of records `owner` u4, `bary` 4×f4, `value` f4), `.npz` (arrays `owner`, `bary` and, with a field, `value`),
+/// `.csv` (columns owner, b0 to b3, value), `.vtu` (the points as vertices) or `.json`. Without a field, values are NaN
+/// (`null` in JSON).
 ///
 /// # Errors
-/// [`Error::Invalid`] for another ending or arrays of different lengths, [`Error::Io`] if it cannot be written.
+/// [`Error::Invalid`] for another extension or for arrays of different lengths, [`Error::Io`] if the file cannot be
+/// written.
 pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()> {
     let path = path.as_ref();
     let format = OutputFormat::of(path, &Located::FORMATS)?;

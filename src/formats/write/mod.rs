@@ -1,5 +1,5 @@
-//! Result files. Every one is written beside its target and renamed when it is complete, so that a reader never sees half a file
-//! and a failure leaves the old one in place.
+//! Writers for result files. Every file is written under a temporary name in the same folder and renamed when it is
+//! complete, so that a reader never sees half a file, and a failure leaves an existing file unchanged.
 
 mod image;
 mod located;
@@ -23,7 +23,7 @@ pub use slices::{SliceGrid, SliceWriter};
 pub use voxels::{Channel, VoxelPackage, VoxelWriter};
 pub use vtu::write_mesh;
 
-/// A format of results, by the ending of the path.
+/// A format of results, selected by the extension of the path.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum OutputFormat {
     /// A NumPy array.
@@ -59,10 +59,10 @@ impl OutputFormat {
         (Self::Md, "md"),
     ];
 
-    /// The format of `path`, which must be one of `allowed`. Ask before long work.
+    /// The format of `path`, which must be one of `allowed`. Call this before long work.
     ///
     /// # Errors
-    /// [`Error::Invalid`] that lists the endings that are allowed.
+    /// [`Error::Invalid`] that lists the allowed extensions.
     pub fn of(path: impl AsRef<Path>, allowed: &[Self]) -> Result<Self> {
         let path = path.as_ref();
         let ending = ending(path);
@@ -74,7 +74,7 @@ impl OutputFormat {
     }
 }
 
-/// A file that takes its place when it is complete; dropped before that, nothing is left of it.
+/// A file that appears at its path when it is complete; if it is dropped before that, nothing remains of it.
 pub struct OutputFile {
     target: PathBuf,
     file: Target,
@@ -82,19 +82,19 @@ pub struct OutputFile {
 
 enum Target {
     Temporary(BufWriter<NamedTempFile>),
-    /// Devices and pipes cannot be renamed to.
+    /// A device or pipe, which cannot be replaced by renaming.
     Direct(BufWriter<File>),
 }
 
 impl OutputFile {
-    /// Begins a file that will be at `path`.
+    /// Creates a file that will appear at `path`.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder cannot be written to.
+    /// [`Error::Io`] if the folder is not writable.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let fail = |source| Error::Io { path: path.into(), source };
-        // A link stays a link; what it points to is replaced.
+        // A symbolic link is kept; the file that it points to is replaced.
         let target = path.canonicalize().unwrap_or_else(|_| path.into());
         if let Ok(meta) = std::fs::metadata(&target)
             && !meta.is_file()
@@ -115,10 +115,10 @@ impl OutputFile {
         Ok(Self { target, file: Target::Temporary(BufWriter::with_capacity(1 << 18, file)) })
     }
 
-    /// Completes the file and moves it to its place.
+    /// Completes the file and moves it to its path.
     ///
     /// # Errors
-    /// [`Error::Io`] if the rest cannot be written.
+    /// [`Error::Io`] if the remaining data cannot be written.
     pub fn commit(self) -> Result<()> {
         let path = self.target.clone();
         let fail = |source| Error::Io { path: path.clone(), source };
@@ -131,7 +131,7 @@ impl OutputFile {
         }
     }
 
-    /// Names the file in an error.
+    /// Makes an error that names the file.
     pub(crate) fn fail(&self, source: std::io::Error) -> Error {
         Error::Io { path: self.target.clone(), source }
     }
@@ -162,17 +162,17 @@ impl Seek for OutputFile {
     }
 }
 
-/// A file made by `write` in one go.
+/// Creates a file, lets `write` fill it, and completes it.
 pub(crate) fn write_file(path: &Path, write: impl FnOnce(&mut OutputFile) -> std::io::Result<()>) -> Result<()> {
     let mut file = OutputFile::create(path)?;
     write(&mut file).map_err(|error| file.fail(error))?;
     file.commit()
 }
 
-/// Writes anything as JSON.
+/// Writes a value as JSON.
 ///
 /// # Errors
-/// [`Error::Io`] if it cannot be written.
+/// [`Error::Io`] if the file cannot be written.
 pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<()> {
     write_file(path.as_ref(), |file| {
         serde_json::to_writer(&mut *file, value)?;
@@ -180,9 +180,9 @@ pub fn write_json(path: impl AsRef<Path>, value: &impl Serialize) -> Result<()> 
     })
 }
 
-/// A number that a NumPy array can hold.
+/// A number type that a NumPy array can hold.
 pub trait NpyNumber: bytemuck::Pod {
-    /// Type name of NumPy.
+    /// The type in NumPy's notation, as a Python literal.
     const DESCR: &'static str;
 }
 
@@ -202,10 +202,10 @@ impl NpyNumber for u8 {
     const DESCR: &'static str = "'|u1'";
 }
 
-/// Writes an array of that shape, last index fastest.
+/// Writes a NumPy array of this shape, with the last index varying fastest.
 ///
 /// # Errors
-/// [`Error::Invalid`] if the shape does not fit the data, [`Error::Io`] if they cannot be written.
+/// [`Error::Invalid`] if the shape does not match the data, [`Error::Io`] if the file cannot be written.
 pub fn write_npy<T: NpyNumber>(path: impl AsRef<Path>, shape: &[usize], data: &[T]) -> Result<()> {
     let path = path.as_ref();
     if shape.iter().product::<usize>() != data.len() {
@@ -217,7 +217,7 @@ pub fn write_npy<T: NpyNumber>(path: impl AsRef<Path>, shape: &[usize], data: &[
     })
 }
 
-/// Text as the value of an XML attribute; what XML cannot hold becomes U+FFFD.
+/// Escapes text for an XML attribute; characters that XML cannot hold become U+FFFD.
 pub(crate) fn xml_attribute(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {

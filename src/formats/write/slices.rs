@@ -1,4 +1,4 @@
-//! Stacks of slices, written layer by layer: they may be larger than memory.
+//! Writer for stacks of slices, layer by layer, because they may be larger than memory.
 
 use std::fmt::Write as _;
 use std::io::{Seek, SeekFrom, Write};
@@ -9,38 +9,39 @@ use super::{NpyNumber, OutputFile, OutputFormat};
 use crate::error::{Error, Result};
 use crate::formats::npy;
 
-/// Voxels of a stack of slices.
+/// Geometry of a stack of slices.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SliceGrid {
     /// Width, height, number of layers.
     pub size: [u32; 3],
     /// Centre of the first voxel, in the coordinates of the mesh file.
     pub origin: [f64; 3],
-    /// Distance of neighbours along width, height and layers.
+    /// Distance between neighbouring voxels along width, height and layers.
     pub spacing: [f64; 3],
     /// Unit vectors along width, height and layers.
     pub axes: [[f64; 3]; 3],
 }
 
-/// Writes slices as `X.npy` (layers × height × width, f32, NaN = empty) with `X.kind.npy` (u8: 0 empty, 1 touched, 2 inside) and, if
-/// wanted, `X.owner.npy` (u32) beside it, or as one `.vti`, an image of the voxels' centres with arrays of these names.
+/// Writes slices as `X.npy` (layers × height × width, f32, NaN = empty) together with `X.kind.npy` (u8: 0 empty, 1
+/// touched, 2 inside) and, on request, `X.owner.npy` (u32); or as one `.vti`, an image whose points are the voxels'
+/// centres, with arrays `value`, `kind` and `owner`.
 pub struct SliceWriter {
     grid: SliceGrid,
     layer: u32,
-    /// Files, and which of them holds value, kind and owner from which byte on.
+    /// The files, and in `places`, for value, kind and owner, the index of the file and the byte where the data start.
     files: Vec<OutputFile>,
     places: Vec<(usize, u64)>,
     tail: &'static [u8],
 }
 
 impl SliceWriter {
-    /// Formats that it knows.
+    /// Formats that the writer supports.
     pub const FORMATS: [OutputFormat; 2] = [OutputFormat::Npy, OutputFormat::Vti];
 
-    /// Begins the files.
+    /// Creates the files.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for another ending, [`Error::Io`] if they cannot be written.
+    /// [`Error::Invalid`] for another extension, [`Error::Io`] if the files cannot be written.
     pub fn create(path: impl AsRef<Path>, grid: SliceGrid, owners: bool) -> Result<Self> {
         let path = path.as_ref();
         let format = OutputFormat::of(path, &Self::FORMATS)?;
@@ -74,7 +75,7 @@ impl SliceWriter {
         let SliceGrid { size, origin, spacing, axes } = self.grid;
         let [x, y, z] = size.map(|n| i64::from(n) - 1);
         let extent = format!("0 {x} 0 {y} 0 {z}");
-        // The matrix whose columns are the axes.
+        // The matrix whose columns are the axes, row by row.
         let direction: Vec<f64> = (0..3).flat_map(|row| axes.map(|axis| axis[row])).collect();
         let mut xml = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"{BYTE_ORDER}\" header_type=\"UInt64\">\n<ImageData WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\">\n<Piece Extent=\"{extent}\">\n<PointData Scalars=\"value\">\n",
@@ -110,10 +111,11 @@ impl SliceWriter {
         Ok(())
     }
 
-    /// Appends a layer: values (NaN where empty), kinds and, if they were announced, owners, row by row.
+    /// Appends a layer, row by row: values (NaN where empty), kinds and, if requested at creation, owners.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if the number of voxels is wrong or all layers are there, [`Error::Io`] if they cannot be written.
+    /// [`Error::Invalid`] if the number of voxels is wrong or all layers have been written, [`Error::Io`] if the files
+    /// cannot be written.
     pub fn layer(&mut self, values: &[f32], kinds: &[u8], owners: Option<&[u32]>) -> Result<()> {
         let voxels = self.grid.size[0] as usize * self.grid.size[1] as usize;
         let wrong = values.len() != voxels || kinds.len() != voxels || owners.is_some_and(|o| o.len() != voxels);
@@ -140,7 +142,7 @@ impl SliceWriter {
     /// Completes the files.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if layers are missing, [`Error::Io`] if the rest cannot be written.
+    /// [`Error::Invalid`] if layers are missing, [`Error::Io`] if the remaining data cannot be written.
     pub fn finish(mut self) -> Result<()> {
         if self.layer != self.grid.size[2] {
             return Err(Error::Invalid(format!("{} of {} layers were written", self.layer, self.grid.size[2])));

@@ -1,4 +1,5 @@
-//! Layers of voxels for printers: SVX, a zip archive of a manifest and one picture per layer and channel (<https://abfab3d.com/svx-format/>).
+//! Writer for voxel packages for 3D printers in the SVX format: a zip archive of a manifest and one picture per layer
+//! and channel (<https://abfab3d.com/svx-format/>).
 
 use std::fmt::Write as _;
 use std::io::Write as _;
@@ -10,27 +11,27 @@ use zip::write::SimpleFileOptions;
 use super::{OutputFile, xml_attribute};
 use crate::error::{Error, Result};
 
-/// Voxels of a package.
+/// Description of a voxel package.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VoxelPackage {
     /// Width, height, number of layers.
     pub size: [u32; 3],
     /// Lower corner of the first voxel in metres.
     pub origin: [f64; 3],
-    /// Side of a voxel in metres.
+    /// Side length of a voxel in metres.
     pub voxel: f64,
-    /// A second channel beside the density.
+    /// A second channel in addition to the density.
     pub channel: Option<Channel>,
-    /// What the manifest says of the contents: key and value.
+    /// Metadata for the manifest: key and value.
     pub metadata: Vec<(String, String)>,
 }
 
-/// What the second channel holds, 8 bits a voxel.
+/// Content of the second channel, 8 bits per voxel.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Channel {
-    /// Numbers of materials, 0 for none.
+    /// Numbers of materials, 0 for none. The list holds the numbers in use.
     Material(Vec<u8>),
-    /// A field scaled to 0…255.
+    /// A field, scaled to 0…255.
     Custom,
 }
 
@@ -43,10 +44,11 @@ pub struct VoxelWriter {
 }
 
 impl VoxelWriter {
-    /// Begins a package.
+    /// Creates a package.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a size of 0 or no voxel size, [`Error::Io`] if it cannot be written.
+    /// [`Error::Invalid`] if a size is 0 or the voxel size is not positive and finite, [`Error::Io`] if the file cannot
+    /// be written.
     pub fn create(path: impl AsRef<Path>, package: VoxelPackage) -> Result<Self> {
         let path = path.as_ref();
         if package.size.contains(&0) || !(package.voxel > 0.0 && package.voxel.is_finite()) {
@@ -65,10 +67,10 @@ impl VoxelWriter {
         self.zip.write_all(bytes).map_err(|e| self.fail(e))
     }
 
-    /// Appends a layer, row 0 first: density (255 material, 0 none) and, if announced, the second channel.
+    /// Appends a layer, row 0 first: density (255 material, 0 none) and, if the package has one, the second channel.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for the wrong number of voxels, [`Error::Io`] if it cannot be written.
+    /// [`Error::Invalid`] if the number of voxels is wrong, [`Error::Io`] if the file cannot be written.
     pub fn layer(&mut self, density: &[u8], second: Option<&[u8]>) -> Result<()> {
         let [width, height, layers] = self.package.size;
         let voxels = width as usize * height as usize;
@@ -93,10 +95,10 @@ impl VoxelWriter {
         if matches!(self.package.channel, Some(Channel::Material(_))) { "material" } else { "value" }
     }
 
-    /// Writes the manifest and gives the file its name.
+    /// Writes the manifest and completes the file.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if layers are missing, [`Error::Io`] if it cannot be written.
+    /// [`Error::Invalid`] if layers are missing, [`Error::Io`] if the file cannot be written.
     pub fn finish(mut self) -> Result<()> {
         let VoxelPackage { size: [x, y, z], origin: [ox, oy, oz], voxel, .. } = self.package;
         if self.layer != z {
@@ -132,7 +134,7 @@ impl VoxelWriter {
     }
 }
 
-/// A grey picture, row 0 on top: that is how the format's own tools number rows.
+/// Encodes a grey picture with row 0 at the top, which is how the tools of the format number rows.
 fn grey(width: u32, height: u32, voxels: &[u8]) -> std::io::Result<Vec<u8>> {
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, width, height);
@@ -180,7 +182,7 @@ mod tests {
         reader.next_frame(&mut pixels).unwrap();
         assert_eq!(pixels, [255, 0, 0, 255, 255, 1]);
         assert_eq!(zip.len(), 5);
-        // Dropped before its end, a package leaves nothing.
+        // A package that is dropped before it is complete leaves no file.
         let other = folder.path().join("b.svx");
         drop(VoxelWriter::create(&other, package).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);

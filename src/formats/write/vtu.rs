@@ -1,4 +1,4 @@
-//! VTK XML unstructured grids: appended raw data, zlib.
+//! Writer for VTK XML unstructured grids with appended raw data, compressed with zlib.
 
 use std::fmt::Write as _;
 use std::io::Write;
@@ -11,7 +11,7 @@ use super::{OutputFile, write_file, xml_attribute};
 use crate::error::Result;
 use crate::mesh::{Mesh, On};
 
-/// Numbers of an array.
+/// The numbers of an array.
 #[derive(Clone, Copy)]
 pub(crate) enum Block<'a> {
     F32(&'a [f32]),
@@ -48,7 +48,7 @@ pub(crate) struct Column<'a> {
     pub block: Block<'a>,
 }
 
-/// A grid in the arrays of the format.
+/// An unstructured grid as the arrays of the format.
 pub(crate) struct Grid<'a> {
     pub points: Column<'a>,
     pub connectivity: &'a [u32],
@@ -58,10 +58,10 @@ pub(crate) struct Grid<'a> {
     pub cell_data: &'a [Column<'a>],
 }
 
-/// Byte order of this machine, which is that of the data written.
+/// Byte order of this machine, in which the data are written.
 pub(crate) const BYTE_ORDER: &str = if cfg!(target_endian = "little") { "LittleEndian" } else { "BigEndian" };
 
-/// Uncompressed size of a block: enough for compression, small enough to share among threads.
+/// Uncompressed size of a block: large enough for compression, small enough to distribute over threads.
 const BLOCK: usize = 1 << 18;
 
 impl Grid<'_> {
@@ -97,7 +97,7 @@ impl Grid<'_> {
     }
 }
 
-/// Appends compressed blocks with their header.
+/// Compresses `bytes` in blocks and appends them with their header.
 fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
     let blocks: Vec<Vec<u8>> = bytes
         .par_chunks(BLOCK)
@@ -114,11 +114,11 @@ fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Writes a mesh with its fields as `.vtu`. The ids of cells that were split or brought into another order become the array `cell_id`, those of points
-/// `point_id`.
+/// Writes a mesh with its fields as `.vtu`. If cells were split or reordered, their ids become the array `cell_id`; if
+/// points were reordered, theirs become `point_id`.
 ///
 /// # Errors
-/// [`crate::Error::Io`] if it cannot be written.
+/// [`crate::Error::Io`] if the file cannot be written.
 pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let moved: Option<Vec<[f64; 3]>> =
         (mesh.origin != [0.0; 3]).then(|| mesh.points.iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + mesh.origin[c])).collect());

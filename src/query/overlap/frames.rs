@@ -1,4 +1,4 @@
-//! What sets and pairs share: counters, and the trees of both meshes in one frame.
+//! What sets and pairs share: counters, and both trees in one frame.
 
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
@@ -9,7 +9,7 @@ use crate::primitives::Arena;
 use crate::query::Scene;
 use std::mem::offset_of;
 
-/// Counters of both directions, and [`NodeFrame`] of either tree.
+/// Counters of both directions, and the [`NodeFrame`] of each tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frames {
     pub(super) status: [BufferRef; 2],
@@ -24,7 +24,7 @@ impl Frames {
         Ok(Self { status, of: [frame()?, frame()?] })
     }
 
-    /// Into zeroed counters; no barrier.
+    /// Records the computation of both frames. Counters must be zeroed; there is no barrier.
     pub(super) fn cmd(&self, r: &mut Recorder<'_>, a: &Scene, b: &Scene) -> Result<()> {
         let arguments = OverlapFrames {
             grid_a: a.tree.grid,
@@ -42,12 +42,13 @@ impl Frames {
     }
 }
 
-/// The counter that every round begins with at 0.
+/// The counter that is 0 at the start of every round.
 pub(super) fn unfinished(status: BufferRef) -> BufferRef {
     status.part(offset_of!(OverlapStatus, unfinished) as u64, 4)
 }
 
-/// Whether two primitives meet in one leaf only, as far as the kernels are concerned: with filtered lists the cell of the corner may lack one of them.
+/// 1 if the kernels compare two tetrahedra in one leaf only, that of the lower corner of the intersection of their
+/// boxes; else 0, because filtered lists may lack one of the two there.
 pub(super) fn each_once(scene: &Scene) -> u32 {
     u32::from(scene.tree.assign == Assign::Aabb)
 }

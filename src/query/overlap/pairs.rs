@@ -1,4 +1,5 @@
-//! Pairs of primitives that intersect, recorded: counted, then written within what memory there is.
+//! Recording functions for the pairs of tetrahedra that intersect: pairs are counted, then written into the memory
+//! available.
 
 use super::frames::{Frames, each_once, unfinished};
 use super::sets::BUDGET;
@@ -8,13 +9,14 @@ use crate::kernels::{OverlapPairs, OverlapPairsSpec};
 use crate::layout::{OverlapStatus, SearchState};
 use crate::options::Lists;
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::query::{Rounds, Scene};
+use crate::query::{Rounds, Scene, capacity_of};
 use std::mem::offset_of;
 
-/// Counters and scratch memory of pairs: 24 bytes per tetrahedron of A.
+/// Counters and scratch memory for pairs: 24 bytes per tetrahedron of A.
 #[derive(Clone, Copy, Debug)]
 pub struct PairMemory {
-    /// [`crate::layout::OverlapStatus`]: `pairs` touch, whether or not there was room for them.
+    /// [`crate::layout::OverlapStatus`]; its `pairs` is the number of pairs that touch, whether or not there was room
+    /// for them.
     pub status: BufferRef,
     frames: Frames,
     states: BufferRef,
@@ -25,7 +27,7 @@ pub struct PairMemory {
 }
 
 impl PairMemory {
-    /// For a first mesh of `tets` tetrahedra.
+    /// Carves the memory for a first mesh of `tets` tetrahedra.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.
@@ -44,14 +46,17 @@ impl PairMemory {
     }
 }
 
-/// Records how many pairs of a primitive of A and one of B touch: [`crate::layout::OverlapStatus::pairs`], complete once `unfinished` is 0. With filtered
-/// assignments a pair counts once per leaf that lists both. Nothing is submitted, waited for, allocated or read back.
+/// Records the counting of pairs, a tetrahedron of A and one of B, that touch: [`crate::layout::OverlapStatus::pairs`],
+/// complete once `unfinished` is 0. With filtered assignments a pair counts once per leaf that lists the tetrahedron of
+/// B and lies in the quantized box of that of A. This call only records: nothing is submitted, waited for, allocated or
+/// read back.
 ///
-/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier before or
-/// after. With [`Rounds::resume`] it goes on with those not finished.
+/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads
+/// and writes; no barrier before or after. With [`Rounds::resume`] it continues with the tetrahedra that are not
+/// finished.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by.
+/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]).
 pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, rounds: Rounds) -> Result<()> {
     if b.tree.lists != Lists::All {
         return Err(Error::Invalid("pairs of cells are found by lists: build the tree over the second mesh with `Lists::All`".into()));
@@ -74,11 +79,14 @@ pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &Pair
     Ok(())
 }
 
-/// Records the pairs themselves, behind [`cmd_count_pairs`]: two words each in `found`, the primitive of A and that of B, ascending by A, within one of A
-/// in the order of B's leaves. As many are written as `found` holds; `pairs` of the status says how many there are. If 32 bits cannot number them,
-/// none is written. Complete once [`crate::layout::OverlapStatus::unfilled`] is 0; with [`Rounds::resume`] it goes on with those not finished.
+/// Records the pairs themselves, after [`cmd_count_pairs`]: two words each in `found`, the tetrahedron of A and that of
+/// B, ascending by A, and for one tetrahedron of A in the order of B's leaves. As many are written as `found` holds;
+/// `pairs` of the status says how many there are. If 32 bits cannot number them, none is written. Complete once
+/// [`crate::layout::OverlapStatus::unfilled`] is 0; with [`Rounds::resume`] it continues with the tetrahedra that are
+/// not finished.
 ///
-/// Begins with a barrier (with [`Rounds::resume`]: with a transfer write of the status). Last use: compute reads and writes; no barrier after.
+/// Starts with a barrier (with [`Rounds::resume`]: with a transfer write of the status). Last use: compute reads and
+/// writes; no barrier after.
 ///
 /// # Errors
 /// [`Error::Vulkan`] if a pipeline cannot be made.
@@ -117,7 +125,7 @@ fn cmd_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, fi
         found,
         status: memory.status,
         tets: own.tets,
-        capacity: u32::try_from(found.size / 8).unwrap_or(u32::MAX),
+        capacity: capacity_of(found, 8),
     };
     let (each_once, stride, own_stride) = (each_once(b), mesh.stride, own.stride);
     let spec = OverlapPairsSpec { workgroup, each_once, budget: BUDGET, own_stride, stride, fill, ..Default::default() };

@@ -1,4 +1,4 @@
-//! Sets of primitives that intersect the other mesh, recorded: both directions side by side.
+//! Recording functions for the sets of tetrahedra that intersect the other mesh, both directions side by side.
 
 use super::frames::{Frames, each_once, unfinished};
 use crate::error::Result;
@@ -10,10 +10,10 @@ use crate::layout::SearchState;
 use crate::primitives::{Arena, Count};
 use crate::query::{Rounds, Scene, list_parts};
 
-/// Nodes and entries that a primitive may look at in one dispatch.
+/// Nodes and entries that one tetrahedron may visit in one dispatch.
 pub(super) const BUDGET: u32 = 512;
 
-/// Arrays of one direction: the primitives of one mesh against the tree of the other.
+/// Arrays of one direction: the tetrahedra of one mesh against the tree of the other.
 #[derive(Clone, Copy, Debug)]
 struct Arrays {
     used: BufferRef,
@@ -44,19 +44,19 @@ impl Arrays {
     }
 }
 
-/// Answers and scratch memory of the sets of two meshes: about 20 bytes per tetrahedron and 4 per point.
+/// Answers and scratch memory for the sets of two meshes: about 20 bytes per tetrahedron and 4 per point.
 #[derive(Clone, Copy, Debug)]
 pub struct OverlapMemory {
-    /// One bit per tetrahedron of A: intersects B; the same of B.
+    /// One bit per tetrahedron, set if it intersects the other mesh: first for A, then for B.
     pub hits: [BufferRef; 2],
-    /// [`crate::layout::OverlapStatus`] of A against B, of B against A.
+    /// [`crate::layout::OverlapStatus`] of A against B, then of B against A.
     pub status: [BufferRef; 2],
     frames: Frames,
     directions: [Arrays; 2],
 }
 
 impl OverlapMemory {
-    /// For these two meshes, or others of the same numbers of points and tetrahedra.
+    /// Carves the memory for these two meshes, or others with the same numbers of points and tetrahedra.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] if the arena is too small.
@@ -68,15 +68,19 @@ impl OverlapMemory {
     }
 }
 
-/// Records which primitives of A intersect B and which of B intersect A; points of both lie in one space. Nothing is submitted, waited for, allocated
-/// or read back.
+/// Records which tetrahedra of A intersect B and which of B intersect A; the points of both lie in one space. This call
+/// only records: nothing is submitted, waited for, allocated or read back.
 ///
-/// A dispatch looks at so many nodes and entries per primitive and no more. Three rounds are enough for most; after the recorded ones
-/// [`crate::layout::OverlapStatus::unfinished`] says how many primitives are undecided, whose bits are 0. Recorded again with [`Rounds::resume`]
-/// (same scenes, same memory) it goes on. Trees with [`crate::options::Lists::Boundary`] will do.
+/// Each round visits a limited number of nodes and entries per tetrahedron; three rounds suffice for most. After the
+/// recorded rounds [`crate::layout::OverlapStatus::unfinished`] says how many tetrahedra are undecided; their bits are
+/// still zero. Recording again with [`Rounds::resume`] (same scenes, same memory) continues the search. Trees with
+/// [`crate::options::Lists::Boundary`] suffice.
+/// 0. Recording again with [`Rounds::resume`] (same scenes, same memory) continues the search. Trees with
+/// [`crate::options::Lists::Boundary`] suffice.
 ///
-/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads and writes; no barrier before or
-/// after, so a host puts one from compute shader writes to whatever reads the answers.
+/// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads
+/// and writes. There is no barrier before or after, so the caller records one from compute shader writes to whatever
+/// reads the answers.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -116,12 +120,12 @@ pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapM
     })
 }
 
-/// One direction as the kernels see it.
+/// One direction, as the kernels see it.
 struct Direction {
     own: Scene,
     other: Scene,
     arrays: Arrays,
-    /// Primitives of its own that hold a vertex of the other mesh: the other direction's answer.
+    /// The tetrahedra of `own` that contain a vertex of the other mesh, which the other direction determines.
     held: BufferRef,
 }
 
@@ -186,7 +190,8 @@ impl Direction {
         r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(32).div_ceil(workgroup)))
     }
 
-    /// Workgroups of the search, as soon as the number of those that wait is visible; no barrier.
+    /// Records the computation of the search's workgroups. The number of waiting tetrahedra must be visible already;
+    /// there is no barrier.
     fn groups(&self, r: &mut Recorder<'_>) -> Result<Groups> {
         let waiting = Count::device(self.own.mesh.input.tets, self.arrays.status.word(0));
         waiting.arguments(r, r.gpu().target().query, self.arrays.groups)

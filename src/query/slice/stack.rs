@@ -1,4 +1,5 @@
-//! A whole stack of layers, sliced by the recorded form: memory of our own, bands of rows, submissions until every voxel is done.
+//! Slicing of a whole stack of layers by means of [`cmd_slice`]: allocates memory, divides the stack into bands of
+//! rows, and submits until every voxel is done.
 
 use super::{SliceInput, SliceMemory, cmd_slice};
 use crate::build::DeviceMesh;
@@ -13,28 +14,28 @@ use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOX
 
 /// Voxels of one band, unless a single row has more.
 const CHUNK: u64 = 1 << 20;
-/// Bytes of device memory per voxel of a band, transfers included and runs left out, and a reserve.
+/// Bytes of device memory per voxel of a band, including transfers but not runs, and a fixed reserve.
 const PER_VOXEL: u64 = 40;
 const RESERVE: u64 = 1 << 14;
 /// Added to the owner of a touched voxel; see `glsl/shared/voxels.glsl`.
 const TOUCHED_BIT: u32 = 1 << 31;
 
-/// Device time of a stack.
+/// Numbers of voxels, and what slicing a stack cost.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Sliced {
-    /// Voxels by kind.
+    /// Numbers of voxels by kind.
     pub tally: Tally,
-    /// Milliseconds to locate the centres.
+    /// Device time in milliseconds to locate the centres.
     pub locate_ms: f64,
-    /// Milliseconds for the boxes of the others.
+    /// Device time in milliseconds to test the boxes of the other voxels.
     pub touch_ms: f64,
-    /// Milliseconds for the values.
+    /// Device time in milliseconds for the values.
     pub values_ms: f64,
-    /// Submissions.
+    /// Number of submissions.
     pub submissions: u32,
 }
 
-/// A stack over a mesh and its tree: what its bands have in common, with memory of our own.
+/// What the bands of a stack over a mesh and its structure have in common, in memory owned by this crate.
 pub(crate) struct Slicing<'a> {
     gpu: &'a Gpu,
     searched: StructureView,
@@ -44,13 +45,14 @@ pub(crate) struct Slicing<'a> {
     part: Option<CellRange>,
     memory: SliceMemory,
     buffer: Buffer,
-    /// Rows that are sliced at once.
+    /// Rows of the largest band.
     pub(crate) rows: u32,
     sliced: Sliced,
 }
 
 impl<'a> Slicing<'a> {
-    /// Prepares slicing, as many rows at once as memory is left for. `part`: as [`SliceInput::part`].
+    /// Prepares slicing in bands of as many rows as the memory that is left allows. `part` is that of
+    /// [`SliceInput::part`].
     ///
     /// # Errors
     /// As [`slice`].
@@ -80,7 +82,8 @@ impl<'a> Slicing<'a> {
         Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
     }
 
-    /// One band of at most so many rows. Submissions are repeated until every voxel is done; usually one is enough.
+    /// Slices one band of at most [`Self::rows`] rows. Submits until every voxel is done; usually one submission
+    /// suffices.
     ///
     /// # Errors
     /// As [`cmd_slice`], or a failed Vulkan call.
@@ -121,12 +124,12 @@ impl<'a> Slicing<'a> {
     }
 }
 
-/// Slices a mesh: hands the voxels to `sink` band by band, in order. `field`: values and what they belong to; `report` is told how many voxels are
-/// done.
+/// Slices a mesh and hands the voxels to `sink` band by band, in order. `field` has values and says whether they belong
+/// to points or tetrahedra. `report` receives the number of voxels done and their total.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a field of the wrong length or voxels that [`VoxelGrid::plan`] refuses, [`Error::Memory`], a failed Vulkan call, or those of
-/// `sink`.
+/// [`Error::Invalid`] for a field of the wrong length, for voxels that [`VoxelGrid::plan`] refuses, or for a structure
+/// over another mesh; [`Error::Memory`]; a failed Vulkan call; errors of `sink`.
 pub fn slice(
     mesh: &DeviceMesh,
     built: &dyn Built,

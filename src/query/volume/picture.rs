@@ -1,4 +1,5 @@
-//! A whole picture, drawn by the recorded form: memory of our own, a round per submission until every ray is done.
+//! Drawing of a whole picture by means of [`cmd_render`]: allocates memory, and submits one round at a time until every
+//! ray is done.
 
 use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Shown, cmd_render};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
@@ -9,30 +10,31 @@ use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Built, Rounds, Structure, StructureView};
 use crate::reference::vertices::CellRange;
-use crate::render::Plan;
+use crate::render::{Plan, TABLE_SIZE};
 
-/// What a drawn picture holds.
+/// A drawn picture, and what it cost.
 #[derive(Clone, Debug, Default)]
 pub struct Drawn {
     /// Premultiplied colour and opacity, row 0 on top.
     pub colors: Vec<[f32; 4]>,
-    /// Samples taken.
+    /// Number of samples taken.
     pub samples: u64,
-    /// Samples within the intervals that were not taken: their nodes have nothing to see.
+    /// Samples within the intervals that were skipped, since nothing is visible in their nodes.
     pub skipped_samples: u64,
-    /// Samples taken that lie in the mesh.
+    /// Number of samples taken that lie in the mesh.
     pub found_samples: u64,
-    /// Device time of the field's ranges and of the marks of visible nodes, where values are transparent.
+    /// Device time in milliseconds of the field's ranges and of the marks of visible nodes, if some values are
+    /// transparent.
     pub ranges_ms: f64,
-    /// Device time of the ray intervals.
+    /// Device time in milliseconds of the ray intervals.
     pub interval_ms: f64,
-    /// Device time of the march.
+    /// Device time in milliseconds of the march.
     pub march_ms: f64,
-    /// Submissions that the march took.
+    /// Number of submissions that the march took.
     pub submissions: u32,
 }
 
-/// The rays of a picture in host memory, between two blocks of a mesh.
+/// The rays of a picture in host memory, kept from one block of a mesh to the next.
 pub(crate) struct Rays {
     /// Premultiplied colour and opacity, row 0 on top.
     pub(crate) colors: Vec<[f32; 4]>,
@@ -41,7 +43,7 @@ pub(crate) struct Rays {
 }
 
 impl Rays {
-    /// Before the first block.
+    /// The rays before the first block.
     ///
     /// # Errors
     /// [`Error::TooLarge`] for 2^31 pixels and more.
@@ -51,7 +53,7 @@ impl Rays {
     }
 }
 
-/// A mesh, its tree and a field in device memory, ready to be drawn: a whole picture, or strips of one.
+/// A mesh, its structure and a field in device memory, ready to draw a whole picture or strips of one.
 pub(crate) struct Canvas<'a> {
     gpu: &'a Gpu,
     searched: StructureView,
@@ -68,7 +70,7 @@ pub(crate) struct Canvas<'a> {
 }
 
 impl<'a> Canvas<'a> {
-    /// Prepares a picture; in strips, of as many rows as memory is left for.
+    /// Prepares a picture, or strips of it with as many rows as the memory that is left allows.
     ///
     /// # Errors
     /// As [`render`].
@@ -83,6 +85,9 @@ impl<'a> Canvas<'a> {
         let gpu = mesh.gpu();
         let searched = StructureView::new(mesh, built)?;
         on.check(values, mesh.sizes())?;
+        if plan.table.len() != TABLE_SIZE {
+            return Err(Error::Invalid(format!("a transfer function of {} colours; there are {TABLE_SIZE}", plan.table.len())));
+        }
         if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
             return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));
         }
@@ -113,7 +118,7 @@ impl<'a> Canvas<'a> {
         Ok(canvas)
     }
 
-    /// The field's values in every node, if any are skipped.
+    /// Computes the range of the field in every node, if nodes are skipped.
     fn gather_ranges(&mut self) -> Result<()> {
         if let (Structure::Octree(tree), Some(ranges)) = (&self.searched.structure, self.ranges) {
             let field = (self.field.0.all(), self.field.1);
@@ -123,7 +128,8 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws a picture of this size from the first row, or a part of one; `report` is told how many of its rays are done.
+    /// Draws a picture of this size from the first row of the view, or a part of one. `report` receives the number of
+    /// rays done and their total.
     fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: &dyn Fn(u64, u64)) -> Result<()> {
         let Self { gpu, searched, plan, memory, drawn, .. } = self;
         let [view, table, shown] = self.uniforms.each_ref().map(Buffer::all);
@@ -157,10 +163,12 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws the samples in these cells, strip by strip; rows that do not meet the block, nor have anything left to see, are left out.
+    /// Draws the samples in these cells, strip by strip. Strips are left out if `met` marks none of their rows as
+    /// meeting the block with something left to draw.
     ///
     /// # Errors
-    /// A failed Vulkan call, or no memory for transfers. What is done is in `rays`, and is not done again.
+    /// A failed Vulkan call, or too little memory for transfers. `rays` then holds what is done; drawing the block
+    /// again with these rays does not take the same samples again.
     pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<Drawn> {
         let [width, height] = self.plan.size;
         for row in (0..height).step_by(self.rows as usize) {
@@ -184,11 +192,12 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// Draws a plan of a field (values per point or per tetrahedron); `normals`: one per point, for shading. `report` is told how many rays
-/// are done.
+/// Draws a plan of a field (values per point or per tetrahedron). `normals` has one normal per point, for shading.
+/// `report` receives the number of rays done and their total.
 ///
 /// # Errors
-/// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field or normals have the wrong length.
+/// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field, normals or transfer
+/// function have the wrong length or the structure was built over another mesh.
 pub fn render(
     mesh: &DeviceMesh,
     built: &dyn Built,

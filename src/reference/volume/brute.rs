@@ -1,4 +1,5 @@
-//! The oracle of the renderers: another camera formula, every tetrahedron tested at every sample, double precision, no tree, no table.
+//! The oracle for the renderers: it uses another camera formula, tests every tetrahedron at every sample in double
+//! precision, and has neither tree nor table.
 
 use super::Scene;
 use crate::mesh::On;
@@ -6,15 +7,15 @@ use crate::render::{Bounds, OPACITY_UNIT, Projection, RenderSettings, Shade};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 
-/// A tetrahedron ready for tests: barycentric coordinates 1 to 3 are `inverse · (p − corner)`.
+/// A tetrahedron prepared for tests: barycentric coordinates 1 to 3 are `inverse · (p − corner)`.
 struct Cell {
     id: usize,
     corner: DVec3,
     inverse: DMat3,
 }
 
-/// Draws what `settings` say, as [`super::render`] should, in time proportional to samples × tetrahedra. Straight RGBA. `settings` must say how opaque
-/// values are. The scene's plan is asked only for its size and light.
+/// Draws what [`super::render`] should draw for `settings`, in time proportional to samples × tetrahedra, as straight
+/// RGBA. The transfer function of `settings` must have opacities. Only size and light are taken from the scene's plan.
 pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
     let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.range(), &scene.prepared.camera);
     let [width, height] = plan.size.map(f64::from);
@@ -67,7 +68,7 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
     (0..plan.size[0] * plan.size[1]).into_par_iter().flat_map_iter(pixel).collect()
 }
 
-/// The tetrahedra that have a volume.
+/// The valid tetrahedra that have a volume.
 fn cells(scene: &Scene<'_>) -> Vec<Cell> {
     let cell = |(id, ids): (usize, &[u32; 4])| {
         let [a, b, c, d] = ids.map(|i| DVec3::from_array(scene.mesh.points[i as usize].map(f64::from)));
@@ -77,7 +78,7 @@ fn cells(scene: &Scene<'_>) -> Vec<Cell> {
     scene.mesh.tets.iter().enumerate().filter(|&(t, _)| scene.topology.is_valid(t as u32)).filter_map(cell).collect()
 }
 
-/// Value and normal at a point of the mesh, if it is finite.
+/// Value and normal at a point; `None` outside the mesh or if the value is not finite.
 fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, [f32; 3])> {
     let (id, b) = cells.iter().find_map(|cell| {
         let b = cell.inverse * (p - cell.corner);

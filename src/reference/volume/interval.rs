@@ -1,4 +1,4 @@
-//! Where a ray can meet the mesh, by the boundary nodes of the tree.
+//! The part of a ray that can meet the mesh, from the boundary nodes of the tree.
 
 use super::skip::inverse_of;
 use crate::reference::boundary::bit;
@@ -10,12 +10,12 @@ use crate::tree::TreeArrays;
 /// Ray intervals of a plan.
 pub struct Intervals<'a> {
     tree: &'a TreeArrays,
-    /// One bit per node: to be looked at.
+    /// One bit per node, set if the node is to be visited.
     nodes: &'a [u32],
     plan: &'a Plan,
-    /// Samples in other cells of the finest grid are not taken.
+    /// Only samples in these cells of the finest grid are taken.
     part: CellRange,
-    /// Boxes are larger by this, so that rounding of samples, boxes and rays loses nothing.
+    /// Boxes are enlarged by this, so that no sample is lost by rounding of samples, boxes and rays.
     slack: [f32; 3],
 }
 
@@ -23,19 +23,20 @@ pub struct Intervals<'a> {
 type Node = (u32, u32, u32);
 
 impl<'a> Intervals<'a> {
-    /// Prepares the rays of `plan`. `visible`: which nodes have something to see.
+    /// Prepares the rays of `plan`. `visible` has one bit per node, set if something is visible there.
     pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &'a Plan) -> Self {
         Self { tree, nodes: visible.unwrap_or(&tree.boundary), plan, part: CellRange::WHOLE, slack: interval_slack(&tree.grid) }
     }
 
-    /// The same for samples in these cells of the finest grid alone.
+    /// Restricts samples to these cells of the finest grid.
     #[must_use]
     pub fn within(self, part: CellRange) -> Self {
         Self { part, ..self }
     }
 
-    /// The samples `[begin, end)` of a ray (origin, unit direction) that the mesh can hold: from the first to the last leaf with the
-    /// boundary flag (or with something to see) whose box the ray meets, and one more on either side. A ray that starts in a leaf of the mesh starts at 0.
+    /// The samples `[begin, end)` of a ray (origin, unit direction) that can lie in the mesh: from the first to the
+    /// last leaf with the boundary flag (or with something visible) whose box the ray meets, and one more at either
+    /// end. For a ray that starts in a leaf of the mesh they start at 0.
     pub fn of(&self, ray: ([f32; 3], [f32; 3])) -> [u32; 2] {
         let (origin, direction) = ray;
         let inverse = inverse_of(direction);
@@ -45,7 +46,7 @@ impl<'a> Intervals<'a> {
         if within && self.tree.find_leaf(grid.quantize(origin)).is_some() {
             (first, last) = (0.0, 0.0);
         }
-        // Depth first; what lies within the interval found so far has nothing to add, so the order of the visits does not matter.
+        // Depth first. Nodes within the interval found so far cannot extend it, so the order of visits does not matter.
         let mut stack: Vec<Node> = vec![(0, 0, 0)];
         while let Some((node, level, code)) = stack.pop() {
             if !bit(self.nodes, node) {
@@ -75,7 +76,8 @@ impl<'a> Intervals<'a> {
         [begin, self.first_sample(ray, begin, end, true)]
     }
 
-    /// The first of the samples `[k, end)` that the cells of the part are not ahead of; `past`: that lies behind them. Cells are monotone along a ray.
+    /// With `past` false, the first of the samples `[k, end)` that has reached the cells of the part; with `past` true,
+    /// the first one that has left them again. Binary search suffices, because cells are monotone along a ray.
     fn first_sample(&self, ray: ([f32; 3], [f32; 3]), mut k: u32, mut end: u32, past: bool) -> u32 {
         let CellRange { lo, hi } = self.part;
         while k < end {
@@ -91,7 +93,7 @@ impl<'a> Intervals<'a> {
         k
     }
 
-    /// Where a ray enters and leaves a box, `None` if it misses it; never before its origin.
+    /// Where a ray enters and leaves a box, never before its origin; `None` if it misses the box.
     fn hit(&self, [x0, y0, z0, x1, y1, z1]: Box6, origin: [f32; 3], inverse: [f32; 3]) -> Option<[f32; 2]> {
         let (lo, hi) = ([x0, y0, z0], [x1, y1, z1]);
         let (mut enter, mut leave) = (0.0f32, f32::MAX);

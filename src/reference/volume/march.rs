@@ -1,4 +1,4 @@
-//! Marching: samples of a ray, front to back.
+//! Marching: takes the samples of a ray, front to back.
 
 use super::Scene;
 use super::skip::{Skips, inverse_of};
@@ -6,24 +6,24 @@ use crate::reference::grid::{canonical, reciprocal};
 use crate::reference::walk::{Stand, weighed};
 use crate::render::{Lighting, Plan};
 
-/// Steps of a walk across faces before the tree is asked.
+/// Most tetrahedra of a walk across faces before the tree is searched.
 const WALK: u32 = 6;
 
 /// Marches rays, one after the other.
 pub struct Marcher<'a> {
     scene: &'a Scene<'a>,
     plan: &'a Plan,
-    /// That of the last sample, if it lay in one: behind a gap the tree is asked first.
+    /// The tetrahedron of the last sample, if it lay in one. After a gap the tree is searched first.
     cell: Option<u32>,
-    /// Samples taken so far.
+    /// Number of samples taken so far.
     pub samples: u64,
-    /// Samples left out: nothing is to be seen in their nodes.
+    /// Number of samples skipped, since nothing is visible in their nodes.
     pub skipped_samples: u64,
-    /// Samples taken that lie in the mesh.
+    /// Number of samples taken that lie in the mesh.
     pub found_samples: u64,
 }
 
-/// What a ray has gathered, and its light.
+/// What a ray has gathered so far, and its light.
 struct Gathered<'a> {
     sum: [f32; 4],
     direction: [f32; 3],
@@ -32,7 +32,7 @@ struct Gathered<'a> {
 }
 
 impl Gathered<'_> {
-    /// Adds a colour at these barycentric coordinates of a cell.
+    /// Adds a colour at barycentric coordinates `b` in a tetrahedron.
     fn add(&mut self, [red, green, blue, mut a]: [f32; 4], stand: &Stand, b: [f32; 4]) {
         let mut color = [red, green, blue];
         if let Some((light, half)) = &self.light {
@@ -50,19 +50,19 @@ impl Gathered<'_> {
 }
 
 impl<'a> Marcher<'a> {
-    /// Ready for any ray of the scene.
+    /// A marcher for any rays of the scene.
     pub fn new(scene: &'a Scene<'a>) -> Self {
         Self { scene, plan: scene.plan(), cell: None, samples: 0, skipped_samples: 0, found_samples: 0 }
     }
 
-    /// Colour (premultiplied) and opacity that a ray gathers over its samples `[begin, end)`.
+    /// Premultiplied colour and opacity that a ray gathers over its samples `[begin, end)`.
     pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), [begin, end]: [u32; 2]) -> [f32; 4] {
         let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
         let mut gathered = Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals };
         let mut last: Option<f32> = None;
-        // Each ray begins without a hint, so that no pixel depends on another one.
+        // Each ray starts without a hint, so that no pixel depends on another one.
         self.cell = None;
         let skips = self.scene.visible.as_deref().map(|visible| Skips { tree: self.scene.tree, visible, plan });
         let inverse = inverse_of(direction);
@@ -72,7 +72,7 @@ impl<'a> Marcher<'a> {
             if let Some(skips) = skips.as_ref().filter(|_| next >= check) {
                 let (behind, hidden) = skips.stretch(ray, inverse, next, end);
                 if hidden && !plan.iso.is_empty() {
-                    // The stretch is on one side of every surface: its first and its last sample tell all.
+                    // The whole stretch lies on one side of every surface, so its first and its last sample suffice.
                     ahead = (behind - next).max(2) - 1;
                 } else if hidden {
                     self.cell = self.cell.filter(|_| behind - next < WALK);
@@ -109,7 +109,7 @@ impl<'a> Marcher<'a> {
         gathered.sum
     }
 
-    /// Adds the surfaces between sample k, which lies in a cell, and the one before.
+    /// Adds the surfaces between sample k, which lies in `stand`, and the sample before it.
     fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), k: u32, [before, value]: [f32; 2], stand: &Stand) {
         let plan = self.plan;
         let n = plan.iso.len();
@@ -131,8 +131,9 @@ impl<'a> Marcher<'a> {
         }
     }
 
-    /// Where a point lies, and its barycentric coordinates: in the last cell or one a short walk across faces away, if that contains the point
-    /// clearly, which makes it the owner in a mesh whose cells do not overlap; or else where the tree says. Outside of the bounds there is nothing to ask for.
+    /// The tetrahedron of a point, and its barycentric coordinates there. A walk across faces from the last tetrahedron
+    /// is tried first. A tetrahedron that contains the point clearly is the owner in a mesh whose tetrahedra do not
+    /// overlap. If the walk does not find one, the tree is searched, except outside of the bounds.
     fn locate(&mut self, p: [f32; 3]) -> Option<(Stand, [f32; 4])> {
         let (walker, grid) = (self.scene.locator.walker(), &self.scene.tree.grid);
         let x = grid.normalise(p);

@@ -1,4 +1,4 @@
-//! Stretches of a ray where nothing is to be seen. Twin of `glsl/shared/skip.glsl`.
+//! Stretches of a ray in which nothing is visible. Twin of `glsl/shared/skip.glsl`.
 
 use crate::reference::boundary::bit;
 use crate::reference::grid::{MAX_LEVEL, morton, reciprocal};
@@ -6,28 +6,29 @@ use crate::reference::leaves::cell_side;
 use crate::render::Plan;
 use crate::tree::TreeArrays;
 
-/// A component of a direction is at least this large, so that its reciprocal is finite.
+/// Components of a direction are taken to be at least this large, so that their reciprocals are finite.
 const LEAST: f32 = 1e-20;
 
-/// The reciprocals of a direction.
+/// The reciprocals of the components of a direction.
 pub fn inverse_of(direction: [f32; 3]) -> [f32; 3] {
     direction.map(|d| if d.abs() < LEAST { 1.0 / LEAST.copysign(d) } else { reciprocal(d) })
 }
 
-/// Which nodes of a tree have something to see, one bit each.
+/// The nodes of a tree in which something is visible.
 pub struct Skips<'a> {
     /// The tree.
     pub tree: &'a TreeArrays,
-    /// The bits.
+    /// One bit per node, set if something is visible there.
     pub visible: &'a [u32],
-    /// What is drawn.
+    /// The plan of the picture.
     pub plan: &'a Plan,
 }
 
 impl Skips<'_> {
-    /// The sample behind those, from `k` on and before `end`, that lie in the same node as sample `k`: the highest one with nothing to see, or else its leaf; and
-    /// whether there is nothing to see. Rounding cannot lose a sample: the places of a ray's samples and their cells are monotone, so what lies between two samples
-    /// of a node lies in it.
+    /// The end of a stretch of samples, and whether nothing is visible in it. The stretch consists of the samples from
+    /// `k` on and before `end` that lie in the same node as sample `k`: the highest such node in which nothing is
+    /// visible, or else its leaf. Rounding cannot lose a sample: the positions of a ray's samples and their cells are
+    /// monotone, so what lies between two samples of a node also lies in it.
     pub fn stretch(&self, (origin, direction): ([f32; 3], [f32; 3]), inverse: [f32; 3], k: u32, end: u32) -> (u32, bool) {
         let (tree, plan, grid) = (self.tree, self.plan, &self.tree.grid);
         let at = |k: u32| grid.quantize(plan.sample((origin, direction), k));

@@ -4,8 +4,8 @@ use super::{Bounds, Camera, DEFAULT_FOV, Projection, three_quarter};
 use crate::error::{Error, Result};
 use glam::DVec3;
 
-/// A camera as a user describes it, in the coordinates of the mesh's source. What is left open is chosen so that the mesh is
-/// framed.
+/// A camera as a user describes it, in the coordinates of the mesh's source. Whatever is left open is chosen so that
+/// the mesh is framed.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct CameraSpec {
     /// The side to look from, as a direction from the mesh to the eye; ignored with `eye`.
@@ -14,21 +14,22 @@ pub struct CameraSpec {
     pub azimuth: Option<f64>,
     /// Degrees above the horizon; ignored with `eye`.
     pub elevation: Option<f64>,
-    /// Where the eye is.
+    /// Position of the eye.
     pub eye: Option<DVec3>,
-    /// What it looks at; the centre of the mesh by default. Without `eye`, only the framing moves.
+    /// The point that the eye looks at; by default the centre of the mesh. Without `eye`, it moves the framed camera.
     pub target: Option<DVec3>,
-    /// What is up in the picture; z by default.
+    /// The direction that is up in the picture; z by default.
     pub up: Option<DVec3>,
-    /// Perspective angle from top to bottom, degrees.
+    /// Perspective angle from top to bottom, in degrees.
     pub fov: Option<f64>,
-    /// Orthographic; with a height in mesh units, or framed.
+    /// Orthographic projection, with a height in mesh units or framed.
     pub ortho: Option<Option<f64>>,
     /// Magnification.
     pub zoom: Option<f64>,
 }
 
-/// Named views: the direction from the mesh to the eye. `iso` is the default three-quarter view, and is chosen by the mesh's shape.
+/// Named views, as directions from the mesh to the eye. `iso` is the default three-quarter view, which depends on the
+/// mesh's shape.
 const VIEWS: [(&str, Option<DVec3>); 13] = [
     ("iso", None),
     ("front", Some(DVec3::NEG_Y)),
@@ -45,7 +46,7 @@ const VIEWS: [(&str, Option<DVec3>); 13] = [
     ("-z", Some(DVec3::NEG_Z)),
 ];
 
-/// What the text of a camera may hold, for errors and help.
+/// The syntax of a camera's text, for errors and help.
 pub const HELP: &str = "a view (iso, front, back, left, right, top, bottom, +x, -x, +y, -y, +z, -z) and settings key=value, separated by commas: \
 azimuth, elevation (degrees), zoom, eye=X,Y,Z, target=X,Y,Z, up=X,Y,Z, fov (degrees), ortho or ortho=HEIGHT";
 
@@ -67,7 +68,8 @@ impl std::str::FromStr for CameraSpec {
                 }
                 continue;
             };
-            // The numbers of a vector are separated by commas as well: what follows without a key belongs to this one.
+            // The numbers of a vector are separated by commas as well, so numbers that follow without a key belong to
+            // this one.
             let mut values = vec![number(first).ok_or_else(|| wrong(part, "needs a finite number"))?];
             while let Some(value) = parts.peek().and_then(|next| number(next)) {
                 values.push(value);
@@ -106,7 +108,8 @@ fn number(text: &str) -> Option<f64> {
 }
 
 impl CameraSpec {
-    /// The camera for a mesh with these bounds, whose coordinates are relative to `origin`; `aspect` is width over height.
+    /// The camera for a mesh with these bounds, whose coordinates are relative to `origin`; `aspect` is width over
+    /// height.
     ///
     /// # Errors
     /// [`Error::Invalid`] if eye and target are the same point.
@@ -114,7 +117,7 @@ impl CameraSpec {
         self.resolve_around(bounds, &bounds.corners(), origin, aspect)
     }
 
-    /// The same, framed around `points` within the bounds rather than the corners.
+    /// As [`CameraSpec::resolve`], but framed around `points` within the bounds instead of the corners.
     ///
     /// # Errors
     /// As [`CameraSpec::resolve`].

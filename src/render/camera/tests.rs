@@ -2,7 +2,7 @@ use super::*;
 
 const BOX: Bounds = Bounds { lo: [-1.0, 2.0, 0.0], hi: [9.0, 4.0, 1.5] };
 
-/// Place of a point in the picture, −1…1 on both axes.
+/// Position of a point in the picture, −1…1 on both axes.
 fn project(camera: &Camera, p: DVec3, aspect: f64) -> [f64; 2] {
     let d = p - camera.eye;
     let scale = match camera.projection {

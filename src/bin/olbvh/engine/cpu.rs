@@ -1,4 +1,4 @@
-//! The reference implementation as an engine.
+//! The engine that computes on the CPU with the reference implementation.
 
 use super::{Drawn, Engine, Located, Report, Sink, Summary};
 use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
@@ -18,10 +18,10 @@ use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 use std::time::Instant;
 
-/// The processor.
+/// The CPU.
 pub struct Cpu;
 
-/// Tree and topology in host memory.
+/// A mesh with its topology and tree in host memory.
 struct CpuTree<'a> {
     mesh: &'a Mesh,
     topology: Topology,
@@ -111,14 +111,14 @@ impl Engine for Cpu {
     }
 }
 
-/// A limit means nothing here.
+/// Refuses a limit of device memory, which has no meaning on the CPU.
 fn no_memory(memory: Option<u64>) -> Result<()> {
     memory.map_or(Ok(()), |_| {
         Err(Error::Invalid("--memory is that of a device; the CPU works in the host's memory, on the whole mesh".into()))
     })
 }
 
-/// An answer of the whole mesh.
+/// Builds the tree over the whole mesh and computes an answer with it.
 fn on_host<T>(
     (mesh, options): (&Mesh, &BuildOptions),
     memory: Option<u64>,
@@ -143,7 +143,7 @@ impl<'a> CpuTree<'a> {
     fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Vec<Located> {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Vec::with_capacity(points.len());
-        // As the device does it, so that owners are the same even where cells overlap.
+        // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
         for chunk in points.chunks(locate::CHUNK) {
             let located = match options.path {
                 query::Path::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
@@ -158,10 +158,10 @@ impl<'a> CpuTree<'a> {
     }
 }
 
-/// Points between two reports.
+/// Number of points between two progress reports.
 const CHUNK: usize = 1 << 16;
 
-/// The answers for all points, in parallel, chunk by chunk.
+/// Computes the answers for all points, in parallel, chunk by chunk.
 fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: Report<'_>) -> Vec<T> {
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {

@@ -1,4 +1,4 @@
-//! A Vulkan device as an engine.
+//! The engine that computes on a Vulkan device.
 
 use super::{Drawn, Engine, Located, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
@@ -14,13 +14,14 @@ use olbvh::reference::overlap::Overlap;
 use olbvh::reference::volume::Picture;
 use std::path::PathBuf;
 
-/// An opened device, and where the shapes of its kernels come from.
+/// An opened device, and the target of its kernels with its origin.
 pub struct Device(Gpu, Shapes);
 
 impl Device {
-    /// Opens the device that `--device` means, or the best one, with the shapes that were asked for. Pipelines are kept in the user's cache folder.
+    /// Opens the device that `--device` names, or the best one, with the target that applies. Compiled pipelines are
+    /// kept in the user's cache folder.
     pub fn open(common: &Common) -> Outcome<Self> {
-        // Tested with the shapes that it will have.
+        // The device is trusted here, because the self-test follows with the target that it will have.
         let options = GpuOptions { device: common.device.clone(), pipeline_cache: cache_file(), trust: true, ..GpuOptions::default() };
         let gpu = Gpu::new(&options)?;
         let shapes = Shapes::of(common, gpu.report())?;
@@ -29,18 +30,18 @@ impl Device {
         Ok(Self(gpu, shapes))
     }
 
-    /// Bytes of memory to stay within: those given, or the device's.
+    /// Maximum number of bytes of device memory: the given number, or else the device's memory.
     fn memory(&self, given: Option<u64>) -> u64 {
         given.unwrap_or(self.0.report().memory)
     }
 
-    /// The device itself.
+    /// The device.
     pub fn gpu(&self) -> &Gpu {
         &self.0
     }
 }
 
-/// Where compiled pipelines are kept.
+/// File in which compiled pipelines are kept.
 fn cache_file() -> Option<PathBuf> {
     let folder =
         std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache")))?;

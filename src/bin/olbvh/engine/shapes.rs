@@ -1,4 +1,4 @@
-//! Which shapes the kernels have, and why.
+//! Selection of the target, that is of the tuning parameters of the kernels.
 
 use crate::common::{Common, Failure, Outcome};
 use olbvh::gpu::DeviceReport;
@@ -6,30 +6,30 @@ use olbvh::kernels::{Row, Target};
 use olbvh::tune::{Profile, Search, folder};
 use std::path::{Path, PathBuf};
 
-/// Where shapes come from.
+/// Where a target comes from.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Origin {
-    /// The row of the device's kind.
+    /// The built-in row for the device's kind.
     Kind,
-    /// `--target NAME`.
+    /// The built-in row that `--target NAME` names.
     Row,
-    /// `--target FILE`.
+    /// The file that `--target FILE` names.
     File(PathBuf),
-    /// The device's profile.
+    /// The profile that was saved for the device.
     Profile(PathBuf),
 }
 
-/// Shapes of the kernels, and where they come from.
+/// A target and where it comes from.
 #[derive(Clone, Debug)]
 pub struct Shapes {
-    /// The shapes.
+    /// The tuning parameters of the kernels.
     pub target: Target,
-    /// Where they come from.
+    /// Where it comes from.
     pub origin: Origin,
 }
 
 impl Shapes {
-    /// Those that were asked for, or else the device's profile, or else the row of its kind.
+    /// The target that `--target` names; without it, the device's profile, or else the built-in row for its kind.
     pub fn of(common: &Common, device: &DeviceReport) -> Outcome<Self> {
         if let Some(wanted) = &common.target {
             return Self::wanted(wanted, device);
@@ -46,11 +46,11 @@ impl Shapes {
         })
     }
 
-    /// A row by its name, or a profile by its file.
+    /// The built-in row with this name, or the profile in this file.
     fn wanted(wanted: &str, device: &DeviceReport) -> Outcome<Self> {
         match wanted.parse::<Row>() {
             Ok(row) => Ok(Self { target: row.target(&device.room), origin: Origin::Row }),
-            // A name, misspelt.
+            // This is a misspelt name, not a file.
             Err(error) if !wanted.contains(['.', '/', '\\']) && !Path::new(wanted).exists() => {
                 Err(Failure::Usage(format!("{error}, or a file that `olbvh tune` saved")))
             }

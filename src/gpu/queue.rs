@@ -1,0 +1,18 @@
+//! Queues protected by a lock, owned by this crate or by the host.
+
+use ash::vk;
+use std::sync::{Mutex, PoisonError};
+
+/// A queue, and the lock that the host takes for its own submissions. Implemented for `Mutex<vk::Queue>`; a host with
+/// another kind of lock implements it for that.
+pub trait HostQueue: Send + Sync {
+    /// Calls `submit` once with the queue, while the lock is held.
+    fn locked(&self, submit: &mut dyn FnMut(vk::Queue));
+}
+
+impl HostQueue for Mutex<vk::Queue> {
+    fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
+        // The handle stays valid even if a panic poisoned the lock.
+        submit(*self.lock().unwrap_or_else(PoisonError::into_inner));
+    }
+}
