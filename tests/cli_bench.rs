@@ -202,6 +202,8 @@ fn wrong_arguments_are_refused() {
         let out = bench(folder.path(), arguments);
         assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));
     }
+    let message = String::from_utf8(bench(folder.path(), &["--seconds", "-3"]).stderr).unwrap();
+    assert!(message.contains("--seconds -3: a time"), "{message}");
     assert_eq!(bench(folder.path(), &["nothing.vtu"]).status.code(), Some(3));
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a refused run leaves nothing");
 }

@@ -153,6 +153,7 @@ fn help_is_there_for_everything() {
         assert_eq!(out.status.code(), Some(0));
         assert!(text(&out.stdout).contains("Example"), "{arguments:?} has no example");
     }
+    assert!(text(&olbvh(folder.path(), &["--help"]).stdout).contains("130"));
     let help = text(&olbvh(folder.path(), &["render", "--help"]).stdout);
     for part in ["viridis", "\"colors\"", "azimuth", "--opacity"] {
         assert!(help.contains(part), "no {part} in {help}");
@@ -175,17 +176,36 @@ fn wrong_usage_ends_with_2() {
         (&["--iso", "0.2,x"], "separated by commas"),
         (&["--iso", "1,2,3,4,5,6,7,8,9"], "up to 8"),
         (&["--background", "pink"], "pink"),
-        (&["--range", "3:1"], "LO:HI"),
+        (&["--range", "3:1"], "LO must be below HI"),
+        (&["--range", "1:1"], "LO must be below HI"),
+        (&["--step", "-1"], "a step of -1"),
+        (&["--opacity", "-1"], "-1 lies outside 0 to 1"),
+        (&["--opacity-scale", "-1"], "an opacity scale of -1"),
+        (&["--outline", "-1"], "an outline of -1"),
+        (&["--camera", "eye=1,2"], "'--camera <CAMERA>': `eye=1,2` needs three numbers"),
+        (&["--camera", "iso,top"], "'--camera <CAMERA>': `top` is a second view"),
+        (&["--background", "sky"], "'--background <COLOR>': `sky` is no background"),
         (&["--field", "pressure"], "jet"),
         (&["--assign", "boxes"], "planes"),
     ] {
         let message = fails(folder.path(), 2, &with(more));
         assert!(message.contains(part), "{more:?}: {message}");
+        assert!(!message.contains("unexpected argument"), "{more:?}: {message}");
     }
+    let message = fails(folder.path(), 2, &["info", "kuhn:2,2,2", "--device", ""]);
+    assert!(message.contains("a value is required for '--device"), "{message}");
     let message = fails(folder.path(), 2, &["render", "kuhn:2,2,2", "-o", "a.jpg"]);
     assert!(message.contains(".png"), "{message}");
     fails(folder.path(), 2, &["render", "kuhn:2,2,2", "-o", "a.png", "--size", "0x5"]);
-    fails(folder.path(), 2, &["info", "kuhn:0,1,2"]);
+    for (mesh, part) in [
+        ("kuhn:0,1,2", "kuhn:0,1,2: a grid needs at least one cube along each axis"),
+        ("graded:0", "graded:0: a grid needs"),
+        ("kuhn:100000,100000,100000", "1000030000300001 points"),
+        ("kuhn:2,2", "kuhn:2,2: three whole numbers"),
+    ] {
+        let message = fails(folder.path(), 2, &["info", mesh, "--device", "cpu"]);
+        assert!(message.matches(&mesh).count() == 1 && message.contains(part), "{message}");
+    }
     assert!(!folder.path().join("a.png").exists());
 }
 
@@ -194,7 +214,7 @@ fn bad_files_end_with_3_and_are_named() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("bad.vtu"), "<VTKFile type=\"UnstructuredGrid\"><Unstruct").unwrap();
     std::fs::write(folder.path().join("p.csv"), "x,y\n1,2\n").unwrap();
-    for (mesh, part) in [("bad.vtu", "bad.vtu"), ("missing.vtu", "missing.vtu"), (".", "folder; name a file in it (.vtu")] {
+    for (mesh, part) in [("bad.vtu", "bad.vtu"), ("missing.vtu", "missing.vtu"), ("cube:3", "kuhn:NX,NY,NZ, graded:N"), (".", "folder; name a file in it (.vtu")] {
         let message = fails(folder.path(), 3, &["info", mesh, "--device", "cpu"]);
         assert!(message.contains(part), "{message}");
     }
@@ -205,8 +225,72 @@ fn bad_files_end_with_3_and_are_named() {
 #[test]
 fn unknown_devices_end_with_4_and_failures_with_1() {
     let folder = TempDir::new().unwrap();
-    fails(folder.path(), 4, &["info", "kuhn:2,2,2", "--device", "no such device"]);
+    let message = fails(folder.path(), 4, &["info", "kuhn:2,2,2", "--device", "no such device"]);
+    assert!(message.contains("no Vulkan") || message.contains("no device `no such device`; there are: 0 "), "{message}");
     fails(folder.path(), 1, &["render", "kuhn:2,2,2", "-o", "no/such/folder/a.png", "--device", "cpu"]);
+}
+
+#[test]
+fn points_may_be_missing() {
+    let folder = TempDir::new().unwrap();
+    for (name, content) in [("empty.csv", ""), ("header.csv", "x,y,z\n")] {
+        std::fs::write(folder.path().join(name), content).unwrap();
+        let out = olbvh(folder.path(), &["locate", "kuhn:2,2,2", name, "-o", "o.csv", "--device", "cpu", "--json"]);
+        let message = text(&out.stderr);
+        assert_eq!((out.status.code(), message.contains(&format!("{name}: no points"))), (Some(0), true), "{message}");
+        assert_eq!(serde_json::from_slice::<Value>(&out.stdout).unwrap()["points"], 0);
+    }
+}
+
+/// What an existing path is decides whether it can be a result; links are kept.
+#[cfg(unix)]
+#[test]
+fn results_go_to_files_of_any_folder() {
+    let folder = TempDir::new().unwrap();
+    let place = |name: &str| folder.path().join(name);
+    let render = |code: i32, output: &str| {
+        let out = olbvh(folder.path(), &["render", "kuhn:2,2,2", "-o", output, "--size", "4", "--device", "cpu"]);
+        assert_eq!(out.status.code(), Some(code), "{output}: {}", text(&out.stderr));
+        text(&out.stderr)
+    };
+    let (old, new) = (place("old.png"), place("new.png"));
+    std::fs::write(&old, "").unwrap();
+    for (target, link) in [(&old, "a.png"), (&new, "b.png")] {
+        std::os::unix::fs::symlink(target.file_name().unwrap(), place(link)).unwrap();
+        render(0, link);
+        assert!(place(link).is_symlink() && !target.is_symlink() && std::fs::metadata(target).unwrap().len() > 0, "{link}");
+    }
+    assert!(Command::new("mkfifo").arg(place("pipe.png")).status().unwrap().success());
+    std::fs::create_dir(place("folder.png")).unwrap();
+    std::os::unix::fs::symlink("/dev/null", place("null.png")).unwrap();
+    for (output, part) in [("pipe.png", "streams or devices"), ("null.png", "streams or devices"), ("-", "streams"), ("folder.png", "a folder")] {
+        let message = render(2, output);
+        assert!(message.contains(part), "{output}: {message}");
+    }
+    if Path::new("/dev/shm").is_dir() {
+        let shared = tempfile::tempdir_in("/dev/shm").unwrap();
+        render(0, shared.path().join("a.png").to_str().unwrap());
+    }
+    if Path::new("/proc/self").is_dir() {
+        let message = render(1, "/proc/a.png");
+        assert!(message.contains("/proc/a.png: ") && !message.contains(".part"), "{message}");
+    }
+}
+
+/// A list names the large cases, too, and a name selects them.
+#[test]
+fn conformance_lists_what_it_can_run() {
+    let folder = TempDir::new().unwrap();
+    let groups = |arguments: &[&str]| {
+        let told = json(folder.path(), &[&["conformance", "--list"], arguments].concat());
+        let names = |group: &str| told["cases"].as_array().unwrap().iter().filter(|case| case["group"] == group).count();
+        ["quick", "full", "large"].map(names)
+    };
+    let all = groups(&[]);
+    assert!(all.iter().all(|&n| n > 0), "{all:?}");
+    assert_eq!(groups(&["--filter", "large"]), [0, 0, all[2]]);
+    assert_eq!(groups(&["--filter", "full"]), [all[0], all[1], 0]);
+    assert!(groups(&["--filter", "sort/21-bits"])[2] > 0);
 }
 
 #[test]

@@ -33,12 +33,17 @@ fn slices_become_files() {
     let kinds = std::fs::read(folder.join("a.kind.npy")).unwrap();
     let inside = kinds[kinds.len() - 210..].iter().map(|&k| u64::from(k == 2)).sum::<u64>();
     assert_eq!(inside, count("inside"));
-    for (name, layers) in [("b.vti", "2"), ("c.png", "1"), ("d.png", "2")] {
-        assert_eq!(
-            olbvh(folder, &["slice", "kuhn:4,3,2", "-o", name, "--layers", layers, "--size", "8", "--normal", "1,2,3"]).0,
-            0,
-            "{name}"
-        );
+    assert_eq!((&json["origin"], &json["axis"]), (&serde_json::json!([0.2, 3.0 / 14.0, 1.0 / 3.0].map(|x: f64| f64::from(x as f32))), &"z".into()));
+    let near = |key: &str, wanted: [f64; 3]| (0..3).all(|i| (json[key][i].as_f64().unwrap() - wanted[i]).abs() < 1e-6);
+    assert!(near("spacing", [0.4, 3.0 / 7.0, 2.0 / 3.0]) && json["axes"][2] == serde_json::json!([0.0, 0.0, 1.0]), "{json:#}");
+    assert!((json["thickness"].as_f64().unwrap() - 2.0 / 3.0).abs() < 1e-6, "{json:#}");
+    for (name, layers, first, last) in
+        [("b.vti", "2", "b.vti", "b.vti"), ("c.png", "1", "c.png", "c.png"), ("d.png", "2", "d-0000.png", "d-0001.png")]
+    {
+        let normal = ["slice", "kuhn:4,3,2", "-o", name, "--layers", layers, "--size", "8", "--normal", "1,2,3"];
+        let (code, json, text) = olbvh(folder, &normal);
+        assert_eq!((code, &json["file"], &json["last_file"]), (0, &first.into(), &last.into()), "{name}: {text}");
+        assert!(json["axis"].is_null());
     }
     let (code, json, text) = olbvh(folder, &["slice", "kuhn:4,3,2", "-o", "e.svx", "--size", "8"]);
     assert_eq!((code, json["layers"].as_u64(), json["height"].as_u64()), (0, Some(4), Some(6)), "{text}");
@@ -75,7 +80,7 @@ fn slices_become_files() {
 fn remarks() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, wanted) in [
-        (&["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "8", "--at", "90"][..], "all voxels are empty"),
+        (&["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "8", "--at", "90"][..], "along z the mesh lies from 0 to 2, the layers from 89.75 to 90.25"),
         (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8", "--layers", "2"], "2 of the 4 layers"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "7,9"], "no surface to be seen"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.5,9"], ""),
@@ -129,6 +134,8 @@ fn overlaps_become_files() {
     assert_eq!((turned["a"].as_u64(), turned["b"].as_u64()), (Some(48), Some(48)));
     let (code, away, _) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "d.vtu", "--move-b", "0,-9,0"]);
     assert_eq!((code, away["a"].as_u64(), away["narrow_tests"].as_u64()), (0, Some(0), Some(0)));
+    let (code, _, text) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.vtu", "--pairs"]);
+    assert!(code == 2 && text.contains("--pairs needs a .json file"), "{code} {text}");
     for wrong in [&["--rotate-b", "z"][..], &["--rotate-b", "0,0,0,5"], &["--move-b", "1,2"], &["--move-b", "1,2,inf"]] {
         let arguments = [&["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.json"], wrong].concat();
         assert_eq!(olbvh(folder, &arguments).0, 2, "{wrong:?}");

@@ -2,6 +2,7 @@
 #![cfg(feature = "cli")]
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+use olbvh::tune::Profile;
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
@@ -30,6 +31,13 @@ impl Home {
         serde_json::from_slice(&out.stdout).unwrap()
     }
 
+    /// The path of the profile of the device that a run of `tune` tells of.
+    fn profile(&self, told: &Value) -> PathBuf {
+        let devices = olbvh::gpu::list_devices().unwrap();
+        let device = devices.iter().find(|d| told["device"] == d.name.as_str() && told["driver"] == d.driver.as_str()).unwrap();
+        self.path("config/olbvh").join(Profile::file_name(device))
+    }
+
     /// The line of `info -v` about the kernels, and its remarks.
     fn kernels(&self, arguments: &[&str], variables: &[(&str, &str)]) -> (String, String) {
         let out = self.olbvh(&[&["info", "kuhn:2,2,2", "-v"], arguments].concat(), variables);
@@ -51,12 +59,13 @@ fn a_search_saves_what_it_gained() {
     let told = home.json(&["tune", "kuhn:5,5,5,jitter=0.3", "--seconds", "2", "--no-profile"]);
     let [tried, refused, kept] = ["tried", "refused", "kept"].map(|key| told[key].as_u64().unwrap());
     assert!(tried > 0 && refused == 0, "{told:#}");
-    let file = PathBuf::from(told["file"].as_str().unwrap());
-    assert!(file.starts_with(home.path("config")), "{}", file.display());
     if kept == 0 {
-        assert!(!file.exists() && told["profile"].is_null() && told["before"] == told["after"], "{told:#}");
+        assert!(told["file"].is_null() && told["profile"].is_null() && told["before"] == told["after"], "{told:#}");
+        assert!(!home.profile(&told).exists());
         return;
     }
+    let file = PathBuf::from(told["file"].as_str().unwrap());
+    assert_eq!(file, home.profile(&told));
     assert_eq!(told["profile"], told["file"]);
     let saved: Value = serde_json::from_slice(&std::fs::read(&file).unwrap()).unwrap();
     assert_eq!((&saved["gains"], &saved["device"]), (&told["gains"], &told["device"]));
@@ -71,8 +80,10 @@ fn profiles_are_found_and_passed_over() {
     let tune = ["tune", "kuhn:3,3,3", "--seconds", "0"];
     let told = home.json(&[&tune[..], &["-o", "mine.json"]].concat());
     assert_eq!((&told["tried"], &told["kept"]), (&0.into(), &0.into()));
-    assert!(home.json(&tune)["profile"].is_null());
-    let file = PathBuf::from(home.json(&tune)["file"].as_str().unwrap());
+    assert_eq!((&told["file"], &told["profile"]), (&"mine.json".into(), &"mine.json".into()));
+    let told = home.json(&tune);
+    assert!(told["file"].is_null() && told["profile"].is_null(), "{told:#}");
+    let file = home.profile(&told);
     assert!(!file.exists());
     assert!(home.kernels(&[], &[]).0.contains("for devices of this kind"));
 
@@ -114,25 +125,33 @@ fn profiles_are_found_and_passed_over() {
         assert!(remarks.contains("profile ignored") && remarks.contains(path) && remarks.contains(what), "{remarks}");
         assert!(remarks.contains("remove it, or"), "{remarks}");
     }
+    for arguments in [&tune[..], &["devices"], &["devices", "-v"]] {
+        let remarks = String::from_utf8(home.olbvh(arguments, &[]).stderr).unwrap();
+        assert_eq!(remarks.matches("profile ignored").count(), 1, "{arguments:?}: {remarks}");
+    }
 
     // A target that is asked for must exist, and takes precedence over the profile.
     write(&file, &profile);
     assert!(home.kernels(&["--target", "mine.json"], &[]).0.contains("from mine.json"));
     assert!(home.kernels(&[], &[("OLBVH_TARGET", "amd")]).0.contains("`amd`, as asked for"));
+    assert!(home.kernels(&[], &[("OLBVH_TARGET", "")]).0.contains("`mine`"), "an empty variable counts as unset");
+    let unknown = home.olbvh(&["info", "kuhn:2,2,2"], &[("OLBVH_TARGET", "bogus")]);
+    let message = String::from_utf8_lossy(&unknown.stderr);
+    assert!(unknown.status.code() == Some(2) && message.contains("OLBVH_TARGET: unknown target `bogus`"), "{message}");
     write(&home.path("narrow.json"), &narrow);
     write(&home.path("broken.json"), &Value::Null);
     for (target, code) in [("nvida", 2), ("narrow.json", 2), ("broken.json", 3), ("nothing.json", 3)] {
         let out = home.olbvh(&["info", "kuhn:2,2,2", "--target", target], &[]);
         let message = String::from_utf8_lossy(&out.stderr);
         assert_eq!(out.status.code(), Some(code), "{target}: {message}");
-        assert!(message.contains(target), "{message}");
+        assert!(message.contains("--target: ") && message.contains(target), "{message}");
     }
 }
 
 #[test]
 fn wrong_arguments_are_refused() {
     let home = Home::new();
-    let wrong: [&[&str]; 4] = [&["--seconds=-1"], &["-o", "a.txt"], &["--device", "cpu"], &["kuhn:0,1,1"]];
+    let wrong: [&[&str]; 5] = [&["--seconds=-1"], &["--seconds", "-3"], &["-o", "a.txt"], &["--device", "cpu"], &["kuhn:0,1,1"]];
     for arguments in wrong {
         let out = home.olbvh(&[&["tune"], arguments].concat(), &[]);
         assert_eq!(out.status.code(), Some(2), "{arguments:?}: {}", String::from_utf8_lossy(&out.stderr));

@@ -93,13 +93,19 @@ fn tables_of_points() {
         std::fs::write(&path, text).unwrap();
         assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
     }
+    for nothing in ["", "x,y,z\n", "# comment\n\n"] {
+        std::fs::write(&path, nothing).unwrap();
+        assert!(load_points(&path).unwrap().is_empty(), "{nothing:?}");
+    }
+    let array = folder.path().join("p.npy");
+    std::fs::write(&array, "").unwrap();
+    assert!(load_points(&array).unwrap_err().to_string().contains("ends inside the header"));
     for (text, place) in [
         ("1,2,3\n4,5\n", "line 2"),
         ("x,y,z\n1,2,3\n4,five,6\n", "line 3"),
         ("1,2,3,4\n", "line 1"),
         ("1.o,2,3\n4,4,4\n", "line 1: `1.o` is not a number"),
         ("a,b,c,d\n1,2,3,4\n", "line 1"),
-        ("", "no points"),
         ("1,2\0,3", "byte 3"),
     ] {
         std::fs::write(&path, text).unwrap();

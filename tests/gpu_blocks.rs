@@ -9,8 +9,12 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::query::{self, LocateOptions, OverlapInput, Path};
+use olbvh::reference::boundary::topology;
+use olbvh::reference::build::build;
+use olbvh::reference::volume;
 use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
+use std::cell::RefCell;
 
 const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
@@ -237,4 +241,27 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
     println!("{one}, {some} and {all} trees");
     assert!(whole == found && whole.iter().any(|c| f32::from_bits(c[3]) > 0.1));
     assert!(one == 1 && some > 1 && some + 1 < all, "{one}, {some} and {all} trees");
+}
+
+/// A picture of more rays than are drawn at once: its strips are those of the reference's picture, and progress is reported.
+#[test]
+fn large_pictures_are_drawn_in_strips() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([4, 4, 4], 0.2, 5).unwrap();
+    let field = Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
+    let settings = RenderSettings { size: [4096, 270], step: Some(0.2), shading: false, ..RenderSettings::default() };
+    let (topology, options) = (topology(&mesh).unwrap(), BuildOptions::default());
+    let host = build(&mesh, &topology, &options).unwrap();
+    let scene = volume::Scene::new(&mesh, &topology, &host, &field, &settings).unwrap();
+    let expected = volume::render(&scene, &|_, _| {});
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &options).unwrap();
+    let told = RefCell::new(Vec::new());
+    let report = |done, all| told.borrow_mut().push((done, all));
+    let drawn = query::render(&device, &tree, scene.plan(), (&field.values, field.on), None, &report).unwrap();
+    assert_eq!((drawn.samples, drawn.found_samples), (expected.samples, expected.found_samples));
+    let pixels = scene.plan().pixels(&drawn.colors);
+    assert!(drawn.found_samples > 100_000 && pixels == expected.pixels);
+    let (told, all) = (told.into_inner(), 4096 * 270);
+    assert!(told.iter().any(|&(done, _)| done == 4096 * 256) && told.last() == Some(&(all, all)), "{told:?}");
 }

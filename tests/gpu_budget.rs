@@ -131,8 +131,7 @@ fn memory_of_a_recorded_build() {
         assert!(size <= bytes && size > bytes - bytes / 8, "{size} of {bytes}");
         let carve =
             |a: &mut Arena| Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?));
-        let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
-        let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (memory, (tree, scratch)) = Arena::reserve(&gpu, "olbvh.test.tree", carve).unwrap();
         submit(&gpu, "olbvh.test.build", |r| cmd_build(r, &view, &tree, &options, &scratch)).unwrap();
         let status = gpu.download::<BuildStatus>(&memory, tree.status.part(0, size_of::<BuildStatus>() as u64)).unwrap()[0];
         assert!(status.overflow == 0 && status.entries <= capacity.entries && status.nodes <= capacity.nodes);

@@ -209,8 +209,7 @@ fn rounds_go_on_where_they_ended() {
     let searched = StructureView::new(&device, &tree).unwrap();
     let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
     let carve = |a: &mut Arena| SliceMemory::carve(a, [5, 5], 5);
-    let buffer = gpu.buffer("olbvh.test.slice", Arena::measure(carve).unwrap()).unwrap();
-    let memory = carve(&mut Arena::new(buffer.all())).unwrap();
+    let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.slice", carve).unwrap();
     // The same number of voxels, but more side by side.
     let wide = olbvh::slicing::VoxelGrid { size: [25, 1], ..voxels };
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
@@ -253,8 +252,7 @@ fn rounds_go_on_where_they_ended() {
         overlap(OverlapInput { mesh: &few, tree: &few_tree }, OverlapInput { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
-    let buffer = gpu.buffer("olbvh.test.pairs", Arena::measure(carve).unwrap()).unwrap();
-    let (memory, found) = carve(&mut Arena::new(buffer.all())).unwrap();
+    let (buffer, (memory, found)) = Arena::reserve(&gpu, "olbvh.test.pairs", carve).unwrap();
     let status = || gpu.download::<OverlapStatus>(&buffer, memory.status).unwrap()[0];
     // With too few rounds to count all pairs, nothing is written, and the status says so.
     submit(&gpu, "olbvh.test.rounds", |r| {

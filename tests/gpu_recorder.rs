@@ -75,8 +75,7 @@ fn primitives() {
         let carve = |a: &mut Arena| {
             Ok((ScanScratch::carve(&gpu, a, n as u32)?, SortScratch::carve(&gpu, a, n as u32, 21)?, a.take(REDUCE_SCRATCH)?))
         };
-        let scratch = gpu.buffer("olbvh.test.scratch", Arena::measure(carve).unwrap()).unwrap();
-        let (scan, sort, reduce) = carve(&mut Arena::new(scratch.all())).unwrap();
+        let (_scratch, (scan, sort, reduce)) = Arena::reserve(&gpu, "olbvh.test.scratch", carve).unwrap();
         for count in [Count::host(n as u32), Count::device(n as u32, count.all())] {
             let what = format!("{} {count:?}", gpu.target().name);
             every_barrier_counts(&gpu, &format!("reduce {what}"), |r| {
@@ -150,8 +149,7 @@ fn location() {
     let (values, sink) = (gpu.buffer("olbvh.test.values", 4 * u64::from(frame.points.count)), gpu.buffer("olbvh.test.sink", 64));
     let (values, sink) = (values.unwrap(), sink.unwrap());
     let carve = |a: &mut Arena| PointOrder::carve(&gpu, a, frame.points.count);
-    let memory = gpu.buffer("olbvh.test.order", Arena::measure(carve).unwrap()).unwrap();
-    let order = carve(&mut Arena::new(memory.all())).unwrap();
+    let (_memory, order) = Arena::reserve(&gpu, "olbvh.test.order", carve).unwrap();
     let points = PointInput { order: Some(order.order), ..frame.points };
     let barriers = every_barrier_counts(&gpu, "location", |r| {
         cmd_sort_points(r, frame.tree.grid, &points, &order)?;
@@ -268,8 +266,7 @@ fn construction() {
         let sink = gpu.buffer("olbvh.test.sink", 4096).unwrap();
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
         let carve = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?));
-        let memory = gpu.buffer("olbvh.test.mesh", Arena::measure(carve).unwrap()).unwrap();
-        let (arrays, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (_memory, (arrays, scratch)) = Arena::reserve(&gpu, "olbvh.test.mesh", carve).unwrap();
         let barriers = every_barrier_counts(&gpu, "mesh", |r| {
             cmd_prepare_mesh(r, device.input(), &arrays, &scratch)?;
             r.barrier("mesh → caller");
@@ -289,8 +286,7 @@ fn construction() {
                 let carve = |a: &mut Arena| {
                     Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?))
                 };
-                let memory = gpu.buffer("olbvh.test.tree", Arena::measure(carve).unwrap()).unwrap();
-                let (tree, scratch) = carve(&mut Arena::new(memory.all())).unwrap();
+                let (_memory, (tree, scratch)) = Arena::reserve(&gpu, "olbvh.test.tree", carve).unwrap();
                 let barriers = every_barrier_counts(&gpu, &format!("build {assign} {boxes} {}", gpu.target().name), |r| {
                     cmd_build(r, &view, &tree, &options, &scratch)?;
                     let arrays = [tree.status, tree.grid, tree.p, tree.po, tree.co, tree.flags, tree.masks];

@@ -158,11 +158,9 @@ impl Lbvh {
         let view = mesh.view();
         let tets = view.input.tets;
         let carve = |a: &mut Arena| BinaryTree::carve(a, tets);
-        let memory = gpu.buffer("olbvh.lbvh.tree", Arena::measure(carve)?)?;
-        let tree = carve(&mut Arena::new(memory.all()))?;
+        let (memory, tree) = Arena::reserve(gpu, "olbvh.lbvh.tree", carve)?;
         let carve = |a: &mut Arena| LbvhScratch::carve(gpu, a, tets);
-        let buffer = gpu.buffer("olbvh.lbvh.scratch", Arena::measure(carve)?)?;
-        let scratch = carve(&mut Arena::new(buffer.all()))?;
+        let (_buffer, scratch) = Arena::reserve(gpu, "olbvh.lbvh.scratch", carve)?;
         let ((), time) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
         Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
     }
@@ -201,8 +199,7 @@ impl Lbvh {
         let n = points.len() as u64;
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
-        let memory = gpu.buffer("olbvh.lbvh.located", Arena::measure(carve)?)?;
-        let (owners, barycentrics, unfinished) = carve(&mut Arena::new(memory.all()))?;
+        let (memory, (owners, barycentrics, unfinished)) = Arena::reserve(gpu, "olbvh.lbvh.located", carve)?;
         let view = mesh.view();
         let (asked, output) = ((uploaded.all(), points.len() as u32), LocateOutput { owners, barycentrics });
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));

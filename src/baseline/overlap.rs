@@ -105,7 +105,7 @@ impl Lbvh {
             done.stages.extend(time.stages);
             let mut statuses = [OverlapStatus::default(); 2];
             for (status, direction) in statuses.iter_mut().zip(&directions) {
-                *status = gpu.download(&memory, direction.status)?.first().copied().unwrap_or_default();
+                *status = gpu.download_one(&memory, direction.status)?;
             }
             let unfinished = statuses.iter().map(|s| u64::from(s.unfinished)).sum::<u64>();
             report(all - unfinished, all);

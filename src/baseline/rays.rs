@@ -67,8 +67,7 @@ impl Rays {
         let MeshInput { cells, tets, points, .. } = *input;
         let vertices = arrays.vertices;
         let carve = |a: &mut Arena| Ok((a.words(u64::from(tets))?, a.words(1)?, ScanScratch::carve(gpu, a, tets)?));
-        let counts = gpu.buffer("olbvh.rays.counts", Arena::measure(carve)?)?;
-        let (places, total, scan) = carve(&mut Arena::new(counts.all()))?;
+        let (counts, (places, total, scan)) = Arena::reserve(gpu, "olbvh.rays.counts", carve)?;
         let memory = gpu.buffer("olbvh.rays.longest", 4)?;
         let longest = memory.all();
         let list = |r: &mut Recorder<'_>, fill: u32, indices: BufferRef, sides: BufferRef| {
@@ -85,7 +84,7 @@ impl Rays {
             cmd_exclusive_scan(r, places, places, total, Count::host(tets), &scan)
         })?;
         let mut stages = time.stages;
-        let faces = gpu.download::<u32>(&counts, total.part(0, 4))?.first().copied().unwrap_or(0);
+        let faces: u32 = gpu.download_one(&counts, total)?;
         let indices = gpu.buffer("olbvh.rays.indices", 12 * u64::from(faces))?;
         let sides = gpu.buffer("olbvh.rays.sides", 8 * u64::from(faces))?;
         let ((), time) = gpu.submit("olbvh.rays.list", |r| list(r, 1, indices.all(), sides.all()))?;
@@ -156,8 +155,7 @@ impl Rays {
         let n = points.len() as u64;
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
-        let memory = self.gpu.buffer("olbvh.rays.located", Arena::measure(carve)?)?;
-        let (owners, barycentrics) = carve(&mut Arena::new(memory.all()))?;
+        let (memory, (owners, barycentrics)) = Arena::reserve(&self.gpu, "olbvh.rays.located", carve)?;
         let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
         let output = LocateOutput { owners, barycentrics };
         let ((), time) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;

@@ -186,7 +186,7 @@ impl Comparison {
 
     /// Geometric mean of the ratios of each kind of measurement, and the number of each verdict.
     fn summary(&self) -> Table {
-        let header = ["", "compared", "B/A, geometric mean", "faster", "slower", "within spread"];
+        let header = ["", "compared", "B/A, geometric mean", "faster", "slower", "within spread", "too few repetitions"];
         let mut names: Vec<&str> = Vec::new();
         for c in &self.compared {
             if !names.contains(&c.measurement.as_str()) {
@@ -197,7 +197,7 @@ impl Comparison {
             let of: Vec<&Compared> = self.compared.iter().filter(|c| c.measurement == *name).collect();
             let mean = (of.iter().map(|c| c.ratio.ln()).sum::<f64>() / of.len() as f64).exp();
             let count = |v: Verdict| of.iter().filter(|c| c.verdict == v).count().to_string();
-            let counts = [Verdict::Faster, Verdict::Slower, Verdict::WithinSpread].map(count);
+            let counts = [Verdict::Faster, Verdict::Slower, Verdict::WithinSpread, Verdict::Unknown].map(count);
             [vec![(*name).to_owned(), of.len().to_string(), number(mean)], counts.to_vec()].concat()
         };
         Table { title: "Summary: time of B by time of A".into(), header: text_of(&header), rows: names.iter().map(row).collect() }
@@ -328,6 +328,10 @@ mod tests {
             assert!(text.contains("SLOWER") && text.contains("2.00") && !text.contains("DIFFERS"), "{text}");
         }
         assert_eq!(Verdict::of(build.ms, 2), Verdict::Unknown);
+        let mut few = a.clone();
+        few["meshes"][0]["structures"][0]["figures"][0]["repetitions"] = 2.into();
+        let summary = compared(&few, &b).summary();
+        assert_eq!((&summary.header[6][..], &summary.rows[0][3..]), ("too few repetitions", &["0", "0", "0", "1"].map(str::to_owned)[..]));
     }
 
     #[test]

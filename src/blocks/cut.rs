@@ -1,15 +1,13 @@
 //! Cutting a mesh into blocks: boxes of octree cells, and the tetrahedra of each.
 
-use crate::build::{
-    BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, MAX_ENTRIES, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, Tree,
-    TreeMemory,
-};
+use super::size::{Extent, Size};
+use super::{LEAST, pieces, smaller};
+use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
 use crate::mesh::{Mesh, On};
 use crate::options::{BuildOptions, Fineness, Lists};
-use crate::primitives::Arena;
 use crate::reference::boundary::{Topology, neighbours};
 use crate::reference::depth::measure;
 use crate::reference::grid::MAX_LEVEL;
@@ -17,6 +15,7 @@ use crate::reference::vertices::{CellRange, Vertices};
 use rayon::prelude::*;
 use std::borrow::Cow;
 use std::rc::Rc;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// A level with at most this many `Aabb` entries per tetrahedron counts as cheap. A body that fills its bounds has 8 at
@@ -30,8 +29,10 @@ pub(super) struct Source<'a> {
     /// Build options, with the level of all trees.
     pub(super) options: BuildOptions,
     pub(super) level: u32,
-    topology: Topology,
-    vertices: Vertices,
+    /// The level before memory was considered.
+    wanted: u32,
+    topology: Arc<Topology>,
+    vertices: Arc<Vertices>,
 }
 
 /// A set of points of the mesh.
@@ -61,8 +62,8 @@ impl Marks {
 }
 
 impl<'a> Source<'a> {
-    /// Chooses the level for trees with these options within `memory` bytes.
-    pub(super) fn new(mesh: &'a Mesh, options: &BuildOptions, memory: u64) -> Result<Self> {
+    /// Prepares a mesh for trees with these options, of the level that suits best if memory is no object.
+    pub(super) fn new(mesh: &'a Mesh, options: &BuildOptions) -> Result<Self> {
         let topology = Topology::bare(mesh)?;
         let grid = topology.grid;
         let cell = mesh.points.par_iter().map(|&p| grid.quantize(p).map(|q| q as u16)).collect();
@@ -72,10 +73,50 @@ impl<'a> Source<'a> {
         // either coarser leaves had long lists, or the finer level costs little.
         let cheap = |level: &u32| options.fineness != Fineness::Alpha && sizes.entries[*level as usize] <= CHEAP * sizes.entries[0];
         let wanted = sizes.level(options)?.max((0..=MAX_LEVEL).rev().find(cheap).unwrap_or(0));
-        let fits = |level: &u32| options.lists == Lists::All || 8u64.pow(*level) / 8 <= memory / 8;
-        let level = (0..=wanted).rev().find(fits).unwrap_or(0);
-        let options = BuildOptions { level: Some(level), capacity: Some(u32::MAX), budget: None, fineness: Fineness::Alpha, ..*options };
-        Ok(Self { mesh, grid, options, level, topology, vertices })
+        let level = Some(wanted);
+        let options = BuildOptions { level, capacity: Some(u32::MAX), budget: None, fineness: Fineness::Alpha, ..*options };
+        let (topology, vertices) = (Arc::new(topology), Arc::new(vertices));
+        Ok(Self { mesh, grid, options, level: wanted, wanted, topology, vertices })
+    }
+
+    /// The same mesh, with trees of the finest level, up to the one wanted, that suits `memory` bytes: the marks of
+    /// cells take at most an eighth of them, and a block of the [`LEAST`] largest tetrahedra at most half. On a finer
+    /// level, these would have too many candidates for any block with them to fit.
+    pub(super) fn within(&self, gpu: &Gpu, memory: u64) -> Result<Self> {
+        let at = |level: u32| BuildOptions { level: Some(level), ..self.options };
+        let marks_fit = |level: u32| self.options.lists == Lists::All || 8u64.pow(level) / 8 <= memory / 8;
+        let mut level = self.wanted;
+        while level > 0 && !(marks_fit(level) && self.largest(level).bytes(gpu, &at(level))? <= memory / 2) {
+            level -= 1;
+        }
+        Ok(Self { level, options: at(level), topology: self.topology.clone(), vertices: self.vertices.clone(), ..*self })
+    }
+
+    /// The size of a block of the [`LEAST`] tetrahedra with the most candidates at a level.
+    fn largest(&self, level: u32) -> Size {
+        let counts = (0..self.mesh.tets.len() as u32).into_par_iter().filter(|&t| self.is_valid(t));
+        let mut counts: Vec<u32> = counts.map(|t| self.vertices.cells(self.mesh.tets[t as usize], level).count()).collect();
+        if counts.len() > LEAST {
+            counts.select_nth_unstable_by(LEAST, |a, b| b.cmp(a));
+            counts.truncate(LEAST);
+        }
+        let candidates = counts.iter().map(|&n| u64::from(n)).sum();
+        Size { points: counts.len() as u32, tets: counts.len(), candidates, entries: candidates, leaves: candidates.min(8u64.pow(level)) }
+    }
+
+    /// Whether `memory` bytes suffice for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
+    /// (see [`Self::cut_in_two`]).
+    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, memory: u64, beside: u64, may: &dyn Fn(usize, u32) -> bool) -> Result<bool> {
+        let (source, most) = (self.within(gpu, memory)?, memory.saturating_sub(beside));
+        let mut waiting = vec![source.whole()];
+        while let Some(block) = waiting.pop() {
+            let need = block.bytes(gpu, &source.options)?;
+            if need > most {
+                let Some(halves) = smaller(&source, &block, pieces(need, most), may) else { return Ok(false) };
+                waiting.extend(halves);
+            }
+        }
+        Ok(true)
     }
 
     /// The longest side of the bounds.
@@ -114,17 +155,8 @@ impl<'a> Source<'a> {
     fn sized(&self, cells: CellRange, tets: Vec<u32>, points: u32) -> Block {
         let extent =
             tets.par_iter().fold(Extent::default, |sum, &t| sum.with(cells, self.cells_of(t))).reduce(Extent::default, Extent::and);
-        let Extent { span, reach, candidates, crossing } = extent;
-        let size = Size {
-            points,
-            tets: tets.len(),
-            candidates,
-            // The candidates of tetrahedra that reach beyond the block's own cells are all counted as entries, since
-            // the block's boundary is there; of the others, only those near the surface of the mesh.
-            entries: if self.options.lists == Lists::All { candidates } else { crossing + (candidates - crossing) / SURFACE },
-            leaves: reach.map_or(0, |reach| u64::from(reach.count())),
-        };
-        Block { cells, span, tets: Rc::new(tets), size }
+        let size = Size::new(tets.len(), points, &extent, self.options.lists);
+        Block { cells, span: extent.span, tets: Rc::new(tets), size }
     }
 
     /// The neighbours across the faces of each tetrahedron, as in [`crate::reference::boundary::Topology`].
@@ -179,60 +211,6 @@ pub(super) struct Block {
     pub(super) tets: Rc<Vec<u32>>,
     /// The quantities that its memory depends on.
     size: Size,
-}
-
-/// Estimate: of the entries with `Lists::All`, one in this many remains with `Lists::Boundary`. *Jets* has one in 11 at
-/// α = 0, smaller meshes have more. A block that turns out to be larger is cut again.
-const SURFACE: u64 = 8;
-
-/// The cells that the tetrahedra of a block meet.
-#[derive(Clone, Copy, Default)]
-struct Extent {
-    /// The bounding box of the block's own cells that they meet.
-    span: Option<CellRange>,
-    /// The bounding box of all cells that they meet.
-    reach: Option<CellRange>,
-    /// The number of cells that they meet, summed over the tetrahedra.
-    candidates: u64,
-    /// The part of that sum for tetrahedra that also meet other cells than the block's own.
-    crossing: u64,
-}
-
-impl Extent {
-    /// Adds a tetrahedron that meets the cells `own`.
-    fn with(self, block: CellRange, own: CellRange) -> Self {
-        let (span, candidates) = (block.common(&own), u64::from(own.count()));
-        let crossing = if span == Some(own) { 0 } else { candidates };
-        self.and(Self { span, reach: Some(own), candidates, crossing })
-    }
-
-    fn and(self, other: Self) -> Self {
-        let union = |a: CellRange, b: CellRange| CellRange {
-            lo: [0, 1, 2].map(|c| a.lo[c].min(b.lo[c])),
-            hi: [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])),
-        };
-        let either = |a: Option<CellRange>, b| a.zip(b).map(|(a, b)| union(a, b)).or(a).or(b);
-        Self {
-            span: either(self.span, other.span),
-            reach: either(self.reach, other.reach),
-            candidates: self.candidates + other.candidates,
-            crossing: self.crossing + other.crossing,
-        }
-    }
-}
-
-/// The quantities that the memory of a mesh and its tree depends on.
-#[derive(Clone, Copy, Default)]
-struct Size {
-    /// Upper bound of the number of points.
-    points: u32,
-    tets: usize,
-    /// Cells in the quantized boxes of all tetrahedra.
-    candidates: u64,
-    /// Estimated number of entries.
-    entries: u64,
-    /// Upper bound of the number of leaves.
-    leaves: u64,
 }
 
 /// A block or a whole mesh in device memory, with its tree.
@@ -301,36 +279,6 @@ impl Block {
     }
 }
 
-/// Estimate of the least bytes that a whole mesh takes, as if its tree had no entries.
-pub(super) fn least_bytes(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions) -> Result<u64> {
-    let points = u32::try_from(mesh.points.len()).unwrap_or(u32::MAX);
-    Size { points, tets: mesh.tets.len(), ..Size::default() }.bytes(gpu, &BuildOptions { level: Some(0), ..*options })
-}
-
-impl Size {
-    /// Estimate of the most bytes in use while the tree is built, the mesh included; `u64::MAX` if 32 bits cannot
-    /// number the mesh or the tree.
-    fn bytes(&self, gpu: &Gpu, options: &BuildOptions) -> Result<u64> {
-        let Self { points, tets, candidates, entries, leaves } = *self;
-        if tets > MAX_TETS as usize || candidates > u64::from(u32::MAX) || entries > u64::from(MAX_ENTRIES) {
-            return Ok(u64::MAX);
-        }
-        let (tets, candidates, entries, level) = (tets as u32, candidates as u32, entries as u32, options.level.unwrap_or(0));
-        // Each level has about an eighth of the nodes of the next.
-        let nodes = leaves.min(u64::from(entries)) as u32 / 7 * 8 + 64;
-        let capacity = Capacity { candidates, entries, nodes, level };
-        let kept = 12 * u64::from(points) + 16 * u64::from(tets) + Arena::measure(|a| MeshArrays::carve(a, points, tets))?;
-        let faces = Arena::measure(|a| MeshScratch::carve(a, tets))?;
-        let tree = Arena::measure(|a| {
-            CountScratch::carve(gpu, a, tets)?;
-            FilterScratch::carve(gpu, a, tets, options, &capacity)?;
-            SortedScratch::carve(gpu, a, &capacity)?;
-            TreeMemory::carve(a, &capacity, options)
-        })?;
-        Ok(kept + faces.max(tree))
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -342,7 +290,7 @@ mod tests {
     fn a_core_has_the_neighbours_and_the_boundary_of_the_whole() {
         let mesh = kuhn_jittered([9, 8, 7], 0.2, 3).unwrap();
         let whole = topology(&mesh).unwrap();
-        let source = Source::new(&mesh, &BuildOptions::default(), 1 << 30).unwrap();
+        let source = Source::new(&mesh, &BuildOptions::default()).unwrap();
         let [low, high] = source.cut_in_two(&source.whole(), 2, &|_, _| true).unwrap();
         let [a, b] = source.cut_in_two(&low, 2, &|_, _| true).unwrap();
         let (mut checked, mut beside, mut needed) = (0, 0, 0);

@@ -1,7 +1,8 @@
 //! Point location in blocks.
 
-use super::cut::{Placed, Source, least_bytes};
-use super::{InBlocks, check_field, pieces, refusal, smaller};
+use super::cut::{Placed, Source};
+use super::size::least_bytes;
+use super::{ANYWHERE, InBlocks, LEAST, Refused, check_field, pieces, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
@@ -9,10 +10,11 @@ use crate::options::BuildOptions;
 use crate::query::{self, LocateOptions, Located};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{CHUNK, place};
+use std::slice::from_ref;
 
 /// Bytes of device memory per point during point location, with a reserve.
 const PER_POINT: u64 = 128;
-/// Locating fewer points at a time is not worth a tree.
+/// Locating fewer points at a time is not worth a tree, unless its block is so small that it is not cut.
 const FEW: usize = 4096;
 
 /// Points of a mesh that may not fit the device.
@@ -96,7 +98,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
             other => return other.map(|()| job.end()),
         }
     }
-    let source = Source::new(mesh, options, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu, memory)?;
     // The other points lie so far outside that they have no cell.
     let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
     let mut waiting = vec![(source.whole(), near)];
@@ -114,8 +116,10 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), a
                 Ok(()) => continue,
             }
         }
-        let Some([low, high]) = smaller(&source, &block, pieces(need, memory)) else {
-            return Err(refusal(gpu, block.tets.len(), need + PER_POINT * FEW as u64, why));
+        let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
+            let beside = PER_POINT * FEW.min(ids.len()) as u64;
+            let refused = Refused { gpu, sources: from_ref(&source), beside, may: ANYWHERE };
+            return Err(refused.error(block.tets.len(), need, why));
         };
         let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
         let (below, above) = ids.into_iter().partition(is_low);
@@ -140,8 +144,9 @@ impl Job<'_> {
         let input = placed.mesh.input();
         let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));
         let most = usize::try_from(left / PER_POINT).unwrap_or(CHUNK).min(CHUNK);
-        if most < ids.len().min(FEW) {
-            let (bytes, reason) = (PER_POINT * FEW as u64, format!("{left} bytes are left"));
+        let few = ids.len().min(if input.tets as usize > LEAST { FEW } else { 1 });
+        if most < few {
+            let (bytes, reason) = (PER_POINT * few as u64, format!("{left} bytes are left"));
             return Err(Error::Memory { name: "olbvh.blocks.points".into(), bytes, reason });
         }
         for chunk in ids.chunks(most.max(1)) {

@@ -23,14 +23,16 @@
 //!   Rendering adds normals (12 bytes per point), rays (48 bytes each), and at the start neighbours (16 bytes per
 //!   tetrahedron, and about three times that while they are matched).
 //! - The level may be coarser than requested, if one bit for each of its cells would take more than an eighth of the
-//!   memory, and finer where lists may be long ([`crate::options::BuildOptions::fineness`]): a plate would be a single
-//!   cell, which cannot be cut. Where tetrahedra overlap, [`crate::options::Lists::Boundary`] may report another of
+//!   memory, or if the largest tetrahedra would meet so many of them that no block with these fitted. It may be finer
+//!   where lists may be long ([`crate::options::BuildOptions::fineness`]): a plate would be a single cell, which cannot
+//!   be cut. Where tetrahedra overlap, [`crate::options::Lists::Boundary`] may report another of
 //!   those that contain a point, as it may without blocks.
 
 mod cut;
 mod locate;
 mod overlap;
 mod render;
+mod size;
 mod slice;
 
 pub use locate::{Points, locate, locate_all};
@@ -91,9 +93,15 @@ fn pieces(need: u64, memory: u64) -> usize {
     (u128::from(need) * 11).div_ceil(u128::from(memory.max(1)) * 10).clamp(2, 64) as usize
 }
 
+/// Which cuts are allowed, by axis and last finest cell below: see [`Source::cut_in_two`].
+type May<'a> = &'a dyn Fn(usize, u32) -> bool;
+
+/// Allows every cut.
+const ANYWHERE: May<'_> = &|_, _| true;
+
 /// Cuts a block in two, if it is large enough, as a step towards `pieces` blocks.
-fn smaller(source: &Source<'_>, block: &Block, pieces: usize) -> Option<[Block; 2]> {
-    if block.tets.len() > LEAST { source.cut_in_two(block, pieces, &|_, _| true) } else { None }
+fn smaller(source: &Source<'_>, block: &Block, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
+    if block.tets.len() > LEAST { source.cut_in_two(block, pieces, may) } else { None }
 }
 
 /// Rejects a field whose length does not match the mesh.
@@ -101,15 +109,42 @@ fn check_field(mesh: &Mesh, field: Option<(&[f32], On)>) -> Result<()> {
     field.map_or(Ok(()), |(values, on)| on.check(values, [mesh.points.len(), mesh.tets.len()]))
 }
 
-/// The error for a block of `tets` tetrahedra that takes about `bytes` (or more than there are) and is not cut again.
-fn refusal(gpu: &Gpu, tets: usize, bytes: u64, why: Option<Error>) -> Error {
-    let why = why.map_or_else(String::new, |e| format!(" ({e})"));
-    let limit = gpu.memory_limit();
-    let enough = bytes.max(limit + limit / 2);
-    let finer = if tets > LEAST { ", or a finer tree, whose cells cut the mesh in smaller blocks" } else { "" };
-    Error::TooLarge(format!(
-        "{limit} bytes of device memory are too few for a block of {tets} tetrahedra{why}; allow {enough} or more{finer}"
-    ))
+/// What was to be done within too little memory.
+struct Refused<'a, 's> {
+    gpu: &'a Gpu,
+    /// The meshes of which a block each is in memory at a time.
+    sources: &'a [Source<'s>],
+    /// Bytes that the query takes beside the blocks.
+    beside: u64,
+    /// The cuts that the query allows.
+    may: May<'a>,
+}
+
+impl Refused<'_, '_> {
+    /// The error for a block of `tets` tetrahedra (or one of each mesh) that takes about `bytes`, or more than there
+    /// are for the reason `why`, and is not cut again.
+    fn error(&self, tets: usize, bytes: u64, why: Option<Error>) -> Error {
+        let limit = self.gpu.memory_limit();
+        let takes = if bytes == u64::MAX { "too many bytes to number".into() } else { format!("about {bytes} bytes") };
+        let why = why.map_or_else(String::new, |e| format!(" ({e})"));
+        let enough = self.enough(limit.max(self.beside));
+        let remedy = enough.map_or_else(String::new, |enough| format!("; allow {enough} bytes or more"));
+        let finer = if tets > LEAST { ", or a finer tree, whose cells cut the mesh in smaller blocks" } else { "" };
+        Error::TooLarge(format!(
+            "{limit} bytes of device memory are too few: a block of {tets} tetrahedra, which is not cut any further, takes {takes}{why}{remedy}{finer}"
+        ))
+    }
+
+    /// An amount of memory above `least` in which all blocks fit: the first of a sequence that grows by half.
+    fn enough(&self, least: u64) -> Option<u64> {
+        const UNIT: u64 = 1 << 16;
+        let n = self.sources.len() as u64;
+        let fits = |memory: &u64| {
+            self.sources.iter().all(|source| source.fits_in_blocks(self.gpu, memory / n, self.beside / n, self.may).unwrap_or(false))
+        };
+        let next = |memory: &u64| Some((memory / 2 * 3).next_multiple_of(UNIT)).filter(|&more| more < 1 << 50);
+        std::iter::successors(next(&least), next).find(fits)
+    }
 }
 
 #[cfg(test)]

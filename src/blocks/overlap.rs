@@ -2,8 +2,9 @@
 //! that does not fit is cut. Intersecting tetrahedra share a point, which lies in the cells of such a pair, so the
 //! result is the union of the pairs' results.
 
-use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, refusal, smaller};
+use super::cut::{Block, Placed, Source};
+use super::size::least_bytes;
+use super::{ANYWHERE, InBlocks, Refused, smaller};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
@@ -14,6 +15,8 @@ use std::rc::Rc;
 
 /// Bytes per tetrahedron of both meshes that the search takes ([`query::OverlapMemory`], [`query::PairMemory`]).
 const PER_TET: u64 = 28;
+/// Further bytes that the search takes.
+const RESERVE: u64 = 1 << 16;
 /// The largest distance, relative to the sum of the meshes' extents, between blocks that are searched: pairs of
 /// tetrahedra count as touching if nearer than 1e-6 of the diagonal.
 const APART: f64 = 4e-6;
@@ -30,7 +33,7 @@ impl Node {
     }
 
     fn halves(&self, source: &Source<'_>) -> Option<&[Rc<Self>; 2]> {
-        self.halves.get_or_init(|| smaller(source, &self.block, 2).map(|halves| halves.map(Self::new))).as_ref()
+        self.halves.get_or_init(|| smaller(source, &self.block, 2, ANYWHERE).map(|halves| halves.map(Self::new))).as_ref()
     }
 
     fn tets(&self) -> usize {
@@ -71,7 +74,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
-    let [a, b] = meshes.map(|mesh| Source::new(mesh, options, memory / 2));
+    let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(gpu, memory / 2));
     let sources = [a?, b?];
     let apart = APART * sources.iter().map(Source::extent).sum::<f64>();
     let mut all = Overlapped::default();
@@ -102,7 +105,11 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
         }
         let larger = usize::from(nodes[1].tets() > nodes[0].tets());
         let cut = [larger, 1 - larger].into_iter().find_map(|side| Some((side, nodes[side].halves(&sources[side])?)));
-        let Some((side, halves)) = cut else { return Err(refusal(gpu, nodes[0].tets() + nodes[1].tets(), need, why)) };
+        let Some((side, halves)) = cut else {
+            let tets = nodes[0].tets() + nodes[1].tets();
+            let refused = Refused { gpu, sources: &sources, beside: PER_TET * tets as u64 + RESERVE, may: ANYWHERE };
+            return Err(refused.error(tets, need, why));
+        };
         for half in halves {
             let mut next = nodes.clone();
             next[side] = half.clone();

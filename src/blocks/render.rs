@@ -2,8 +2,9 @@
 //! each ray meets its blocks in order and continues in each from its state after the previous one. A sample is taken by
 //! the block that has its cell. Between blocks, rays are in host memory.
 
-use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, LEAST, check_field, pieces, refusal};
+use super::cut::{Block, Placed, Source};
+use super::size::least_bytes;
+use super::{InBlocks, Refused, check_field, pieces, smaller};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
@@ -13,6 +14,12 @@ use crate::query::{self, Canvas, Drawn, Rays};
 use crate::reference::ranges::visible;
 use crate::render::{Plan, Prepared, RenderSettings};
 use rayon::prelude::*;
+use std::slice::from_ref;
+
+/// Bytes of device memory that rendering takes beside a block, at the least: for each column of the picture (of which
+/// it draws a strip at a time), and in addition.
+const PER_COLUMN: u64 = 1024;
+const RESERVE: u64 = 1 << 17;
 
 /// The field of a mesh that may not fit the device, and how to render it.
 #[derive(Clone, Copy, Debug)]
@@ -56,7 +63,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
             other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
         }
     }
-    let source = Source::new(mesh, options, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu, memory)?;
     // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
     let prepared = Prepared::new(settings, mesh, &(&source.grid).into(), &neighbours, |t| source.is_valid(t as u32), field)?;
@@ -121,8 +128,11 @@ impl Job<'_> {
         }
         let order = |axis: usize, last: u32| low_first(&self.prepared.plan, &self.source.grid, axis, last);
         let may = |axis: usize, last: u32| order(axis, last).is_some();
-        let halves = if block.tets.len() > LEAST { self.source.cut_in_two(block, pieces(need, self.memory), &may) } else { None };
-        let Some([low, high]) = halves else { return Err(refusal(self.gpu, block.tets.len(), need, why)) };
+        let Some([low, high]) = smaller(self.source, block, pieces(need, self.memory), &may) else {
+            let beside = RESERVE + PER_COLUMN * u64::from(self.prepared.plan.size[0]);
+            let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: &may };
+            return Err(refused.error(block.tets.len(), need, why));
+        };
         let finest = low.cells.finest(self.source.level).hi;
         let axis = (0..3).find(|&c| low.cells.hi[c] < high.cells.lo[c]).unwrap_or(0);
         Ok(Some(if order(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))

@@ -3,8 +3,9 @@
 //! own cells, and the closest of all is taken. The trees are shared by as many layers as host memory is provided for,
 //! since a tree takes longer than a layer.
 
-use super::cut::{Block, Placed, Source, least_bytes};
-use super::{InBlocks, check_field, pieces, refusal, smaller};
+use super::cut::{Block, Placed, Source};
+use super::size::least_bytes;
+use super::{ANYWHERE, InBlocks, Refused, check_field, pieces, smaller};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
@@ -16,9 +17,13 @@ use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, Vox
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::rc::Rc;
+use std::slice::from_ref;
 
 /// Voxels that share the trees of a mesh in blocks; each takes 9 bytes of host memory.
 const BATCH: u64 = 1 << 24;
+/// Bytes of device memory that slicing takes beside a block, at the least: for each voxel of a row, and in addition.
+const PER_ROW_VOXEL: u64 = 128;
+const RESERVE: u64 = 1 << 16;
 
 /// A stack of layers through a mesh that may not fit the device.
 #[derive(Clone, Copy, Debug)]
@@ -71,7 +76,7 @@ pub fn slice(
             other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
         }
     }
-    let source = Source::new(mesh, options, memory)?;
+    let source = Source::new(mesh, options)?.within(gpu, memory)?;
     voxels.plan(&source.grid)?;
     let mut job = Job { gpu, memory, asked, source: &source, blocks: vec![source.whole()], placed: None, took, done: 0.0, report };
     for rows in bands(voxels, BATCH) {
@@ -108,7 +113,8 @@ impl Job<'_> {
         let blocks = std::mem::take(&mut self.blocks);
         let share = n as f64 / blocks.len() as f64;
         let mut waiting: Vec<(Block, f64)> = blocks.into_iter().map(|block| (block, share)).collect();
-        log::debug!("rows {rows:?} from {begun} voxels on");
+        let [row, layer] = rows.row(0, voxels.size[1]);
+        log::debug!("slice: {} rows from row {row} of layer {layer} on, after {begun} voxels", rows.count);
         while let Some((block, share)) = waiting.pop() {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
             let need = if met { block.bytes(self.gpu, &self.source.options)? } else { 0 };
@@ -122,8 +128,10 @@ impl Job<'_> {
             match tried {
                 Err(Some(e)) if !e.is_lack_of_room() => return Err(e),
                 Err(why) => {
-                    let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory)) else {
-                        return Err(refusal(self.gpu, block.tets.len(), need, why));
+                    let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
+                        let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
+                        let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };
+                        return Err(refused.error(block.tets.len(), need, why));
                     };
                     waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
                 }
@@ -162,7 +170,7 @@ impl Job<'_> {
             }
             at += n;
         }
-        log::debug!("a block of {} tetrahedra", block.tets.len());
+        log::debug!("slice: a block of {} tetrahedra", block.tets.len());
         Ok(())
     }
 }

@@ -251,15 +251,12 @@ impl DeviceMesh {
         let cells = gpu.upload("olbvh.mesh.cells", &mesh.tets)?;
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
-        let memory = gpu.buffer("olbvh.mesh.arrays", Arena::measure(carve)?)?;
-        let arrays = carve(&mut Arena::new(memory.all()))?;
+        let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
         let carve = |a: &mut Arena| MeshScratch::carve(a, tets);
-        let scratch_memory = gpu.buffer("olbvh.mesh.scratch", Arena::measure(carve)?)?;
-        let scratch = carve(&mut Arena::new(scratch_memory.all()))?;
+        let (_memory, scratch) = Arena::reserve(gpu, "olbvh.mesh.scratch", carve)?;
         let ((), time) = gpu.submit("olbvh.mesh", |r| cmd_prepare(r, &input, &arrays, &scratch, given.as_ref().map(Buffer::all)))?;
-        let one = |v: Vec<MeshStatus>| v.first().copied().unwrap_or_default();
-        let status = one(gpu.download(&memory, arrays.status.part(0, size_of::<MeshStatus>() as u64))?);
-        let grid = gpu.download::<Grid>(&memory, arrays.grid.part(0, size_of::<Grid>() as u64))?.first().copied().unwrap_or_default();
+        let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
+        let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
             return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
         }

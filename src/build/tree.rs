@@ -13,7 +13,6 @@ use crate::reference::depth::{finer, too_large};
 use crate::reference::grid::MAX_LEVEL;
 use crate::reference::quarters::split_entries;
 use crate::tree::{TreeArrays, TreeBytes};
-use bytemuck::Pod;
 
 /// An OLBVH in device memory.
 #[derive(Debug)]
@@ -28,17 +27,6 @@ pub struct Tree {
     scratch_bytes: u64,
     entry_buffer: Buffer,
     node_buffer: Buffer,
-}
-
-/// Allocates a buffer of exactly the size that `carve` takes, and carves it.
-fn reserve<T>(gpu: &Gpu, name: &str, carve: impl Fn(&mut Arena) -> Result<T>) -> Result<(Buffer, T)> {
-    let buffer = gpu.buffer(name, Arena::measure(&carve)?)?;
-    let parts = carve(&mut Arena::new(buffer.all()))?;
-    Ok((buffer, parts))
-}
-
-fn first<T: Pod + Default>(gpu: &Gpu, buffer: &Buffer, part: BufferRef) -> Result<T> {
-    Ok(gpu.download::<T>(buffer, part.part(0, size_of::<T>() as u64))?.first().copied().unwrap_or_default())
 }
 
 impl Tree {
@@ -84,30 +72,31 @@ impl Tree {
         let mut stages = Vec::new();
 
         // First submission: the level, and the number of candidates.
-        let (head, (status, grid)) = reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
-        let (counts_buffer, counts) = reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
+        let (head, (status, grid)) = Arena::reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
+        let (counts_buffer, counts) = Arena::reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
         let ((), time) = gpu.submit("olbvh.build.counts", |r| {
             cmd_depth(r, &view, status, grid, options, (u32::MAX, MAX_LEVEL), &counts)?;
             cmd_count(r, &view, grid, options, &counts)
         })?;
         stages.extend(time.stages);
-        let measured: BuildStatus = first(gpu, &head, status)?;
+        let measured: BuildStatus = gpu.download_one(&head, status)?;
         refuse_overflow(&measured, options)?;
         let level = measured.level;
         let mut capacity = Capacity { candidates: measured.candidates, entries: measured.candidates, nodes: 0, level };
 
         // Second submission: which candidates are entries.
-        let (filter_buffer, filter) = reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
+        let (filter_buffer, filter) =
+            Arena::reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         if let Some(filter) = &filter {
             let ((), time) = gpu.submit("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
             stages.extend(time.stages);
-            capacity.entries = first(gpu, &filter_buffer, filter.entries)?;
+            capacity.entries = gpu.download_one(&filter_buffer, filter.entries)?;
         }
 
         // Third submission: codes, and the number of nodes. P is part of the tree; the rest is scratch memory.
         capacity.nodes = Capacity::for_entries(capacity.entries, level).nodes;
         let entry_buffer = gpu.buffer("olbvh.tree.p", 4 * u64::from(capacity.entries.max(4)))?;
-        let (sorted_buffer, sorted) = reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
+        let (sorted_buffer, sorted) = Arena::reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
         let nothing = gpu.nothing();
         let head_memory = TreeMemory {
             assign,
@@ -128,7 +117,7 @@ impl Tree {
             cmd_count_splits(r, &head_memory, entries, &sorted)
         })?;
         stages.extend(time.stages);
-        let planned: BuildStatus = first(gpu, &head, status)?;
+        let planned: BuildStatus = gpu.download_one(&head, status)?;
         refuse_overflow(&planned, options)?;
         capacity.nodes = planned.nodes;
 
@@ -138,7 +127,7 @@ impl Tree {
             let sizes = [planned.nodes, planned.internal, planned.leaves].map(u64::from);
             TreeMemory::carve_nodes(a, head, entry_buffer.all(), sizes, &capacity, options)
         };
-        let (node_buffer, memory) = reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
+        let (node_buffer, memory) = Arena::reserve(gpu, "olbvh.tree.nodes", carve_nodes)?;
         let ((), time) = gpu.submit("olbvh.build.nodes", |r| {
             r.copy(status.part(0, size_of::<BuildStatus>() as u64), memory.status);
             r.copy(grid.part(0, size_of::<Grid>() as u64), memory.grid);
@@ -148,9 +137,9 @@ impl Tree {
             cmd_levels(r, &memory, &sorted)
         })?;
         stages.extend(time.stages);
-        let status: BuildStatus = first(gpu, &node_buffer, memory.status)?;
+        let status: BuildStatus = gpu.download_one(&node_buffer, memory.status)?;
         refuse_overflow(&status, options)?;
-        let grid: Grid = first(gpu, &node_buffer, memory.grid)?;
+        let grid: Grid = gpu.download_one(&node_buffer, memory.grid)?;
         let scratch_bytes = head.size() + counts_buffer.size() + filter_buffer.size() + sorted_buffer.size();
         Ok(Self {
             gpu: gpu.clone(),

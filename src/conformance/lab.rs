@@ -27,6 +27,9 @@ pub struct Report {
     pub name: String,
     /// The outcome.
     pub outcome: Outcome,
+    /// For a case that passed, a difference between two trees that was accepted, and why: tetrahedra of the mesh
+    /// overlap.
+    pub accepted: Option<String>,
     /// The time that it took.
     pub time: Duration,
 }
@@ -84,7 +87,8 @@ impl Lab {
             }),
             (outcome, _) => outcome,
         };
-        Report { name: case.name.clone(), outcome, time: begin.elapsed() }
+        let accepted = self.subject.as_mut().and_then(|(twin, _)| twin.accepted.take());
+        Report { name: case.name.clone(), outcome, accepted, time: begin.elapsed() }
     }
 
     fn work(&mut self, work: &Work) -> Verdict {

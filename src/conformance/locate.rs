@@ -6,15 +6,13 @@ use super::failure::{Verdict, compare, fail};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
+use crate::error::Error;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
-
-/// Meshes with inverted tetrahedra (93 of 10,296 in this one), which overlap the neighbours of their neighbours.
-const OVERLAPPING: [&str; 1] = ["jitter-12x13x11"];
 
 /// How the points of a case are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -66,7 +64,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
-    let (twin, (points, inside)) = (&*twin, twin.points());
+    let (points, _) = twin.points();
     let (mesh, locator) = (&twin.mesh, twin.locator(&built));
     let quiet: &dyn Fn(u64, u64) = &|_, _| {};
     match case.how {
@@ -111,28 +109,28 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
             }
             Ok(())
         }
-        How::Same => {
-            let first = locate(device, &tree, points, None, &LocateOptions::default(), quiet)?;
-            if let Some(i) = first.owners[..inside].iter().position(|&o| o == NONE) {
-                return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
-            }
-            // Where tetrahedra overlap, only full lists give the lowest of those that contain a point (SPEC 3.1).
-            let kinds = if OVERLAPPING.contains(&case.mesh.name) { vec![Lists::All] } else { Lists::EVERY.to_vec() };
-            for (alpha, assign) in [(0.0, Assign::Planes), (1.0, Assign::Exact), (2.0, Assign::Planes), (4.0, Assign::Aabb)] {
-                for &lists in &kinds {
-                    let tree = Tree::build(gpu, device, &BuildOptions { alpha, assign, lists, ..options })?;
-                    let found = locate(device, &tree, &points[..inside], None, &LocateOptions::default(), quiet)?;
-                    compare(
-                        &format!("query.locate (alpha {alpha}, {assign}, lists {lists})"),
-                        "owners",
-                        &first.owners[..inside],
-                        &found.owners,
-                    )?;
-                }
-            }
-            Ok(())
+        How::Same => same_owners(gpu, twin, device, &tree),
+    }
+}
+
+/// Locates points of the mesh in trees of every kind, which must all find the same owners.
+fn same_owners(gpu: &Gpu, twin: &mut Twin, device: &DeviceMesh, first: &Tree) -> Verdict {
+    let (points, inside) = twin.points();
+    let points = points[..inside].to_vec();
+    let owners = |tree: &Tree| Ok::<_, Error>(locate(device, tree, &points, None, &LocateOptions::default(), &|_, _| {})?.owners);
+    let expected = owners(first)?;
+    if let Some(i) = expected.iter().position(|&o| o == NONE) {
+        return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
+    }
+    for (alpha, assign) in [(0.0, Assign::Planes), (1.0, Assign::Exact), (2.0, Assign::Planes), (4.0, Assign::Aabb)] {
+        for lists in Lists::EVERY {
+            let tree = Tree::build(gpu, device, &BuildOptions { alpha, assign, lists, ..*first.options() })?;
+            let stage = format!("query.locate (alpha {alpha}, {assign}, lists {lists})");
+            let same = compare(&stage, "owners", &expected, &owners(&tree)?);
+            if lists == Lists::All { same } else { twin.same_unless_tangled(same) }?;
         }
     }
+    Ok(())
 }
 
 fn compare_locations(expected: &[Location], owners: &[u32], barycentrics: &[[f32; 4]], points: &[[f32; 3]]) -> Verdict {

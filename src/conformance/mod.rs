@@ -36,6 +36,7 @@ mod primitives;
 mod query_cases;
 mod ranges;
 mod slice;
+mod tangles;
 mod topology;
 mod twin;
 

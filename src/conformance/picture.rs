@@ -65,18 +65,22 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         // Ray intervals depend on the leaves of the tree, the picture does not.
         compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
         compare_one(&stage, "skipped samples", &expected.skipped_samples, &drawn.skipped_samples)?;
-        if plan.hides(&field.values) {
+        near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
+        let hides = plan.hides(&field.values);
+        if hides {
             // The colours must equal, to the bit, those of a picture in which nothing is skipped.
             let all = Plan { drawn: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
             let all = render(device, &tree, &all, (&field.values, field.on), normals, &|_, _| {})?;
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
-            compare(&stage, "colours beside those of every sample", &bits(&all.colors), &bits(&drawn.colors))?;
+            let same = compare(&stage, "colours beside those of every sample", &bits(&all.colors), &bits(&drawn.colors));
+            twin.same_unless_tangled(same)?;
         }
-        near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
-        match &first {
-            Some(first) => near(&stage, "pixels beside those of alpha 0", first, &pixels, 1, 0)?,
-            None => first = Some(pixels),
+        if let Some(first) = &first {
+            let same = near(&stage, "pixels beside those of alpha 0", first, &pixels, 1, 0);
+            // From full lists, samples get other owners only if others have been skipped before them.
+            if lists == all && !hides { same } else { twin.same_unless_tangled(same) }?;
         }
+        first.get_or_insert(pixels);
     }
     Ok(())
 }

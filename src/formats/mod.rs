@@ -51,8 +51,8 @@ pub use points::load_points;
 pub use report::{CellCount, Fate, Report};
 use source::Source;
 pub use write::{
-    Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, write_json, write_located,
-    write_mesh, write_npy, write_png,
+    Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, write_json,
+    write_located, write_mesh, write_npy, write_png,
 };
 
 /// How to read a mesh.

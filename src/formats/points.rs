@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::detect::ending;
 use super::npy;
 use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::Result;
@@ -9,13 +10,13 @@ use crate::error::Result;
 /// Reads points from a `.npy` file of shape (n, 3) with any numeric type, or from a text table with one point per line
 /// and columns separated by commas, semicolons or white space. The first line of a table may name the columns: if it
 /// names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that start with `#` are
-/// comments.
+/// comments. A table without points is valid, even an empty file.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
 pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
     let source = Source::read(path.as_ref(), ".npy or a table of text")?;
-    if source.bytes.starts_with(npy::MAGIC) {
+    if source.bytes.starts_with(npy::MAGIC) || ending(path.as_ref()) == "npy" && source.bytes.is_empty() {
         return npy::read_points(&source);
     }
     if source.bytes.starts_with(b"PK\x03\x04") {
@@ -58,9 +59,6 @@ fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
             return Err(source.error_line(at, format!("{} columns instead of {width}", fields.len())));
         }
         points.push(point(source, at, line, &fields, columns)?);
-    }
-    if columns.is_none() {
-        return Err(source.error("no points in it"));
     }
     Ok(points)
 }

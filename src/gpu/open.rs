@@ -72,16 +72,17 @@ fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::Physica
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
     let all: Vec<_> = devices.into_iter().map(|d| (d, DeviceReport::new(instance, d))).collect();
-    let names = || all.iter().enumerate().map(|(i, (_, r))| format!("{i}: {}", r.name)).collect::<Vec<_>>().join(", ");
+    let names = || all.iter().enumerate().map(|(i, (_, r))| format!("{i} {}", r.name)).collect::<Vec<_>>().join(", ");
     if all.is_empty() {
         return Err(Error::NoDevice(NO_DRIVER.into()));
     }
     if let Some(wanted) = wanted {
         let lower = wanted.to_lowercase();
         let by_index = wanted.parse::<usize>().ok().and_then(|i| all.get(i));
-        let found = by_index.or_else(|| all.iter().find(|(_, r)| r.name.to_lowercase().contains(&lower)));
+        let named = |(_, r): &&(_, DeviceReport)| !lower.trim().is_empty() && r.name.to_lowercase().contains(&lower);
+        let found = by_index.or_else(|| all.iter().find(named));
         let Some((device, report)) = found else {
-            return Err(Error::NoDevice(format!("none is called `{wanted}`; there are {}", names())));
+            return Err(Error::NoDevice(format!("no device `{wanted}`; there are: {}", names())));
         };
         if !report.requirements.missing.is_empty() {
             return Err(Error::NoDevice(format!("{} lacks {}", report.name, report.requirements.missing.join(", "))));

@@ -223,6 +223,15 @@ impl Gpu {
         Ok(data)
     }
 
+    /// Reads back the value at the beginning of a part of a buffer.
+    ///
+    /// # Errors
+    /// As [`Gpu::download`].
+    pub fn download_one<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<T> {
+        let found = self.download::<T>(buffer, part.part(0, size_of::<T>() as u64))?;
+        Ok(found.first().copied().unwrap_or_else(T::zeroed))
+    }
+
     /// Reads back a range of any buffer through staging memory.
     pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
         let most = self.staging_bytes();

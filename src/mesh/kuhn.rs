@@ -22,13 +22,14 @@ pub fn kuhn(cells: [u32; 3]) -> Result<Mesh> {
 /// Those of [`kuhn`].
 pub fn kuhn_jittered(cells: [u32; 3], jitter: f32, seed: u32) -> Result<Mesh> {
     if cells.contains(&0) {
-        return Err(Error::Invalid(format!("a Kuhn grid needs at least one cell per axis, not {cells:?}")));
+        return Err(Error::Invalid(format!("a grid needs at least one cube along each axis, not {}×{}×{}", cells[0], cells[1], cells[2])));
     }
     let [nx, ny, nz] = cells.map(u64::from);
     let (n_points, n_tets) =
         ((nx + 1).saturating_mul(ny + 1).saturating_mul(nz + 1), nx.saturating_mul(ny).saturating_mul(nz).saturating_mul(6));
     if n_points > u64::from(u32::MAX) || n_tets > u64::from(u32::MAX / 4) {
-        return Err(Error::TooLarge(format!("a Kuhn grid of {nx}×{ny}×{nz} cells has {n_points} points and {n_tets} tetrahedra")));
+        let most = format!("at most {} and {} can be numbered", u32::MAX, u32::MAX / 4);
+        return Err(Error::TooLarge(format!("a grid of {nx}×{ny}×{nz} cubes has {n_points} points and {n_tets} tetrahedra; {most}")));
     }
     let mut points = Vec::with_capacity(n_points as usize);
     let mut jet = Vec::with_capacity(n_points as usize);

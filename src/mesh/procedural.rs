@@ -40,7 +40,7 @@ pub fn slivers(n: u32) -> Result<Mesh> {
 /// [`Error::Invalid`] for fewer than 8 cubes around the ring, otherwise those of [`super::kuhn`].
 pub fn shell(n: u32) -> Result<Mesh> {
     if n < 8 {
-        return Err(Error::Invalid(format!("a shell of {n} cells around; it needs 8")));
+        return Err(Error::Invalid(format!("a shell of {n} cubes around the ring; it needs at least 8")));
     }
     let size = [n, n / 2, LAYERS];
     let grid = kuhn_jittered(size, 0.0, 0)?;

@@ -17,7 +17,7 @@ pub(crate) use selftest::self_test;
 pub use sort::{SortScratch, cmd_sort_pairs};
 
 use crate::error::{Error, Result};
-use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, Buffer, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{DispatchArgs, DispatchArgsSpec};
 
 /// A number of items: an upper limit known to the host, and optionally the true number in a word of device memory.
@@ -89,6 +89,16 @@ impl Arena {
         let mut arena = Self { memory: None, used: 0 };
         carve(&mut arena)?;
         Ok(arena.used)
+    }
+
+    /// A buffer of exactly the size that `carve` takes, and its parts.
+    ///
+    /// # Errors
+    /// [`Error::Memory`], or those of `carve`.
+    pub fn reserve<T>(gpu: &Gpu, name: &str, carve: impl Fn(&mut Self) -> Result<T>) -> Result<(Buffer, T)> {
+        let buffer = gpu.buffer(name, Self::measure(&carve)?)?;
+        let parts = carve(&mut Self::new(buffer.all()))?;
+        Ok((buffer, parts))
     }
 
     /// Takes the next `bytes` bytes, aligned for every use.

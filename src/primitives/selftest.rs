@@ -29,8 +29,7 @@ pub(crate) fn self_test(gpu: &Gpu) -> Result<()> {
     let total = gpu.buffer("olbvh.selftest.total", 4)?;
     let lanes = gpu.buffer("olbvh.selftest.lanes", 4 * 4 * 64)?;
     let carve = |a: &mut Arena| Ok((ScanScratch::carve(gpu, a, ITEMS)?, SortScratch::carve(gpu, a, ITEMS, 13)?));
-    let scratch = gpu.buffer("olbvh.selftest.scratch", Arena::measure(carve)?)?;
-    let (scan, sort) = carve(&mut Arena::new(scratch.all()))?;
+    let (_memory, (scan, sort)) = Arena::reserve(gpu, "olbvh.selftest.scratch", carve)?;
     let workgroup = 64u32.next_multiple_of(gpu.subgroup_size());
     gpu.submit("olbvh.selftest", |r| {
         let arguments = SelfTest { lanes: lanes.all(), iterations: LONGEST_LOOP };

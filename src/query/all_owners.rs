@@ -129,10 +129,9 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
         let carve = |a: &mut Arena| OwnersMemory::carve(gpu, a, count);
-        let buffer = gpu.buffer("olbvh.query.lists", Arena::measure(carve)?)?;
-        let memory = carve(&mut Arena::new(buffer.all()))?;
+        let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.lists", carve)?;
         gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
-        let total = gpu.download::<u32>(&buffer, memory.total.part(0, 4))?.first().copied().unwrap_or(0);
+        let total: u32 = gpu.download_one(&buffer, memory.total)?;
         if total > i32::MAX.cast_unsigned() {
             return Err(Error::TooLarge(format!(
                 "{total} owners of {count} points; shaders number {} at most: ask for fewer points",

@@ -1,7 +1,7 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, and values of fields there.
 
 use super::order::{PointOrder, cmd_sort_points};
-use super::{Scene, list_parts};
+use super::{Scene, list_parts, upload_field};
 use crate::build::{DeviceMesh, Tree, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
@@ -243,13 +243,7 @@ pub fn locate(
 ) -> Result<Located> {
     let gpu = tree.gpu();
     let scene = Scene::new(mesh, tree)?;
-    let field = match field {
-        Some((values, on)) => {
-            on.check(values, mesh.sizes())?;
-            Some((gpu.upload("olbvh.query.field", values)?, on))
-        }
-        None => None,
-    };
+    let field = field.map(|field| upload_field(mesh, field)).transpose()?;
     let mut all = Located::default();
     let most = points.len().min(CHUNK) as u64;
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
@@ -257,17 +251,16 @@ pub fn locate(
     let values = gpu.buffer("olbvh.query.values", 4 * most)?;
     let sorted = options.path == Path::Sorted;
     let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
-    let order_memory = gpu.buffer("olbvh.query.order", Arena::measure(carve)?)?;
-    let memory = carve(&mut Arena::new(order_memory.all()))?;
+    let (_memory, order) = Arena::reserve(gpu, "olbvh.query.order", carve)?;
     for chunk in points.chunks(CHUNK) {
         let input = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let n = u64::from(count);
-        let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: memory.map(|m| m.order) };
+        let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: order.map(|o| o.order) };
         let output = LocateOutput { owners: owners.all().part(0, 4 * n), barycentrics: barycentrics.all().part(0, 16 * n) };
         let ((), time) = gpu.submit("olbvh.query.locate", |r| {
-            if let Some(memory) = &memory {
-                cmd_sort_points(r, scene.tree.grid, &input, memory)?;
+            if let Some(order) = &order {
+                cmd_sort_points(r, scene.tree.grid, &input, order)?;
                 r.barrier("sort_points → locate");
             }
             cmd_locate(r, &scene, &input, &output, options)?;

@@ -20,7 +20,8 @@ pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::Result;
-use crate::gpu::{BufferRef, Groups};
+use crate::gpu::{Buffer, BufferRef};
+use crate::mesh::On;
 use crate::reference::locate::LIST_PART;
 
 /// A binary tree in device memory: the structure that queries search for the LBVH baseline.
@@ -43,41 +44,23 @@ pub enum Structure {
     Binary(BinaryTree),
 }
 
-/// The workgroups that a kernel needs: computed from a number of items, or given, for example by a count on the device.
-pub(crate) trait Items {
-    fn groups(self, workgroup: u32) -> Groups;
-}
-
-impl Items for u32 {
-    fn groups(self, workgroup: u32) -> Groups {
-        Groups::Count(self.div_ceil(workgroup))
-    }
-}
-
-impl Items for Groups {
-    fn groups(self, _: u32) -> Groups {
-        self
-    }
-}
-
 /// Dispatches the octree kernel (with its `extra` arguments and the constants of its `kind`) or the corresponding
 /// binary-tree kernel, one invocation per item. Both take the buffers of the structure and the arguments and constants
 /// that follow.
 macro_rules! dispatch {
-    ($r:ident, $items:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
+    ($r:ident, $groups:expr, $searched:expr, $octree:ident $octree_spec:ident { $($extra:ident),* } { $($kind:ident),* }, $binary:ident $binary_spec:ident,
      { $($name:ident: $value:expr),* $(,)? }, { $($constant:ident),* }) => {{
         let $crate::query::StructureView { mesh, structure } = $searched;
         let workgroup = $r.gpu().target().query;
-        let groups = $crate::query::Items::groups($items, workgroup);
         match *structure {
             $crate::query::Structure::Octree($crate::build::TreeMemory { grid, masks, co, po, p, flags, .. }) => {
                 let arguments = $octree { grid, masks, co, po, p, flags, $($extra,)* $($name: $value),* };
-                $r.dispatch(&arguments, $octree_spec { workgroup, $($kind,)* $($constant,)* ..Default::default() }, groups)
+                $r.dispatch(&arguments, $octree_spec { workgroup, $($kind,)* $($constant,)* ..Default::default() }, $groups)
             }
             $crate::query::Structure::Binary($crate::query::BinaryTree { nodes, root, ids }) => {
                 let $crate::build::MeshArrays { grid, boundary, .. } = mesh.arrays;
                 let arguments = $binary { grid, nodes, root, ids, boundary, $($name: $value),* };
-                $r.dispatch(&arguments, $binary_spec { workgroup, $($constant,)* ..Default::default() }, groups)
+                $r.dispatch(&arguments, $binary_spec { workgroup, $($constant,)* ..Default::default() }, $groups)
             }
         }
     }};
@@ -165,6 +148,12 @@ impl From<&Scene> for StructureView {
     fn from(scene: &Scene) -> Self {
         Self { mesh: scene.mesh, structure: Structure::Octree(scene.tree) }
     }
+}
+
+/// Uploads the values of a field, one per point or tetrahedron of the mesh.
+fn upload_field(mesh: &DeviceMesh, (values, on): (&[f32], On)) -> Result<(Buffer, On)> {
+    on.check(values, mesh.sizes())?;
+    Ok((mesh.gpu().upload("olbvh.query.field", values)?, on))
 }
 
 /// A mesh and its tree, as queries take them.

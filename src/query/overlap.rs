@@ -75,16 +75,13 @@ impl Job<'_> {
         let ((), time) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
         self.done.submissions += 1;
         self.done.stages.extend(time.stages);
-        let size = size_of::<OverlapStatus>() as u64;
-        let one = |part: &BufferRef| Ok(self.gpu.download(memory, part.part(0, size))?.first().copied().unwrap_or_default());
-        status.iter().map(one).collect()
+        status.iter().map(|&part| self.gpu.download_one(memory, part)).collect()
     }
 
     fn sets(&mut self) -> Result<()> {
         let [a, b] = &self.scenes;
         let carve = |arena: &mut Arena| OverlapMemory::carve(arena, a, b);
-        let buffer = self.gpu.buffer("olbvh.query.overlap", Arena::measure(carve)?)?;
-        let memory = carve(&mut Arena::new(buffer.all()))?;
+        let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap", carve)?;
         let mut rounds = Rounds::begin(ROUNDS);
         let statuses = loop {
             let statuses = self.submit(&buffer, &memory.status, |r, [a, b]| cmd_overlap(r, a, b, &memory, rounds))?;
@@ -111,8 +108,7 @@ impl Job<'_> {
     fn pairs(&mut self) -> Result<()> {
         let tets = self.scenes[0].mesh.input.tets;
         let carve = |arena: &mut Arena| PairMemory::carve(self.gpu, arena, tets);
-        let buffer = self.gpu.buffer("olbvh.query.overlap_counts", Arena::measure(carve)?)?;
-        let memory = carve(&mut Arena::new(buffer.all()))?;
+        let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap_counts", carve)?;
         let told = |left: u32| u64::from(tets) - u64::from(left);
         let mut rounds = Rounds::begin(1);
         let status = loop {

@@ -170,12 +170,12 @@ fn cmd_locate_voxels(
     begins: u32,
 ) -> Result<()> {
     let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let items = asked.runs();
+    let groups = Groups::Count(asked.runs().div_ceil(r.gpu().target().query));
     let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
     let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
     let (buffer, field, on_cells) = of_field(r, asked);
     r.stage("query.slice_locate", |r| {
-        dispatch!(r, items, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
+        dispatch!(r, groups, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
             cells: input.cells,
             vertices: arrays.vertices,
             neighbours: arrays.neighbours,

@@ -239,8 +239,9 @@ fn cmd_intervals(
 ) -> Result<()> {
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
     let (mesh, arrays, stack, part) = (&searched.mesh.input, &searched.mesh.arrays, STACK, u32::from(input.part.is_some()));
+    let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
-        dispatch!(r, rays, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
+        dispatch!(r, groups, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
             cells: mesh.cells,
             vertices: arrays.vertices,
             frames: memory.frame,
@@ -263,8 +264,9 @@ fn cmd_march(
     let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
     let (iso, skip, normals) = (u32::from(input.iso), u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
+    let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.march", |r| {
-        dispatch!(r, rays, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
+        dispatch!(r, groups, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
             cells: mesh.cells,
             vertices: arrays.vertices,
             neighbours: arrays.neighbours,

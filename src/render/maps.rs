@@ -98,7 +98,7 @@ pub const MAPS: &[ColorMap] = &[
     },
     ColorMap {
         name: "cividis",
-        about: "as viridis, the same to colour-blind eyes",
+        about: "like viridis, also for colour-blind viewers",
         points: &[
             (0, 0x00_22_4e),
             (18, 0x00_2f_6d),

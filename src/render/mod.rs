@@ -29,6 +29,7 @@ pub mod maps;
 pub mod plan;
 pub mod settings;
 pub mod shading;
+mod step;
 pub mod transfer;
 
 pub use auto::auto_opacity;
@@ -36,6 +37,7 @@ pub use camera::{Bounds, Camera, CameraSpec, Projection, RayGrid};
 pub use plan::{MAX_SAMPLES, Plan, Prepared, TABLE_SIZE, interval_slack};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
+pub use step::{SuitedStep, suited_step};
 pub use transfer::TransferFunction;
 
 /// `1/√x` of a normal positive `x`, computed by correctly rounded multiplications and subtractions alone, so that every

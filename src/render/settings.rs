@@ -38,7 +38,8 @@ pub struct RenderSettings {
     /// The field's values at places 0 and 1 of the transfer function. The default is the range of the transfer
     /// function, or else the whole range of the field.
     pub range: Option<[f32; 2]>,
-    /// Distance Δ of two samples in mesh units; by default 1/512 of the diagonal.
+    /// Distance Δ of two samples in mesh units; by default 1/512 of the diagonal. [`super::suited_step`]
+    /// is finer for thin parts and layers.
     pub step: Option<f64>,
     /// What is behind the mesh.
     pub background: Background,
@@ -127,7 +128,7 @@ impl std::str::FromStr for Background {
             },
         };
         found.ok_or_else(|| {
-            Error::Invalid(format!("background `{text}`: give white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM"))
+            Error::Invalid(format!("`{text}` is no background; give white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM"))
         })
     }
 }

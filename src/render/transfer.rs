@@ -18,11 +18,18 @@ pub const DEFAULT_MAP: &str = "viridis";
 /// dense where it is high.
 pub const DEFAULT_OPACITY: &[(f32, f32)] = &[(0.0, 0.04), (0.25, 0.08), (0.5, 0.18), (0.75, 0.38), (1.0, 0.7)];
 
-/// The JSON form, as explained in the help.
-pub const JSON_HELP: &str = r##"{"map": "viridis", "opacity": [[0, 0.02], [0.6, 0.1], [1, 0.8]]}, or with own colours
-{"colors": [[0, "#1a2a6c"], [0.5, [0.7, 0.1, 0.1]], [1, "#fdbb2d"]], "opacity": …}. Places run from 0 to 1 over the field's range;
-with "positions": "values" they are values of the field. Colours are sRGB. Opacities (0 to 1) are what a ray gathers on 1/100 of the mesh's
-diagonal; left out, they are chosen so that rare values show through common ones. "range": [LO, HI] fixes the values of places 0 and 1."##;
+/// The JSON form of a transfer function, as the help describes it.
+pub const JSON_HELP: &str = concat!(
+    r##"  {"map": "viridis", "opacity": [[0, 0.02], [0.6, 0.1], [1, 0.8]]}"##,
+    "\n",
+    r##"  {"colors": [[0, "#1a2a6c"], [0.5, [0.7, 0.1, 0.1]], [1, "#fdbb2d"]], "range": [20, 350]}"##,
+    "\n\n",
+    r##""map" names a colour map; instead, "colors" has a place and a colour for each point. "opacity" has a place and an opacity "##,
+    r##"for each point. Places go from 0 to 1 over the range of the field or, with "positions": "values", are values of the "##,
+    r##"field. Colours are sRGB. An opacity, from 0 to 1, is that of a layer as thick as 1/100 of the diagonal of the mesh's "##,
+    r##"bounds; without "opacity", opacities are chosen so that rare values show through common ones. "range": [LO, HI] sets the "##,
+    r##"values at places 0 and 1."##,
+);
 
 impl Default for TransferFunction {
     fn default() -> Self {
@@ -82,7 +89,7 @@ impl TransferFunction {
     /// [`Error::Invalid`] if the text has neither form.
     pub fn parse_opacity(text: &str) -> Result<Vec<(f32, f32)>> {
         let wrong =
-            || Error::Invalid(format!("opacity `{text}`: give one number from 0 to 1, or PLACE:OPACITY pairs such as 0:0,0.5:0.1,1:0.8"));
+            || Error::Invalid(format!("`{text}` is no opacity; give one number from 0 to 1, or PLACE:OPACITY pairs such as 0:0,0.5:0.1,1:0.8"));
         if let Ok(all) = text.trim().parse::<f32>() {
             return Ok(vec![(0.0, all), (1.0, all)]);
         }
@@ -128,7 +135,7 @@ fn check<'a>(what: &str, points: impl Iterator<Item = (f32, &'a [f32])>) -> Resu
             return Err(Error::Invalid(format!("transfer function: {what} point at {place}: {bad} lies outside 0 to 1")));
         }
         if last.is_some_and(|last| place < last) {
-            return Err(Error::Invalid(format!("transfer function: {what} points must ascend, {place} comes too late")));
+            return Err(Error::Invalid(format!("transfer function: places of {what} points must ascend, but {place} follows a larger one")));
         }
         last = Some(place);
     }
@@ -189,7 +196,7 @@ mod json {
             let mut colors = match (file.map, file.colors) {
                 (Some(map), None) => Self::named(&map)?.colors,
                 (None, Some(colors)) => colors.into_iter().map(|(place, color)| Ok((place, channels(color)?))).collect::<Result<_>>()?,
-                _ => return Err(Error::Invalid("transfer function: either \"map\" or \"colors\"".into())),
+                _ => return Err(Error::Invalid("transfer function: needs either \"map\" or \"colors\"".into())),
             };
             let mut opacity = file.opacity;
             let mut range = file.range;
@@ -203,7 +210,7 @@ mod json {
                 range = Some([lo, hi]);
             }
             if let Some([lo, hi]) = range.filter(|[lo, hi]| !(lo < hi && (hi - lo).is_finite())) {
-                return Err(Error::Invalid(format!("transfer function: the range {lo} to {hi} is empty")));
+                return Err(Error::Invalid(format!("transfer function: a range from {lo} to {hi}; LO must be below HI in \"range\": [LO, HI]")));
             }
             let known = opacity.is_some();
             let function = Self::new(colors, opacity.unwrap_or_else(|| DEFAULT_OPACITY.to_vec()))?;

@@ -29,8 +29,7 @@ impl Baseline {
             let output = LocateOutput { owners: a.words(asked)?, barycentrics: a.words(4 * asked)? };
             Ok((BinaryTree::carve(a, tets)?, LbvhScratch::carve(gpu, a, tets)?, output, a.words(1)?))
         };
-        let memory = gpu.buffer("olbvh.test.lbvh", Arena::measure(carve).unwrap()).unwrap();
-        let (tree, scratch, output, unfinished) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (memory, (tree, scratch, output, unfinished)) = Arena::reserve(gpu, "olbvh.test.lbvh", carve).unwrap();
         let rays = RayMethod::ALL.into_iter().filter_map(|method| Rays::build(gpu, &mesh, method).unwrap()).collect();
         Self { output, unfinished, mesh, points, tree, scratch, rays, _memory: memory }
     }

@@ -186,8 +186,7 @@ impl Frame {
             let output = LocateOutput { owners: a.words(u64::from(points))?, barycentrics: a.take(16 * u64::from(points))? };
             Ok((arrays, mesh_scratch, tree, build_scratch, output))
         };
-        let memory = gpu.buffer("olbvh.test.frame", Arena::measure(carve).unwrap()).unwrap();
-        let (arrays, mesh_scratch, tree, build_scratch, output) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (memory, (arrays, mesh_scratch, tree, build_scratch, output)) = Arena::reserve(gpu, "olbvh.test.frame", carve).unwrap();
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let asked = PointInput { points: positions.all(), stride: 3, count: points, hints: None, order: None };
         Self { input, arrays, mesh_scratch, tree, build_scratch, points: asked, output, memory, held: [cells, positions] }

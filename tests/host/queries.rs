@@ -73,8 +73,8 @@ impl Queries {
             let order = PointOrder::carve(gpu, a, frame.points.count)?;
             Ok((slice, sets, pairs, a.take(8 * room)?, owners, a.take(4 * room)?, picture, (ranges, values, order)))
         };
-        let memory = gpu.buffer("olbvh.test.queries", Arena::measure(carve).unwrap()).unwrap();
-        let (slice, sets, pairs, found, owners, owner_lists, picture, rest) = carve(&mut Arena::new(memory.all())).unwrap();
+        let (memory, (slice, sets, pairs, found, owners, owner_lists, picture, rest)) =
+            Arena::reserve(gpu, "olbvh.test.queries", carve).unwrap();
         let (ranges, values, order) = rest;
         let field = gpu.upload("olbvh.test.field", field).unwrap();
         let points = PointInput { order: Some(order.order), ..frame.points };

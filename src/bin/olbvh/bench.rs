@@ -14,19 +14,20 @@ use std::process::Command;
 #[command(after_help = "\
 Examples:
   olbvh bench                               two small meshes, within a minute on two cores
-  olbvh bench --suite paper -o results      the paper's sizes; results/ gets bench.json, bench.md and a plot per figure
+  olbvh bench --suite paper -o results      the paper's sizes; a folder for tables and plots
   olbvh bench --suite scaling -o scaling    construction and location from 1k to 12.3M tetrahedra
   olbvh bench bracket.vtu -o bracket.md     this mesh, with the sizes of the quick suite
   olbvh bench graded:40 shell:200 --suite paper --repeat 9 --seconds 1 --json
-  olbvh bench --compare before.json after.json -o changes.md   which times differ by more than their spread
+  olbvh bench --compare a.json b.json       which times differ by more than their spread
 
-Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different size), shell:N (thin walls), slivers:N (flat cells). The suite gives \
-the sizes of points, picture and slice; MESH... stands in place of its meshes. Answers are verified before anything is timed; a wrong one ends the \
-run with code 1. Times are medians on the device (on the host where its queue has no timestamps); JSON has all of them, with bytes and ratios. Stages of the construction are \
-related to the rate at which the device copies, by the bytes that they must read and write at least.
+Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different sizes), shell:N (thin walls), slivers:N (flat cells). The suite \
+determines the numbers of points, pixels and voxels, and the meshes unless MESH is given. Answers are verified before anything is timed; a wrong one \
+ends the run with code 1. Times are medians on the device (on the host if its queue has no timestamps); the JSON result has all of them, with bytes \
+and ratios. Each stage of the construction is compared with the rate at which the device copies memory: the bytes that the stage has to read and \
+write, at the minimum, divided by its time.
 
---compare runs nothing. It tells every ratio of times that both files have, the range that the repetitions allow, what only one of them has, and \
-whatever differs in device, driver, target, program and settings.")]
+--compare measures nothing. For every measurement that both files have, it shows the ratio of the times and the range of ratios that the repetitions \
+allow. It also lists what only one of the files has, and every difference in device, driver, target, program and settings.")]
 pub struct Args {
     /// Mesh files or procedural meshes to measure instead of those of the suite.
     mesh: Vec<PathBuf>,
@@ -38,19 +39,19 @@ pub struct Args {
     output: Option<PathBuf>,
     /// Number of points to locate, up to 67,108,864 (2^26). Default: set by the suite (quick 16,384, paper and full
     /// 1,048,576, scaling 262,144).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 26))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1 << 26), allow_negative_numbers = true)]
     points: Option<u32>,
     /// Width and height of the picture in pixels, and voxels per row of the slice, up to 8,192. Default: set by the
     /// suite (quick 96 and 256, paper and full 1,024 and 999, scaling none).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8192), allow_negative_numbers = true)]
     pixels: Option<u32>,
     /// Maximum number of repetitions of a measurement. Default: set by the suite (quick, paper and full 50, scaling
     /// 15).
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..), allow_negative_numbers = true)]
     repeat: Option<u32>,
     /// Time in seconds after which a measurement is not repeated again. Default: set by the suite (quick 0.05, others
     /// 5).
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Compare two .json result files instead of measuring.
     #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds"])]
@@ -77,11 +78,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     settings.budget.repetitions = args.repeat.unwrap_or(settings.budget.repetitions);
     if let Some(seconds) = args.seconds {
         if !(seconds.is_finite() && seconds >= 0.0) {
-            return Err(Failure::Usage(format!("--seconds {seconds}; it is a time")));
+            return Err(Failure::Usage(format!("--seconds {seconds}: a time of 0 or more is needed")));
         }
         settings.budget.seconds = seconds;
     }
-    let gpu = engine::device(common)?;
+    let (gpu, _) = engine::device(common)?;
     let mut report = Report::new(&gpu, args.suite, settings, commit())?;
     let named =
         |(role, mesh): (&str, &str)| (if role.is_empty() { mesh.to_owned() } else { format!("{role} {mesh}") }, PathBuf::from(mesh));

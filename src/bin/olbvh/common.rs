@@ -1,7 +1,12 @@
 //! Arguments that all subcommands share, and the exit codes of failures.
 
+use clap::builder::{FalseyValueParser, NonEmptyStringValueParser};
 use olbvh::error::Error;
+use std::io::Write as _;
 use std::process::ExitCode;
+
+/// Environment variable that names a target.
+const TARGET_VARIABLE: &str = "OLBVH_TARGET";
 
 /// Arguments that all subcommands share.
 #[derive(clap::Args)]
@@ -12,15 +17,15 @@ pub struct Common {
     pub json: bool,
     /// Device that computes: a part of its name or its number (`olbvh devices` lists them), or `cpu` for the reference
     /// implementation, which needs no Vulkan and is slower. Default: the best suitable Vulkan device.
-    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|INDEX|cpu")]
+    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|INDEX|cpu", value_parser = NonEmptyStringValueParser::new())]
     pub device: Option<String>,
     /// Tuning parameters of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh
-    /// tune` saved. They affect speed only, never results. Default: the profile that `olbvh tune` saved for the device,
-    /// otherwise the parameters for its kind of device.
-    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|FILE", env = "OLBVH_TARGET", hide_env_values = true)]
+    /// tune` saved. They affect speed only, never results. Default: what the environment variable OLBVH_TARGET names,
+    /// otherwise the profile that `olbvh tune` saved for the device, otherwise the parameters for its kind of device.
+    #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|FILE", value_parser = NonEmptyStringValueParser::new())]
     pub target: Option<String>,
     /// Ignore the profile that `olbvh tune` saved for the device.
-    #[arg(long, global = true, help_heading = "Global options", env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = clap::builder::FalseyValueParser::new())]
+    #[arg(long, global = true, help_heading = "Global options", env = "OLBVH_NO_PROFILE", hide_env_values = true, value_parser = FalseyValueParser::new())]
     pub no_profile: bool,
     /// Print errors only: no progress bar, no remarks.
     #[arg(long, short, global = true, help_heading = "Global options", conflicts_with = "verbose")]
@@ -31,19 +36,31 @@ pub struct Common {
 }
 
 impl Common {
-    /// Sends the library's log to standard error.
+    /// Sends the library's log to standard error, as plain sentences.
     pub fn start_log(&self) {
         let level = match (self.quiet, self.verbose) {
             (true, _) => log::LevelFilter::Error,
             (_, true) => log::LevelFilter::Debug,
             _ => log::LevelFilter::Warn,
         };
-        env_logger::Builder::new().filter_level(level).format_timestamp(None).init();
+        let line = |out: &mut env_logger::fmt::Formatter, record: &log::Record<'_>| match record.level() {
+            log::Level::Error => writeln!(out, "error: {}", record.args()),
+            log::Level::Warn => writeln!(out, "warning: {}", record.args()),
+            _ => writeln!(out, "{}", record.args()),
+        };
+        env_logger::Builder::new().filter_level(level).format(line).init();
     }
 
     /// Whether `--device` selects the reference implementation.
     pub fn means_cpu(&self) -> bool {
         self.device.as_deref().is_some_and(|device| device.eq_ignore_ascii_case("cpu"))
+    }
+
+    /// The target that the user asks for, and what names it: `--target`, or else the environment variable if it is not
+    /// empty.
+    pub fn wanted_target(&self) -> Option<(String, &'static str)> {
+        let given = self.target.clone().map(|target| (target, "--target"));
+        given.or_else(|| Some((std::env::var(TARGET_VARIABLE).ok().filter(|target| !target.is_empty())?, TARGET_VARIABLE)))
     }
 
     /// Prints a remark on standard error, unless `--quiet` is given.
@@ -56,7 +73,6 @@ impl Common {
 
 /// Prints a line on standard error; a closed standard error is not a failure.
 fn output_line(line: &str) {
-    use std::io::Write as _;
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
@@ -80,7 +96,7 @@ impl From<Error> for Failure {
         let message = match &error {
             Error::Memory { .. } => {
                 format!(
-                    "{error}; `locate`, `render`, `slice` and `overlap` take meshes that do not fit in blocks, smaller ones with a smaller --memory"
+                    "{error}; `locate`, `render`, `slice` and `overlap` take a mesh that does not fit in blocks, and in smaller blocks with a smaller --memory"
                 )
             }
             Error::NoVulkan(_) => format!("{error}, or use the CPU (--device cpu)"),
@@ -101,6 +117,18 @@ impl Failure {
         match error {
             Error::Io { .. } | Error::TooLarge(_) => Self::Input(error.to_string()),
             other => other.into(),
+        }
+    }
+
+    /// Adds what the failure is about before its message.
+    pub fn about(self, what: impl std::fmt::Display) -> Self {
+        let before = |message: String| format!("{what}: {message}");
+        match self {
+            Self::Failed(message) => Self::Failed(before(message)),
+            Self::Usage(message) => Self::Usage(before(message)),
+            Self::Input(message) => Self::Input(before(message)),
+            Self::Device(message) => Self::Device(before(message)),
+            Self::Closed => Self::Closed,
         }
     }
 

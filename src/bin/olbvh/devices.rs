@@ -11,14 +11,14 @@ use std::fmt::Write as _;
 /// List all Vulkan devices: whether each can be used and, if not, what it lacks.
 #[derive(clap::Args)]
 #[command(
-    after_help = "Examples:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1\n  olbvh devices -v         with the shapes of the kernels, and the profile they come from"
+    after_help = "Examples:\n  olbvh devices            then choose one by number or part of its name:\n  olbvh render m.vtu -o m.png --device 1\n  olbvh devices -v         also the tuning parameters of each, and where they come from"
 )]
 pub struct Args {}
 
 /// Runs the subcommand.
 pub fn run(_: &Args, common: &Common) -> Outcome {
     if common.device.is_some() {
-        common.remark("--device chooses for other commands; these are all devices");
+        common.remark("--device has no effect here; these are all devices");
     }
     let devices = match list_devices() {
         Ok(devices) => devices,
@@ -30,7 +30,9 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
         Err(error) => return Err(Failure::from(error)),
     };
     let mut lines = String::new();
-    for (i, d) in devices.iter().enumerate() {
+    // Once per device, because a profile that is ignored causes a remark.
+    let targets: Vec<Option<Shapes>> = devices.iter().map(|d| Shapes::of(common, d).ok()).collect();
+    for (i, (d, target)) in devices.iter().zip(&targets).enumerate() {
         let missing = &d.requirements.missing;
         let verdict = if missing.is_empty() { "qualifies".to_owned() } else { format!("cannot be used; it lacks {}", missing.join(", ")) };
         let rays = match d.requirements.ray_tracing {
@@ -48,24 +50,22 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
             text::bytes(d.memory),
             d.kind
         );
-        if common.verbose
-            && let Ok(shapes) = Shapes::of(common, d)
-        {
+        if let Some(shapes) = target.as_ref().filter(|_| common.verbose) {
             let _ = writeln!(lines, "     kernels {shapes}");
         }
     }
-    lines.push_str("cpu  the reference implementation on the processor, always there\n");
-    let entry = |(i, d): (usize, &olbvh::gpu::DeviceReport)| {
+    lines.push_str("cpu  the reference implementation on the processor, always available\n");
+    let entry = |(i, (d, target)): (usize, (&olbvh::gpu::DeviceReport, &Option<Shapes>))| {
         json!({
             "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
             "qualifies": d.requirements.missing.is_empty(), "missing": d.requirements.missing,
             "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines,
-            "target": Shapes::of(common, d).map_or(serde_json::Value::Null, |shapes| json!({
+            "target": target.as_ref().map(|shapes| json!({
                 "name": shapes.target.name,
-                "profile": if let Origin::Profile(path) | Origin::File(path) = shapes.origin { Some(path.display().to_string()) } else { None },
+                "profile": if let Origin::Profile(path) | Origin::File(path) = &shapes.origin { Some(path.display().to_string()) } else { None },
             })),
         })
     };
-    let json = json!({ "devices": devices.iter().enumerate().map(entry).collect::<Vec<_>>() });
+    let json = json!({ "devices": devices.iter().zip(&targets).enumerate().map(entry).collect::<Vec<_>>() });
     output::result(common, &json, &lines)
 }

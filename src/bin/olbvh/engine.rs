@@ -100,15 +100,14 @@ pub struct Summary {
     pub stages: Vec<(String, f64)>,
 }
 
-/// Opens the Vulkan device that `--device` names, for measurements.
-pub fn device(common: &Common) -> Outcome<Gpu> {
+/// Opens the Vulkan device that `--device` names, for measurements, with its target.
+pub fn device(common: &Common) -> Outcome<(Gpu, Shapes)> {
     if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: only Vulkan devices are measured".into()));
     }
-    let device = gpu::Device::open(common)?;
-    let gpu = device.gpu();
+    let (gpu, shapes) = gpu::Device::open(common)?.into_parts();
     // Measurements are repeated, so the pool keeps the memory of one repetition for the next.
-    Ok(gpu.with_pool(gpu.report().memory / 4))
+    Ok((gpu.with_pool(gpu.report().memory / 4), shapes))
 }
 
 /// The target of the kernels on the device that `--device` names.
@@ -122,8 +121,8 @@ pub fn open(common: &Common) -> Outcome<Box<dyn Engine>> {
     if !common.means_cpu() {
         return Ok(Box::new(gpu::Device::open(common)?));
     }
-    if common.target.is_some() && std::env::var_os("OLBVH_TARGET").is_none() {
-        return Err(Failure::Usage("--target shapes the kernels of Vulkan devices; --device cpu has none".into()));
+    if common.target.is_some() {
+        return Err(Failure::Usage("--target: tuning parameters of kernels, which --device cpu does not have".into()));
     }
     Ok(Box::new(cpu::Cpu))
 }

@@ -19,11 +19,12 @@ Examples:
   olbvh info bracket.vtu
   olbvh info bracket.vtu --alpha 1 --assign planes
   olbvh info bracket.vtu --budget 2MiB
-  olbvh info bracket.vtu --level 6            a level finer than alpha 0
+  olbvh info bracket.vtu --level 6            leaves of level 6
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
-Bad cells (a vertex that does not exist, occurs twice or is not finite) are left out of the tree. Boundary cells have a face on the surface, no \
-volume, or overlap a neighbour. Negative cells have their vertices in the other order, which does no harm.")]
+Bad cells are left out of the tree: those with a vertex that does not exist or occurs twice, or with a coordinate that is not finite or has a \
+magnitude of 2^125 (4.3e37) or more. Boundary cells have a face on the surface or no volume, or overlap a neighbour. Negative cells have their vertices \
+in the other order, which does no harm where cells do not overlap.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
@@ -133,13 +134,14 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
         args.tree.budget.map(|b| format!(", budget {}", bytes(b))).unwrap_or_default(),
         milliseconds(s.build_ms)
     ));
-    let clipped = if s.wanted > s.level { format!(" ({} is asked for, which would be too large)", s.wanted) } else { String::new() };
+    let clipped =
+        if s.wanted > s.level { format!(" (a tree of level {}, as requested, would be too large)", s.wanted) } else { String::new() };
     page.row("level of the leaves, l", format_args!("{}{clipped}", s.level));
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
     let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.wants_finer(each) && s.wanted == s.level && finer <= MAX_LEVEL;
-    let hint = if hint { format!("; pictures are drawn sooner with --level {finer}") } else { String::new() };
+    let hint = if hint { format!("; pictures are drawn faster with --level {finer}") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
     for (name, n) in s.memory.arrays() {
         let what = match name {
@@ -157,7 +159,10 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("total", bytes(s.memory.total()));
     page.row("as the paper counts", format_args!("{} (4 n_m + 25 n_n + 4 n_ni, without PO)", bytes(s.paper_bytes)));
     let neighbours = bytes(s.neighbour_bytes);
-    page.row("neighbours, boundary", format_args!("found in {}; {neighbours} of neighbours beside the tree", milliseconds(s.topology_ms)));
+    page.row(
+        "neighbours, boundary",
+        format_args!("found in {}; neighbours take {neighbours} besides the tree", milliseconds(s.topology_ms)),
+    );
     if verbose {
         if let Some(shapes) = shapes {
             page.row("kernels", shapes);

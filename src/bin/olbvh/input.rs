@@ -2,9 +2,11 @@
 
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
+use olbvh::error::Error;
 use olbvh::formats::{LoadOptions, Loaded, load};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
+use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Instant;
 
@@ -12,33 +14,34 @@ use std::time::Instant;
 #[derive(clap::Args)]
 pub struct TreeArgs {
     /// Coarseness of the tree, from 0 (fine) to 10: every whole number makes the leaves one level coarser. Coarser
-    /// trees are smaller and faster to build. Answers do not depend on it.
+    /// trees are smaller and faster to build. Answers do not depend on it where cells do not overlap.
     #[arg(long, default_value_t = 0.0, value_name = "A", allow_hyphen_values = true)]
     pub alpha: f32,
     /// Level of the leaves, from 0 to 10, instead of the level that --alpha selects; leaves of the next level are half
     /// as large. By default, and unless --alpha, --lists or --budget is changed, leaves become finer than --alpha 0
     /// selects where parts of the mesh are thin and lists are long, and for pictures of small meshes (not in `info`).
-    /// Answers do not depend on it.
-    #[arg(long, value_name = "L", conflicts_with = "alpha", value_parser = clap::value_parser!(u32).range(0..=10))]
+    /// Answers do not depend on it where cells do not overlap.
+    #[arg(long, value_name = "L", conflicts_with = "alpha", value_parser = clap::value_parser!(u32).range(0..=10), allow_negative_numbers = true)]
     pub level: Option<u32>,
     /// Which octree cells list a tetrahedron. aabb: all that meet its bounding box, as in the paper. planes: of these,
     /// the cells that none of its face planes separates from it. exact: only the cells that it touches, which gives the
-    /// shortest lists and takes longest to build. Answers do not depend on it.
+    /// shortest lists and takes longest to build. Answers do not depend on it where cells do not overlap.
     #[arg(long, default_value_t = BuildOptions::default().assign, value_parser = named::<Assign>, value_name = "aabb|planes|exact")]
     pub assign: Assign,
     /// Which tetrahedra a leaf lists. boundary: all of them in leaves at the surface of the mesh, and a single one
     /// elsewhere, from which points are found by walking across faces. all: all of them in every leaf, as in the paper.
-    /// Answers do not depend on it.
+    /// Answers do not depend on it where cells do not overlap.
     #[arg(long, default_value_t = BuildOptions::default().lists, value_parser = named::<Lists>, value_name = "all|boundary")]
     pub lists: Lists,
     /// Maximum memory for the arrays of the tree, for example 64MiB (units B, KiB, MiB, GiB, kB, MB, GB; a plain number
     /// is in bytes). The tree is made coarser than --alpha selects until it fits, judged by the most that it could need
-    /// with `--lists all --assign aabb`. Default: no limit. Answers do not depend on it.
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    /// with `--lists all --assign aabb`. Default: no limit. Answers do not depend on it where cells do not overlap.
+    #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub budget: Option<u64>,
     /// Sort cells and points along a Z-order curve first. This pays if the file has them in no spatial order and there
-    /// are many queries; most meshes gain nothing. Ids in results stay those of the file, but a point on a face, edge
-    /// or vertex is owned by the first of the cells along the curve instead of the one with the lowest id.
+    /// are many queries; most meshes gain nothing. Ids in results stay those of the file, but a point that several
+    /// cells contain, on a face, edge or vertex or where cells overlap, may be owned by another of them: the first
+    /// along the curve instead of the one with the lowest id.
     #[arg(long)]
     pub reorder: bool,
 }
@@ -48,8 +51,8 @@ pub struct TreeArgs {
 pub struct MemoryArgs {
     /// Maximum device memory to use, including buffers for transfers, for example 512MiB (units as for --budget). A
     /// mesh that does not fit is built and queried in blocks, one after the other. Default: the memory of the device.
-    /// Answers do not depend on it.
-    #[arg(long, value_name = "BYTES", value_parser = bytes)]
+    /// Answers do not depend on it where cells do not overlap.
+    #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub memory: Option<u64>,
 }
 
@@ -104,12 +107,26 @@ impl TreeArgs {
 
 /// Reads a mesh and prints the warnings of its reader.
 pub fn mesh(path: &Path, common: &Common) -> Outcome<Loaded> {
-    let loaded = load(path, &LoadOptions::default()).map_err(Failure::input)?;
+    let loaded = load(path, &LoadOptions::default()).map_err(|error| refused(path, error))?;
     for warning in &loaded.report.warnings {
         common.remark(format_args!("{}: {warning}", path.display()));
     }
     log::info!("{}: {} tetrahedra in {:.2} s", path.display(), loaded.mesh.tets.len(), loaded.report.seconds);
     Ok(loaded)
+}
+
+/// The failure of a mesh that cannot be read or made. A procedural mesh that cannot be made is wrong usage.
+fn refused(path: &Path, error: Error) -> Failure {
+    let text = path.to_string_lossy();
+    let wrong = |why: &str| Failure::Usage(if why.starts_with(&*text) { why.to_owned() } else { format!("{text}: {why}") });
+    match &error {
+        Error::Invalid(why) => wrong(why),
+        Error::TooLarge(why) if !path.exists() => wrong(why),
+        Error::Io { source, .. } if source.kind() == ErrorKind::NotFound && text.contains(':') => Failure::Input(format!(
+            "{text}: neither a file nor a procedural mesh, which are kuhn:NX,NY,NZ, graded:N, shell:N and slivers:N"
+        )),
+        _ => Failure::input(error),
+    }
 }
 
 /// The field with this name; without a name, the first field of points, or else the first field of cells.

@@ -21,14 +21,17 @@ use std::time::Instant;
 Examples:
   olbvh locate bracket.vtu points.csv -o values.csv
   olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
-  olbvh locate bracket.vtu points.csv -o cells.csv --all      every cell, for points on faces, edges and vertices
+  olbvh locate bracket.vtu points.csv -o cells.csv --all   every cell that contains the point
 
-Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder the first along \
-the curve); ids count the cells of the file from 0, and 4294967295 means none. The barycentric coordinates b0 to b3 belong to the tetrahedron's vertices in file order. \
-A .npy result is an array of records (owner, bary, value), an .npz has one array for each; also .csv, .vtu and .json. \
-Where there is a point to every two cells or more, each is looked for near the one before, along a Z curve; --coherent takes them as they come, which \
-saves the sorting. The answers are the same, and stand in the order of the points in any case. \
-With --all the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
+Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder, the first \
+along the curve). Where cells of the mesh overlap each other, another of the cells that contain the point may be named, which depends on \
+the options; --all then finds all of them only with --lists all. Ids count the cells of the file from 0; 4294967295 means that there is no owner. The \
+barycentric coordinates b0 to b3 belong to the vertices of the tetrahedron in file order. For a cell that was split into tetrahedra (hexahedron, voxel, \
+wedge or pyramid), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
+A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; .csv, .vtu and .json are other formats. \
+If there is at least one point for every four cells (for at most 4,194,304 cells), points are sorted along a Z curve, and each is searched for near \
+the one before. --coherent searches in the given order instead, which saves the sorting. Results are always in the order of the points. \
+With --all, the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
@@ -44,10 +47,12 @@ pub struct Args {
     #[arg(long, conflicts_with = "field")]
     all: bool,
     /// How far outside the surface a point may lie and still count as inside: its smallest barycentric coordinate may
-    /// be down to -T. T is between 0 and 1, without unit.
+    /// be down to -T. T is between 0 and 1, without unit. Whether such a point is found may depend on options of the
+    /// tree.
     #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
-    /// Take the points in the given order, in which each lies near the one before, as the samples of a line or scan do.
+    /// Search for each point near the one before it in the given order. This is fast for points that follow each other
+    /// closely, such as samples on a line or of a scan. Answers do not depend on it where cells do not overlap.
     /// Default: no order is assumed.
     #[arg(long, conflicts_with = "all")]
     coherent: bool,
@@ -66,7 +71,7 @@ struct Done {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if !(0.0..=1.0).contains(&args.tolerance) {
-        return Err(Failure::Usage(format!("a tolerance of {}; it lies between 0 and 1", args.tolerance)));
+        return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", args.tolerance)));
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let format = output::announce(&args.output, formats, &[&args.mesh, &args.points])?;
@@ -76,6 +81,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mesh = &loaded.mesh;
     let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
     let points = load_points(&args.points).map_err(Failure::input)?;
+    if points.is_empty() {
+        common.remark(format_args!("{}: no points in it", args.points.display()));
+    }
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
     let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);

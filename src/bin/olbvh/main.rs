@@ -15,6 +15,7 @@ mod overlap;
 mod render;
 mod slice;
 mod slice_output;
+mod slice_placement;
 mod text;
 mod tune;
 
@@ -23,20 +24,21 @@ use common::{Common, Failure};
 use std::process::ExitCode;
 
 const AFTER_HELP: &str = "\
-MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh (Medit), .node or .ele (TetGen); or kuhn:NX,NY,NZ, a procedural grid of \
-NX×NY×NZ unit cubes, six tetrahedra each, with a scalar field (others: see `olbvh bench --help`). Lengths are in the units of the mesh.
+MESH is a file: .vtu, .vtk, .msh (Gmsh), .mesh or .meshb (Medit), .node or .ele (TetGen); or a procedural mesh: kuhn:NX,NY,NZ, a grid of \
+NX×NY×NZ unit cubes of six tetrahedra each, with a scalar field, or graded:N, shell:N, slivers:N (see `olbvh bench --help`). Lengths are in the \
+units of the mesh.
 
 Examples:
-  olbvh info bracket.vtu                        what is in a mesh, and what its tree is like
-  olbvh render bracket.vtu -o bracket.png       a picture of its first field
-  olbvh locate bracket.vtu points.csv -o out.csv   in which cell each point lies, and the field there
-  olbvh slice bracket.vtu -o bracket.npy --layers 100   voxels, none of them empty that the mesh touches
-  olbvh overlap a.vtu b.vtu -o cells.json       which cells of two meshes intersect
-  olbvh bench                                   how fast all that is here
-  olbvh tune                                    make it faster on this device
-  olbvh render kuhn:32,32,32 -o jet.png --device cpu
+  olbvh info bracket.vtu                               the contents of a mesh, and its tree
+  olbvh render bracket.vtu -o bracket.png              a picture of its first field
+  olbvh locate bracket.vtu points.csv -o out.csv       the cell of each point, and the value there
+  olbvh slice bracket.vtu -o bracket.npy --layers 100  voxels; none that the mesh touches is empty
+  olbvh overlap a.vtu b.vtu -o cells.json              the cells of two meshes that intersect
+  olbvh bench                                          how fast the device does all of this
+  olbvh tune                                           parameters with which it is faster
+  olbvh render kuhn:32,32,32 -o jet.png --device cpu   without a Vulkan device
 
-Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device.";
+Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input file, 4 no suitable device, 130 interrupted.";
 
 /// Build octree linear bounding volume hierarchies (OLBVH) over tetrahedral meshes on the GPU, and query them: locate
 /// points and interpolate fields, render pictures, slice into voxels, find the overlap of two meshes.

@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use olbvh::error::Error;
-use olbvh::formats::{OutputFile, OutputFormat};
+use olbvh::formats::{OutputFile, OutputFormat, destination};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -61,17 +61,23 @@ pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outc
     Ok(OutputFormat::of(path, formats)?)
 }
 
-/// Announces a result with any extension: its folder must exist, and it must not be one of the `inputs`.
+/// Announces a result with any extension: it must not be a folder, device, pipe or socket, nor one of the `inputs`, and
+/// its folder must exist.
 pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
-    if path == Path::new("-") || path.starts_with("/dev") {
+    let existing = std::fs::metadata(path).ok();
+    if existing.as_ref().is_some_and(std::fs::Metadata::is_dir) {
+        return Err(Failure::Usage(format!("{}: a folder; name a file in it", path.display())));
+    }
+    if path == Path::new("-") || existing.is_some_and(|existing| !existing.is_file()) {
         return Err(Failure::Usage(format!("{}: results go to files, not to streams or devices", path.display())));
     }
     let place = std::fs::canonicalize(path).ok();
     if place.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == place) {
-        return Err(Failure::Usage(format!("{}: the result would replace what it is made of; choose another name", path.display())));
+        return Err(Failure::Usage(format!("{}: the result would replace an input; choose another name", path.display())));
     }
-    if !folder(path).is_dir() {
-        return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(path).display())));
+    let destination = destination(path);
+    if !folder(&destination).is_dir() {
+        return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(&destination).display())));
     }
     begin(path);
     Ok(())
@@ -79,7 +85,7 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
 
 /// Registers a file of a result that consists of several files, before it is written.
 pub fn begin(path: &Path) {
-    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(path.to_path_buf());
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(destination(path));
 }
 
 /// Writes a text file, completely or not at all.

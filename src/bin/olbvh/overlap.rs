@@ -1,7 +1,7 @@
 //! The subcommand `olbvh overlap`.
 
 use crate::arguments::vector;
-use crate::common::{Common, Outcome};
+use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
@@ -21,13 +21,14 @@ use std::time::Instant;
 #[command(after_help = "\
 Examples:
   olbvh overlap die.vtu box.vtu -o cells.json
-  olbvh overlap a.vtu b.vtu -o cells.json --pairs              every pair of intersecting cells
+  olbvh overlap a.vtu b.vtu -o cells.json --pairs   also every pair of intersecting cells
   olbvh overlap a.vtu b.vtu -o cells.json --move-b 0,0,3.5 --rotate-b z,30
-  olbvh overlap a.vtu b.vtu -o touched.vtu                     the cells of A that intersect B, as a mesh
+  olbvh overlap a.vtu b.vtu -o touched.vtu          the cells of A that intersect B, as a mesh
 
-The result has `a` and `b`, ascending cell ids, and with --pairs `pairs`, ascending by a then b. Ids count the cells of a file from 0. Touching counts. \
-B is turned about the centre of its points first, then moved. Cells nearer to touching than 1e-6 of the scene's diagonal may be counted or not, \
-but the same on every device.")]
+The .json result has the lists `a` and `b` of ascending cell ids and, with --pairs, the list `pairs`, sorted by the cell of A, then by that of B. Ids \
+count the cells of a file from 0. B is rotated about the centre of its bounds first, then moved. Cells are closed, so cells that touch intersect. Two \
+cells that share a vertex with equal coordinates always count; two other cells that touch, or that are nearer to touching than 1e-6 of the diagonal \
+of both meshes together, may count or not, but the result is the same on every device.")]
 pub struct Args {
     /// Mesh A: a file, or a procedural mesh such as kuhn:NX,NY,NZ.
     a: PathBuf,
@@ -36,7 +37,7 @@ pub struct Args {
     /// Output file: .json, or .vtu for the cells of A that intersect B as a mesh.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Also find all pairs of intersecting cells (.json output).
+    /// Also find all pairs of intersecting cells; only .json files hold them.
     #[arg(long)]
     pairs: bool,
     /// Move B by this vector, in units of the mesh.
@@ -55,6 +56,9 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
+    if args.pairs && format != OutputFormat::Json {
+        return Err(Failure::Usage(format!("{}: --pairs needs a .json file; a .vtu file holds no pairs", args.output.display())));
+    }
     let mut options = args.tree.suited(Fineness::Points)?;
     if args.pairs {
         // Pairs are found through lists; only lists by bounding box find each pair once.
@@ -137,7 +141,7 @@ fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
         *p = (turned + centre + shift).as_vec3().to_array();
     }
     b.origin = a.origin;
-    if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("B is moved beyond all bounds".into()).into()) }
+    if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("--move-b: coordinates of B become infinite".into()).into()) }
 }
 
 /// A mesh of some of the cells, in the order of their ids, with all points and fields.

@@ -1,6 +1,6 @@
 //! The subcommand `olbvh render`.
 
-use crate::arguments::{range, vector};
+use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{self, Drawn};
 use crate::input::{self, MemoryArgs, TreeArgs};
@@ -11,9 +11,9 @@ use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::Fineness;
-use olbvh::render::camera::CameraSpec;
+use olbvh::render::camera::{CameraSpec, HELP};
 use olbvh::render::maps::MAPS;
-use olbvh::render::{Background, RenderSettings, TransferFunction, transfer};
+use olbvh::render::{Background, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -23,13 +23,14 @@ Examples:
   olbvh render bracket.vtu -o bracket.png
   olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
   olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900
-  olbvh render bracket.vtu -o shell.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   only values around 70 % of the range
-  olbvh render bracket.vtu -o surfaces.png --iso 40,55,70 --opacity 0.5   three iso-surfaces, seen through one another
+  olbvh render bracket.vtu -o part.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   some of the values
+  olbvh render bracket.vtu -o iso.png --iso 40,55,70 --opacity 0.5   three translucent iso-surfaces
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
-The camera sees the whole mesh unless told otherwise. --opacity and the last column of a transfer function are what a ray gathers on 1/100 of the \
-mesh's diagonal; the picture does not depend on --alpha and --assign, and hardly on --step. \
-Where the opacity is 0 nothing is looked at: octree nodes with no other values are skipped, so pictures of few values are quick.";
+By default, the camera sees the whole mesh. An opacity, of --opacity or a transfer function, is that of a layer as thick as 1/100 of the diagonal of \
+the mesh's bounds. The picture depends little on --step and, where cells of the mesh do not overlap each other, not at all on --alpha, --level, \
+--lists, --assign, --memory and --budget. Octree nodes in which the opacity is 0 everywhere are skipped, so pictures that show few of the values are \
+drawn fast.";
 
 /// Draw a field of a mesh as a volume or as iso-surfaces, into a PNG file.
 #[derive(clap::Args)]
@@ -45,50 +46,51 @@ pub struct Args {
     #[arg(long)]
     field: Option<String>,
     /// Width and height in pixels; a single number gives a square.
-    #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size)]
+    #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size, allow_negative_numbers = true)]
     size: [u32; 2],
     /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
-    /// bounds.
-    #[arg(long)]
+    /// bounds, or less where the mesh or its layers are thinner than that, down to 1/8192. An iso-surface nearer to the
+    /// surface of the mesh than a step may have gaps.
+    #[arg(long, allow_negative_numbers = true)]
     step: Option<f64>,
     /// View and settings, separated by commas, for example `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (angles in
     /// degrees; --help lists all).
-    #[arg(long, default_value = "iso", allow_hyphen_values = true, long_help = olbvh::render::camera::HELP)]
+    #[arg(long, default_value = "iso", allow_hyphen_values = true, value_parser = named::<CameraSpec>, long_help = format!("Camera: {HELP}"))]
     camera: CameraSpec,
     /// Colours and opacities: the name of a colour map, or a .json file (--help lists the maps and describes the file).
     #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP|FILE.json")]
     tf: String,
     /// Opacity, from 0 to 1, per 1/100 of the mesh's diagonal: one number, or PLACE:OPACITY pairs, where PLACE goes
     /// from 0 to 1 over --range. Default: opacities that fit the field, so that rare values show through common ones.
-    #[arg(long, value_name = "A|P:A,P:A,…", value_parser = |text: &str| TransferFunction::parse_opacity(text).map(Opacity))]
+    #[arg(long, value_name = "A|P:A,P:A,…", value_parser = opacity, allow_hyphen_values = true)]
     opacity: Option<Opacity>,
     /// Draw iso-surfaces of a field of points at these values (up to 8) instead of the volume. They are opaque, unless
     /// --opacity gives their opacities.
     #[arg(long, value_name = "V,V,…", value_parser = iso, allow_hyphen_values = true)]
     iso: Option<Iso>,
-    /// Values of the field at the two ends of the transfer function. Default: the range in the .json file of --tf if it
+    /// Values of the field at the two ends of the transfer function, LO below HI. Default: the range in the .json file of --tf if it
     /// has one, otherwise the smallest and largest value of the field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
     /// Factor on the opacity: 2 makes the mesh as opaque as if it were twice as large.
-    #[arg(long, default_value_t = 1.0, value_name = "S")]
+    #[arg(long, default_value_t = 1.0, value_name = "S", allow_negative_numbers = true)]
     opacity_scale: f32,
     /// Background: white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM for a gradient. Default: white.
-    #[arg(long, value_name = "COLOR")]
+    #[arg(long, value_name = "COLOR", value_parser = named::<Background>)]
     background: Option<Background>,
     /// Show colours without lighting.
     #[arg(long)]
     no_shading: bool,
     /// Minimum opacity, from 0 to 1, of lit surfaces that are seen edge-on: it keeps outlines crisp where the field is
     /// faint. 0: no outlines.
-    #[arg(long, default_value_t = 0.35, value_name = "A")]
+    #[arg(long, default_value_t = 0.35, value_name = "A", allow_negative_numbers = true)]
     outline: f32,
     /// Direction to the light, of any length, as seen in the picture: right, up, towards the viewer. Default:
     /// -0.45,0.65,1.
     #[arg(long, value_name = "R,U,T", value_parser = vector, allow_hyphen_values = true)]
     light: Option<[f64; 3]>,
     /// Opacity at which a ray ends, above 0 and up to 1.
-    #[arg(long, default_value_t = 0.99, value_name = "A")]
+    #[arg(long, default_value_t = 0.99, value_name = "A", allow_negative_numbers = true)]
     termination: f32,
     #[command(flatten)]
     tree: TreeArgs,
@@ -108,7 +110,7 @@ struct Iso(Vec<f32>);
 pub fn run(args: &Args, common: &Common) -> Outcome {
     output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
     let mut options = args.tree.suited(Fineness::Pictures)?;
-    let settings = args.settings()?;
+    let mut settings = args.settings()?;
     settings.check()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
@@ -120,14 +122,21 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     if let (false, Some([lo, hi])) = (settings.iso.is_empty(), field.range())
         && !settings.iso.iter().any(|iso| (lo..=hi).contains(iso))
     {
-        common.remark(format_args!("no surface to be seen: {} goes from {lo} to {hi}", field.name));
+        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", field.name));
     }
+    let suited = suited_step(&loaded.mesh.points, &loaded.mesh.tets);
+    settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
     let (drawn, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let Drawn { picture, range: [lo, hi], step } = drawn;
     drop(progress);
+    if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
+        common.remark(format_args!(
+            "the mesh is about {thickness:.1e} thick, the step is {step:.1e}: the picture may show rings, or miss parts; --step sets it"
+        ));
+    }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
     let json = json!({
@@ -201,6 +210,11 @@ fn size(text: &str) -> Result<[u32; 2], String> {
     }
 }
 
+/// Parses opacities; the error message holds only what is wrong with them.
+fn opacity(text: &str) -> Result<Opacity, String> {
+    TransferFunction::parse_opacity(text).map(Opacity).map_err(message)
+}
+
 /// Parses values `V,V,…`.
 fn iso(text: &str) -> Result<Iso, String> {
     let values: Result<Vec<f32>, _> = text.split(',').map(|part| part.trim().parse()).collect();
@@ -213,5 +227,5 @@ fn long_help() -> String {
     for map in MAPS {
         maps.row(map.name, map.about);
     }
-    format!("{EXAMPLES}\n\nColour maps (with _r behind the name: reversed):\n{maps}\nTransfer function in a file:\n{}", transfer::JSON_HELP)
+    format!("{EXAMPLES}\n\nColour maps (NAME_r is the reversed map):\n{maps}\nTransfer function in a file:\n{}", transfer::JSON_HELP)
 }

@@ -5,7 +5,8 @@ use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
-use crate::slice_output::{Appearance, Layers, materials};
+use crate::slice_output::{Appearance, Layers, layer_file, materials};
+use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::Stack;
 use olbvh::formats::OutputFormat;
@@ -22,16 +23,19 @@ use std::time::Instant;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  olbvh slice bracket.vtu -o middle.png                       one slice through the middle
-  olbvh slice bracket.vtu -o bracket.npy --layers 200         the whole mesh; kinds in bracket.kind.npy
+  olbvh slice bracket.vtu -o middle.png                 one slice through the middle
+  olbvh slice bracket.vtu -o bracket.npy --layers 200   the whole mesh; kinds in bracket.kind.npy
   olbvh slice bracket.vtu -o layer.png --axis x --at 12.5 --layers 10 --thickness 0.2
   olbvh slice bracket.vtu -o cut.vti --normal 1,1,0.5 --size 800
-  olbvh slice bracket.vtu -o print.svx --size 400             voxel package for printers
+  olbvh slice bracket.vtu -o print.svx --size 400       a package of voxels for printers
 
-A voxel's kind is 2 where its centre lies in the mesh, 1 where only its box touches the mesh, else 0. A touched voxel gets the value at the closest point \
-of the mesh's closest boundary cell (or, with --extrapolate linear, that cell's field continued to the centre). Empty voxels are NaN, in pictures \
-transparent. Rows and layers run upwards; pictures show the highest row on top. More than one layer makes pictures NAME-0000.png, NAME-0001.png, … \
-An .svx package has its origin and voxels in metres (see --unit); its x and y are those of the layers.")]
+A voxel's kind is 2 if its centre lies in the mesh, 1 if only its box touches the mesh, otherwise 0. A touched voxel gets the value at the closest \
+point of the closest boundary cell of the mesh (or, with --extrapolate linear, the field of that cell continued to the centre). Empty voxels are NaN, \
+and transparent in pictures. Rows and layers run upwards; pictures show the highest row on top. Several layers make pictures NAME-0000.png, \
+NAME-0001.png and so on. With --json, the centre of the first voxel (`origin`), the distances from voxel to voxel, row to row and layer to layer \
+(`spacing`) and the directions of these (`axes`) place a .npy result in the coordinates of the mesh file. Origin and voxels of an .svx package are in \
+metres (see --unit); its x and y run along the rows and from row to row. Where cells of the mesh overlap each other, options such as --alpha may \
+change which of the cells that contain a point gives its value.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
@@ -49,11 +53,11 @@ pub struct Args {
     #[arg(long, value_name = "V", allow_hyphen_values = true)]
     at: Option<f64>,
     /// Number of layers. Default: 1; for .svx as many as fill the mesh.
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     layers: Option<u32>,
     /// Size of a layer, which covers the bounds of the mesh: voxels per row x rows. A single number is voxels per row;
     /// voxels are then square.
-    #[arg(long, default_value = "512", value_name = "WxH|W", value_parser = size)]
+    #[arg(long, default_value = "512", value_name = "WxH|W", value_parser = size, allow_negative_numbers = true)]
     size: [u32; 2],
     /// Height of a voxel perpendicular to the layers, in units of the mesh. Default: --spacing if given; otherwise,
     /// with one layer or with --at, the width of a voxel; otherwise what fills the mesh.
@@ -76,12 +80,12 @@ pub struct Args {
     /// Colour map of .png pictures, as for `render --tf`. Default: viridis.
     #[arg(long, value_name = "MAP")]
     tf: Option<String>,
-    /// Values of the field at the two ends of the colour map (and of the value channel of an .svx package). Default:
-    /// the smallest and largest value of the field.
+    /// Values of the field at the two ends of the colour map (and of the value channel of an .svx package), LO below
+    /// HI. Default: the smallest and largest value of the field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
     /// Metres per unit of the mesh, for .svx. Default: 0.001, that is the mesh is in millimetres.
-    #[arg(long, value_name = "M", value_parser = unit)]
+    #[arg(long, value_name = "M", value_parser = unit, allow_negative_numbers = true)]
     unit: Option<f64>,
     #[command(flatten)]
     tree: TreeArgs,
@@ -109,7 +113,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         (args.unit.is_some(), "--unit", &[OutputFormat::Svx], ".svx"),
     ] {
         if given && !formats.contains(&format) {
-            return Err(Failure::Usage(format!("{option} goes with {endings}")));
+            return Err(Failure::Usage(format!("{option} is for {endings} files")));
         }
     }
     let colors = TransferFunction::named(args.tf.as_deref().unwrap_or(transfer::DEFAULT_MAP))?;
@@ -131,22 +135,29 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let whole = settings.cubes(lo, hi, mesh.origin, true)?;
         settings = if args.layers.is_none() { whole } else { settings.cubes(lo, hi, mesh.origin, false)? };
         if settings.layers < whole.layers {
-            common
-                .remark(format_args!("{} of the {} layers that fill the mesh; leave --layers out for all", settings.layers, whole.layers));
+            common.remark(format_args!(
+                "{} of the {} layers that fill the mesh; without --layers, all are made",
+                settings.layers, whole.layers
+            ));
         }
     }
     let voxels = settings.voxels(lo, hi, mesh.origin)?;
     if voxels.voxels() > MOST_VOXELS {
         let all = grouped(voxels.voxels());
-        return Err(Failure::Usage(format!("{all} voxels are more than fit a file; at most 2^40: fewer --layers, or a smaller --size")));
+        return Err(Failure::Usage(format!("{all} voxels, more than the maximum of 2^40; take fewer --layers or a smaller --size")));
     }
     let range = args.range.or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
     let materials = field.and_then(materials);
     if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
-        common.remark(format_args!("{name} does not number materials from 1 to 255; the package has its values over {range:?}"));
+        common.remark(format_args!(
+            "{name} does not number materials from 1 to 255; the package has its values from {} to {}",
+            range[0], range[1]
+        ));
     }
     let look = Appearance { colors, range, unit: args.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials };
-    let mut layers = Layers::create(&args.output, format, &voxels, mesh, args.owners, look)?;
+    let placement = Placement::new(&voxels, mesh);
+    let [width, height] = voxels.size;
+    let mut layers = Layers::create(&args.output, format, ([width, height, voxels.layers], &placement), mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let mut tally = Tally::default();
     let start = Instant::now();
@@ -158,23 +169,28 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
+    let axis = args.normal.is_none().then(|| AXES[args.axis]);
     if tally.inside + tally.touched == 0 {
-        common.remark(format_args!("all voxels are empty: the mesh lies between {lo:?} and {hi:?} beside {:?}", mesh.origin));
+        common.remark(placement.remark_on_emptiness(axis, &Bounds { lo, hi }, mesh));
     }
+    let file = |layer: u32| match format {
+        OutputFormat::Png => layer_file(&args.output, layer, voxels.layers).display().to_string(),
+        _ => args.output.display().to_string(),
+    };
+    let (first, last) = (file(0), file(voxels.layers - 1));
+    let shown = if first == last { first.clone() } else { format!("{first} to {last}") };
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
     let json = json!({
-        "file": args.output.display().to_string(), "layers": voxels.layers, "width": voxels.size[0], "height": voxels.size[1],
+        "file": first, "last_file": last, "layers": voxels.layers, "width": width, "height": height,
+        "origin": placement.origin, "spacing": placement.spacing, "axis": axis, "axes": placement.axes, "thickness": placement.thickness,
         "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
         "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": took.build_seconds * 1e3, "blocks": took.trees,
         "peak_bytes": took.peak, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} of {}x{} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
-        args.output.display(),
+        "{shown}: {} of {width}x{height} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
         counted(voxels.layers.into(), "layer"),
-        voxels.size[0],
-        voxels.size[1],
         grouped(tally.inside),
         grouped(tally.touched),
         grouped(tally.empty),
@@ -185,8 +201,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     output::summary(common, &json, &text)
 }
 
+/// Names of the axes.
+const AXES: [&str; 3] = ["x", "y", "z"];
+
 fn axis(text: &str) -> Result<usize, String> {
-    ["x", "y", "z"].iter().position(|a| a.eq_ignore_ascii_case(text)).ok_or_else(|| "an axis is x, y or z".into())
+    AXES.iter().position(|a| a.eq_ignore_ascii_case(text)).ok_or_else(|| "an axis is x, y or z".into())
 }
 
 fn extrapolate(text: &str) -> Result<Extrapolate, String> {

@@ -1,11 +1,12 @@
 //! Output of the layers of `olbvh slice`: arrays, an image for `ParaView`, pictures, or a package of voxels.
 
 use super::output;
+use super::slice_placement::Placement;
 use olbvh::error::{Error, Result};
 use olbvh::formats::{Channel, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::render::TransferFunction;
-use olbvh::slicing::{Band, EMPTY, VoxelGrid};
+use olbvh::slicing::{Band, EMPTY};
 use std::path::{Path, PathBuf};
 
 /// How values are shown in pictures and packages.
@@ -56,17 +57,17 @@ pub struct Layers<'a> {
 }
 
 impl<'a> Layers<'a> {
-    /// Creates the output.
-    pub fn create(path: &Path, format: OutputFormat, voxels: &VoxelGrid, mesh: &'a Mesh, owners: bool, look: Appearance) -> Result<Self> {
-        let [w, h] = voxels.size;
-        let size = [w, h, voxels.layers];
-        let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
-        let origin = [0, 1, 2].map(|c| mesh.origin[c] + f64::from(voxels.origin[c]));
-        let steps = [voxels.across, voxels.down, voxels.up];
-        // The direction of the layers is that of the half axis, since the distance between layers may be 0.
-        let axes = [voxels.half[0], voxels.half[1], voxels.half[2]].map(|v| v.map(|x| f64::from(x) / length(v)));
-        let upside = steps[2].iter().zip(&axes[2]).map(|(&a, b)| f64::from(a) * b).sum::<f64>() < 0.0;
-        let spacing = [length(steps[0]), length(steps[1]), if upside { -length(steps[2]) } else { length(steps[2]) }];
+    /// Creates the output for layers of this many voxels: per row, rows, layers.
+    pub fn create(
+        path: &Path,
+        format: OutputFormat,
+        (size, placement): ([u32; 3], &Placement),
+        mesh: &'a Mesh,
+        owners: bool,
+        look: Appearance,
+    ) -> Result<Self> {
+        let [w, h, count] = size;
+        let Placement { origin, spacing, axes, .. } = *placement;
         let target = match format {
             OutputFormat::Png => Target::Pictures(path.into()),
             OutputFormat::Svx => {
@@ -85,7 +86,7 @@ impl<'a> Layers<'a> {
             }
             _ => Target::Arrays(Box::new(SliceWriter::create(path, SliceGrid { size, origin, spacing, axes }, owners)?)),
         };
-        Ok(Self { target, mesh, size: [w, h], count: voxels.layers, done: 0, owners, look, pending: Band::default() })
+        Ok(Self { target, mesh, size: [w, h], count, done: 0, owners, look, pending: Band::default() })
     }
 
     /// Adds a band, and writes the layers that are complete.
@@ -125,7 +126,7 @@ impl<'a> Layers<'a> {
                 writer.layer(values, kinds, cells.as_deref())?;
             }
             Target::Pictures(path) => {
-                let path = if self.count == 1 { path.clone() } else { numbered(path, self.done) };
+                let path = layer_file(path, self.done, self.count);
                 let pixel = |i: usize| -> [u8; 4] {
                     if kinds[i] == EMPTY {
                         return [0; 4];
@@ -170,15 +171,27 @@ impl<'a> Layers<'a> {
     }
 }
 
-/// The file of layer `i`, for example `NAME-0007.png`.
-fn numbered(path: &Path, i: u32) -> PathBuf {
+/// The picture of layer `i` of `count`, for example `NAME-0007.png`; a single layer has no number. All numbers have as
+/// many digits as the largest one, so that the files sort in the order of the layers.
+pub fn layer_file(path: &Path, i: u32, count: u32) -> PathBuf {
+    if count == 1 {
+        return path.to_path_buf();
+    }
+    let digits = (count - 1).to_string().len().max(4);
     let stem = path.file_stem().unwrap_or_default().to_string_lossy();
-    path.with_file_name(format!("{stem}-{i:04}.png"))
+    path.with_file_name(format!("{stem}-{i:0digits$}.png"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn pictures_of_layers_sort() {
+        let name = |i, count| layer_file(Path::new("a/b.png"), i, count).display().to_string();
+        assert_eq!([name(0, 1), name(7, 8), name(9999, 10_000)], ["a/b.png", "a/b-0007.png", "a/b-9999.png"]);
+        assert_eq!([name(7, 10_001), name(10_000, 10_001)], ["a/b-00007.png", "a/b-10000.png"]);
+    }
 
     #[test]
     fn whole_numbers_of_cells_are_materials() {

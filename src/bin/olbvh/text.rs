@@ -65,6 +65,11 @@ pub fn bytes(n: u64) -> String {
     if unit == 0 { format!("{n} B") } else { format!("{value:.2} {}", units[unit]) }
 }
 
+/// Rounds to eight significant digits, which leaves out what single precision adds to numbers such as 0.1.
+pub fn number(x: f64) -> f64 {
+    format!("{x:.7e}").parse().unwrap_or(x)
+}
+
 /// Formats a duration in a readable unit.
 pub fn milliseconds(ms: f64) -> String {
     match ms {
@@ -112,6 +117,7 @@ mod tests {
     fn numbers_read_well() {
         assert_eq!([grouped(0u32), grouped(999u32), grouped(1000u32), grouped(12_290_298u32)], ["0", "999", "1,000", "12,290,298"]);
         assert_eq!([counted(0, "point"), counted(1, "point"), counted(1200, "point")], ["0 points", "1 point", "1,200 points"]);
+        assert_eq!([f64::from(0.1f32), 5_123_456.75, -7e6].map(|x| number(x).to_string()), ["0.1", "5123456.8", "-7000000"]);
         assert_eq!([bytes(12), bytes(1536), bytes(3 << 30)], ["12 B", "1.50 KiB", "3.00 GiB"]);
         assert_eq!([milliseconds(1.26), milliseconds(2345.0), milliseconds(90_000.0)], ["1.3 ms", "2.35 s", "1.5 min"]);
     }

@@ -17,21 +17,22 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = "\
 Examples:
-  olbvh tune                             a minute; later runs on this device find what was saved
-  olbvh tune --seconds 600 bracket.vtu   longer, on a mesh of yours
-  olbvh tune --no-profile -o mine.json   from the table's values, into a file:
+  olbvh tune                             takes a minute; later runs use the saved profile
+  olbvh tune --seconds 600 bracket.vtu   takes longer, and measures with this mesh
+  olbvh tune --no-profile -o mine.json   starts from the built-in parameters; for --target:
   olbvh render m.vtu -o m.png --target mine.json
 
-Every candidate must give the same trees, owners, pictures and voxels, byte for byte, before it is timed; then it runs in turns with the best so far, \
-and is kept only if it is faster by more than the times vary. What was gained is measured again at the end. The profile lies in the user's \
-configuration folder (olbvh/DEVICE.DRIVER.json in $XDG_CONFIG_HOME or ~/.config); `olbvh devices -v` names it, --no-profile (or OLBVH_NO_PROFILE=1) \
-passes it over, and removing the file undoes it. A profile that is broken or was made for something else is passed over with a remark.")]
+Every candidate must give the same trees, owners, pictures and voxels, byte for byte, before it is timed. It then runs alternately with the best one \
+so far, and is kept only if it is faster by more than the times vary. At the end, the gains are measured again. The profile is a file in the user's \
+configuration folder (olbvh/DEVICE.DRIVER.json in $XDG_CONFIG_HOME or ~/.config). `olbvh devices -v` shows its path, --no-profile (or \
+OLBVH_NO_PROFILE=1) ignores it, and deleting the file restores the built-in parameters. A profile that is broken, or was made for another device or \
+driver, is ignored with a remark.")]
 pub struct Args {
     /// Mesh to tune with: a file or a procedural mesh.
     #[arg(default_value = "kuhn:32,32,32,jitter=0.3")]
     mesh: PathBuf,
     /// Time in seconds after which no further candidate is tried.
-    #[arg(long, value_name = "S", default_value_t = 60.0)]
+    #[arg(long, value_name = "S", default_value_t = 60.0, allow_negative_numbers = true)]
     seconds: f64,
     /// File for the profile (.json). Default: a file in the user's configuration folder, which later runs find.
     #[arg(short, long, value_name = "FILE")]
@@ -41,22 +42,23 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if !(args.seconds.is_finite() && (0.0..=1e6).contains(&args.seconds)) {
-        return Err(Failure::Usage(format!("--seconds {}; it is a time, up to a million seconds", args.seconds)));
+        return Err(Failure::Usage(format!("--seconds {}: a time from 0 to 1,000,000 is needed", args.seconds)));
     }
     if let Some(path) = &args.output {
         output::announce(path, &[OutputFormat::Json], &[])?;
     }
-    let gpu = engine::device(common)?;
+    let (gpu, shapes) = engine::device(common)?;
     let file = args.output.clone().or_else(|| Some(folder()?.join(Profile::file_name(gpu.report()))));
     let Some(file) = file else {
-        return Err(Failure::Usage("there is no home for a configuration folder; -o FILE says where the profile goes".into()));
+        return Err(Failure::Usage(
+            "there is no home folder, and so no configuration folder; name a file for the profile with -o FILE".into(),
+        ));
     };
     let mesh = input::mesh(&args.mesh, common)?.mesh;
     if mesh.tets.is_empty() {
         return Err(Failure::Usage(format!("{}: no tetrahedra to tune with", args.mesh.display())));
     }
-    let origin = engine::shapes(common)?;
-    common.remark(format_args!("{}: {} tetrahedra, from kernels {origin}", args.mesh.display(), mesh.tets.len()));
+    common.remark(format_args!("{}: {} tetrahedra; starting from target {shapes}", args.mesh.display(), mesh.tets.len()));
     let work = Workload::new(&gpu, &mesh)?;
     let progress = Progress::new(common, "tuning");
     let report = |event: &Event, part: f64| {
@@ -67,7 +69,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     drop(progress);
     // Without a gain there is nothing to save, unless a file was requested.
     let saved = (tuned.kept > 0 || args.output.is_some()).then(|| save(&gpu, args, &tuned, &file)).transpose()?;
-    finish(common, &gpu, &tuned, (&file, saved.is_some()), matches!(origin.origin, Origin::Profile(_)))
+    let file = saved.map(|()| file.as_path());
+    finish(common, &gpu, &tuned, file, matches!(shapes.origin, Origin::Profile(_)))
 }
 
 /// Reports candidates: all of them with `--verbose`, otherwise only those that are kept or refused.
@@ -97,12 +100,12 @@ fn save(gpu: &Gpu, args: &Args, tuned: &Tuned, file: &Path) -> Outcome {
     Ok(profile.write(file)?)
 }
 
-/// Prints what was gained, stage by stage, and where the profile is.
-fn finish(common: &Common, gpu: &Gpu, tuned: &Tuned, (file, saved): (&Path, bool), had_profile: bool) -> Outcome {
+/// Prints what was gained, stage by stage, and the file that the profile was saved to, if it was.
+fn finish(common: &Common, gpu: &Gpu, tuned: &Tuned, saved: Option<&Path>, had_profile: bool) -> Outcome {
     let Tuned { target, kept, tried, refused, complete, gains } = tuned;
     let start = gpu.target();
     let mut page = Page::default();
-    let end = if *complete { "nothing left to try" } else { "time over" };
+    let end = if *complete { "nothing left to try" } else { "time is up" };
     page.section(&format!("{}: {tried} candidates timed, {refused} refused, {kept} kept; {end}", gpu.report().name));
     if start.sort.serial != target.sort.serial {
         page.row("sort.serial", format_args!("{} → {}", start.sort.serial, target.sort.serial));
@@ -117,15 +120,16 @@ fn finish(common: &Common, gpu: &Gpu, tuned: &Tuned, (file, saved): (&Path, bool
         let shown = [milliseconds(*before_ms), milliseconds(*after_ms)];
         page.row(stage, format_args!("{} → {}  ({:.2}×)", shown[0], shown[1], before_ms / after_ms));
     }
-    let verdict = match () {
-        () if saved => format!("Saved: {}", file.display()),
-        () if had_profile => "Nothing gained; the profile stays as it is".into(),
-        () => format!("Nothing gained over the target `{}`; nothing saved", start.name),
+    let verdict = match saved {
+        Some(file) => format!("Saved: {}", file.display()),
+        None if had_profile => "Nothing gained; the profile stays as it is".into(),
+        None => format!("Nothing gained over the target `{}`; nothing saved", start.name),
     };
     page.section(&verdict);
+    let file = saved.map(|file| file.display().to_string());
     let json = json!({
         "device": gpu.report().name, "driver": gpu.report().driver, "tried": tried, "refused": refused, "kept": kept, "complete": complete,
-        "before": start, "after": target, "gains": gains, "file": file.display().to_string(), "profile": saved.then(|| file.display().to_string()),
+        "before": start, "after": target, "gains": gains, "file": file, "profile": file,
     });
     output::summary(common, &json, &page.to_string())
 }

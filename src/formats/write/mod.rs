@@ -74,7 +74,11 @@ impl OutputFormat {
     }
 }
 
-/// A file that appears at its path when it is complete; if it is dropped before that, nothing remains of it.
+/// Maximum number of symbolic links that are followed one after the other, as on Linux.
+const MAX_LINKS: usize = 40;
+
+/// A file that appears at its path when it is complete; if it is dropped before that, nothing remains of it. Symbolic
+/// links are followed ([`destination`]).
 pub struct OutputFile {
     target: PathBuf,
     file: Target,
@@ -93,15 +97,14 @@ impl OutputFile {
     /// [`Error::Io`] if the folder is not writable.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
-        let fail = |source| Error::Io { path: path.into(), source };
-        // A symbolic link is kept; the file that it points to is replaced.
-        let target = path.canonicalize().unwrap_or_else(|_| path.into());
-        if let Ok(meta) = std::fs::metadata(&target)
+        let fail = |source| Error::Io { path: path.into(), source: nameless(source) };
+        if let Ok(meta) = std::fs::metadata(path)
             && !meta.is_file()
         {
-            let file = File::options().write(true).open(&target).map_err(fail)?;
-            return Ok(Self { target, file: Target::Direct(BufWriter::new(file)) });
+            let file = File::options().write(true).open(path).map_err(fail)?;
+            return Ok(Self { target: path.into(), file: Target::Direct(BufWriter::new(file)) });
         }
+        let target = destination(path);
         let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
         let prefix = format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy());
         let mut builder = tempfile::Builder::new();
@@ -121,7 +124,7 @@ impl OutputFile {
     /// [`Error::Io`] if the remaining data cannot be written.
     pub fn commit(self) -> Result<()> {
         let path = self.target.clone();
-        let fail = |source| Error::Io { path: path.clone(), source };
+        let fail = |source| Error::Io { path: path.clone(), source: nameless(source) };
         match self.file {
             Target::Direct(mut file) => file.flush().map_err(fail),
             Target::Temporary(file) => {
@@ -133,21 +136,41 @@ impl OutputFile {
 
     /// Makes an error that names the file.
     pub(crate) fn fail(&self, source: std::io::Error) -> Error {
-        Error::Io { path: self.target.clone(), source }
+        Error::Io { path: self.target.clone(), source: nameless(source) }
+    }
+}
+
+/// The file that a path leads to: a symbolic link is followed, even if it points to nothing yet, so that a result
+/// replaces the file and not the link.
+pub fn destination(path: &Path) -> PathBuf {
+    let mut target = path.to_path_buf();
+    for _ in 0..MAX_LINKS {
+        let Ok(next) = std::fs::read_link(&target) else { break };
+        target = target.parent().unwrap_or_else(|| Path::new("")).join(next);
+    }
+    target
+}
+
+/// Removes the name of the temporary file, which nobody asked for, from an error.
+fn nameless(error: std::io::Error) -> std::io::Error {
+    let text = error.to_string();
+    match text.split_once(" at path \"") {
+        Some((reason, _)) => std::io::Error::new(error.kind(), reason),
+        None => error,
     }
 }
 
 impl Write for OutputFile {
     fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
         match &mut self.file {
-            Target::Temporary(file) => file.write(bytes),
+            Target::Temporary(file) => file.write(bytes).map_err(nameless),
             Target::Direct(file) => file.write(bytes),
         }
     }
 
     fn flush(&mut self) -> std::io::Result<()> {
         match &mut self.file {
-            Target::Temporary(file) => file.flush(),
+            Target::Temporary(file) => file.flush().map_err(nameless),
             Target::Direct(file) => file.flush(),
         }
     }
@@ -156,7 +179,7 @@ impl Write for OutputFile {
 impl Seek for OutputFile {
     fn seek(&mut self, to: SeekFrom) -> std::io::Result<u64> {
         match &mut self.file {
-            Target::Temporary(file) => file.seek(to),
+            Target::Temporary(file) => file.seek(to).map_err(nameless),
             Target::Direct(file) => file.seek(to),
         }
     }

@@ -3,12 +3,12 @@
 
 use super::{SliceInput, SliceMemory, cmd_slice};
 use crate::build::DeviceMesh;
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{Buffer, Gpu};
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, StructureView};
+use crate::query::{Built, Rounds, StructureView, upload_field};
 use crate::reference::vertices::CellRange;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
@@ -65,19 +65,14 @@ impl<'a> Slicing<'a> {
     ) -> Result<Self> {
         let gpu = mesh.gpu();
         voxels.plan(mesh.grid())?;
-        let upload = |(values, on): (&[f32], On)| {
-            on.check(values, mesh.sizes())?;
-            Ok::<_, Error>((gpu.upload("olbvh.query.field", values)?, on))
-        };
-        let field = field.map(upload).transpose()?;
+        let field = field.map(|field| upload_field(mesh, field)).transpose()?;
         let [width, height] = voxels.size;
         let per_run = size_of::<RunState>() as u64;
         let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, VOXEL_RUN));
         let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_run * u64::from(width)) / per_voxel);
         let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size, rows);
-        let buffer = gpu.buffer("olbvh.query.slice", Arena::measure(carve)?)?;
-        let memory = carve(&mut Arena::new(buffer.all()))?;
+        let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.slice", carve)?;
         let (searched, sliced) = (StructureView::new(mesh, built)?, Sliced::default());
         Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
     }
@@ -99,7 +94,7 @@ impl<'a> Slicing<'a> {
             sliced.locate_ms += time.milliseconds("query.slice_locate");
             sliced.touch_ms += time.milliseconds("query.slice_touch");
             sliced.values_ms += time.milliseconds("query.slice_values");
-            let status = self.gpu.download::<SliceStatus>(&self.buffer, memory.status)?.first().copied().unwrap_or_default();
+            let status: SliceStatus = self.gpu.download_one(&self.buffer, memory.status)?;
             if status.locating + status.touching == 0 {
                 break status;
             }

@@ -8,9 +8,12 @@ use crate::gpu::{Buffer, BufferRef, Gpu};
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, Structure, StructureView};
+use crate::query::{Built, Rounds, Structure, StructureView, upload_field};
 use crate::reference::vertices::CellRange;
 use crate::render::{Plan, TABLE_SIZE};
+
+/// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long.
+const STRIP: u32 = 1 << 20;
 
 /// A drawn picture, and what it cost.
 #[derive(Clone, Debug, Default)]
@@ -84,14 +87,13 @@ impl<'a> Canvas<'a> {
     ) -> Result<Self> {
         let gpu = mesh.gpu();
         let searched = StructureView::new(mesh, built)?;
-        on.check(values, mesh.sizes())?;
         if plan.table.len() != TABLE_SIZE {
             return Err(Error::Invalid(format!("a transfer function of {} colours; there are {TABLE_SIZE}", plan.table.len())));
         }
         if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
             return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));
         }
-        let field = (gpu.upload("olbvh.query.field", values)?, on);
+        let field = upload_field(mesh, (values, on))?;
         let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
         let uniforms = [
             gpu.upload("olbvh.query.view", &[plan.view()])?,
@@ -106,7 +108,8 @@ impl<'a> Canvas<'a> {
             let memory = RenderMemory::carve(a, [plan.size[0], rows], skipped.map(|tree| &tree.capacity))?;
             Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
         };
-        let mut rows = plan.size[1];
+        let in_strips = in_strips && matches!(searched.structure, Structure::Octree(_));
+        let mut rows = if in_strips { strip_rows(plan.size) } else { plan.size[1] };
         while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > gpu.memory_left() - gpu.memory_left() / 4 {
             rows = rows.div_ceil(2).next_multiple_of(BLOCK);
         }
@@ -151,7 +154,7 @@ impl<'a> Canvas<'a> {
             let ((), time) = gpu.submit("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
             drawn.march_ms += time.milliseconds("query.march");
             drawn.submissions += 1;
-            let status = gpu.download::<RenderStatus>(&self.buffer, memory.status)?.first().copied().unwrap_or_default();
+            let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
             report(rays.saturating_sub(u64::from(status.unfinished)), rays);
             if status.unfinished == 0 {
                 break status;
@@ -179,17 +182,34 @@ impl<'a> Canvas<'a> {
             let first = [row as usize * width as usize, super::rays([width, row])? as usize];
             let pixels = first[0]..first[0] + size[0] as usize * size[1] as usize;
             let items = first[1]..first[1] + super::rays(size)? as usize;
-            let RenderMemory { colors, rays: states, .. } = self.memory;
-            self.gpu.write(&mut self.buffer, colors.offset, &rays.colors[pixels.clone()])?;
-            self.gpu.write(&mut self.buffer, states.offset, &rays.states[items.clone()])?;
-            self.draw(size, Some(RenderPart { cells, row }), &|_, _| {})?;
-            let drawn = self.gpu.download(&self.buffer, colors.part(0, 16 * pixels.len() as u64))?;
-            let states = self.gpu.download(&self.buffer, states.part(0, (size_of::<RayState>() * items.len()) as u64))?;
-            rays.colors[pixels].copy_from_slice(&drawn);
-            rays.states[items].copy_from_slice(&states);
+            let (colors, states) = (&mut rays.colors[pixels], &mut rays.states[items]);
+            self.draw_strip(size, RenderPart { cells, row }, colors, states, &|_, _| {})?;
+            let last = self.memory.rays.part(0, size_of_val(states) as u64);
+            states.copy_from_slice(&self.gpu.download(&self.buffer, last)?);
         }
         Ok(self.drawn)
     }
+
+    /// Draws rows of the picture, with the colours gathered so far in `colors`, and the rays' states.
+    fn draw_strip(
+        &mut self,
+        size: [u32; 2],
+        part: RenderPart,
+        colors: &mut [[f32; 4]],
+        states: &[RayState],
+        report: &dyn Fn(u64, u64),
+    ) -> Result<()> {
+        self.gpu.write(&mut self.buffer, self.memory.colors.offset, colors)?;
+        self.gpu.write(&mut self.buffer, self.memory.rays.offset, states)?;
+        self.draw(size, Some(part), report)?;
+        colors.copy_from_slice(&self.gpu.download(&self.buffer, self.memory.colors.part(0, size_of_val(colors) as u64))?);
+        Ok(())
+    }
+}
+
+/// Rows of a strip of about [`STRIP`] rays.
+fn strip_rows([width, height]: [u32; 2]) -> u32 {
+    (STRIP / width.max(1)).max(1).next_multiple_of(BLOCK).min(height)
 }
 
 /// Draws a plan of a field (values per point or per tetrahedron). `normals` has one normal per point, for shading.
@@ -206,9 +226,24 @@ pub fn render(
     normals: Option<&[[f32; 3]]>,
     report: &dyn Fn(u64, u64),
 ) -> Result<Drawn> {
-    let mut canvas = Canvas::new(mesh, built, plan, field, normals, false)?;
-    canvas.draw(plan.size, None, report)?;
-    let rays = u64::from(plan.size[0]) * u64::from(plan.size[1]);
-    let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;
+    let [width, height] = plan.size;
+    let rays = u64::from(width) * u64::from(height);
+    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(STRIP))?;
+    if canvas.rows == height {
+        canvas.draw(plan.size, None, report)?;
+        let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;
+        return Ok(Drawn { colors, ..canvas.drawn });
+    }
+    super::rays(plan.size)?;
+    let mut colors = vec![[0.0; 4]; rays as usize];
+    let Rays { states, .. } = Rays::new([width, canvas.rows])?;
+    for (strip, colors) in colors.chunks_mut(width as usize * canvas.rows as usize).enumerate() {
+        let row = strip as u32 * canvas.rows;
+        let size = [width, canvas.rows.min(height - row)];
+        let before = u64::from(width) * u64::from(row);
+        let states = &states[..super::rays(size)? as usize];
+        let part = RenderPart { cells: CellRange::WHOLE, row };
+        canvas.draw_strip(size, part, colors, states, &|done, _| report(before + done, rays))?;
+    }
     Ok(Drawn { colors, ..canvas.drawn })
 }

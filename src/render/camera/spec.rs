@@ -47,56 +47,41 @@ const VIEWS: [(&str, Option<DVec3>); 13] = [
 ];
 
 /// The syntax of a camera's text, for errors and help.
-pub const HELP: &str = "a view (iso, front, back, left, right, top, bottom, +x, -x, +y, -y, +z, -z) and settings key=value, separated by commas: \
-azimuth, elevation (degrees), zoom, eye=X,Y,Z, target=X,Y,Z, up=X,Y,Z, fov (degrees), ortho or ortho=HEIGHT";
+pub const HELP: &str = "a view (iso, front, back, left, right, top, bottom, +x, -x, +y, -y, +z or -z), settings, or both, separated by commas. \
+Settings are azimuth=DEGREES and elevation=DEGREES of the eye as seen from the mesh, or the eye itself, eye=X,Y,Z; target=X,Y,Z, the point that is looked \
+at; up=X,Y,Z; fov=DEGREES from top to bottom, or ortho, or ortho=HEIGHT; zoom=FACTOR";
+
+/// Keys of settings.
+const KEYS: [&str; 8] = ["azimuth", "elevation", "zoom", "fov", "ortho", "eye", "target", "up"];
+
+/// Parts of a camera that contradict each other.
+const CONTRADICTIONS: [[&str; 2]; 4] = [["eye", "view"], ["eye", "azimuth"], ["eye", "elevation"], ["fov", "ortho"]];
 
 impl std::str::FromStr for CameraSpec {
     type Err = Error;
 
     fn from_str(text: &str) -> Result<Self> {
-        let wrong = |part: &str, why: &str| Error::Invalid(format!("camera `{text}`: `{part}` {why}; a camera is {HELP}"));
         let mut spec = Self::default();
+        let mut given = Vec::new();
         let mut parts = text.split(',').map(str::trim).peekable();
         while let Some(part) = parts.next() {
-            let Some((key, first)) = part.split_once('=') else {
-                if part.eq_ignore_ascii_case("ortho") {
-                    spec.ortho = Some(None);
-                } else if let Some(&(_, from)) = VIEWS.iter().find(|(name, _)| name.eq_ignore_ascii_case(part)) {
-                    spec.from = from;
-                } else {
-                    return Err(wrong(part, "is no view"));
-                }
-                continue;
-            };
             // The numbers of a vector are separated by commas as well, so numbers that follow without a key belong to
-            // this one.
-            let mut values = vec![number(first).ok_or_else(|| wrong(part, "needs a finite number"))?];
-            while let Some(value) = parts.peek().and_then(|next| number(next)) {
-                values.push(value);
-                parts.next();
+            // this part.
+            let mut part = part.to_owned();
+            while let Some(next) = parts.next_if(|next| part.contains('=') && next.parse::<f64>().is_ok()) {
+                part = format!("{part},{next}");
             }
-            let vector = || match values[..] {
-                [x, y, z] => Ok(Some(DVec3::new(x, y, z))),
-                _ => Err(wrong(part, "needs three numbers")),
-            };
-            let scalar = |ok: &dyn Fn(f64) -> bool, range: &str| match values[..] {
-                [v] if ok(v) => Ok(Some(v)),
-                _ => Err(wrong(part, &format!("needs one number {range}"))),
-            };
-            match key.trim().to_ascii_lowercase().as_str() {
-                "azimuth" | "az" => spec.azimuth = scalar(&|_| true, "of degrees")?,
-                "elevation" | "el" => spec.elevation = scalar(&|v| v.abs() <= 90.0, "from -90 to 90")?,
-                "zoom" => spec.zoom = scalar(&|v| v > 0.0, "above 0")?,
-                "fov" => spec.fov = scalar(&|v| v > 0.0 && v <= 179.0, "above 0, up to 179")?,
-                "ortho" => spec.ortho = Some(scalar(&|v| v > 0.0, "above 0")?),
-                "eye" => spec.eye = vector()?,
-                "target" => spec.target = vector()?,
-                "up" => spec.up = vector()?,
-                _ => return Err(wrong(part, "has an unknown key")),
+            let key = spec.set(&part)?;
+            if given.contains(&key) {
+                return Err(Error::Invalid(format!("`{part}` is a second {key}; give one")));
             }
+            given.push(key);
         }
-        if spec.fov.is_some() && spec.ortho.is_some() {
-            return Err(Error::Invalid(format!("camera `{text}`: either fov or ortho")));
+        if let Some([a, b]) = CONTRADICTIONS.iter().find(|pair| pair.iter().all(|key| given.contains(key))) {
+            return Err(Error::Invalid(format!("{a} and {b} contradict each other; give one of them")));
+        }
+        if ["view", "azimuth", "elevation"].iter().all(|key| given.contains(key)) {
+            return Err(Error::Invalid("azimuth and elevation leave nothing to the view; give two of the three".into()));
         }
         Ok(spec)
     }
@@ -108,6 +93,46 @@ fn number(text: &str) -> Option<f64> {
 }
 
 impl CameraSpec {
+    /// Sets what one part of a text describes, `VIEW` or `KEY=VALUE`; returns the name of what was set.
+    fn set(&mut self, part: &str) -> Result<&'static str> {
+        let wrong = |why: &str| Error::Invalid(format!("`{part}` {why}; a camera is {HELP}"));
+        let Some((key, values)) = part.split_once('=') else {
+            if part.eq_ignore_ascii_case("ortho") {
+                self.ortho = Some(None);
+                return Ok("ortho");
+            }
+            let view = VIEWS.iter().find(|(name, _)| name.eq_ignore_ascii_case(part));
+            self.from = view.ok_or_else(|| wrong("is no view"))?.1;
+            return Ok("view");
+        };
+        let values: Option<Vec<f64>> = values.split(',').map(number).collect();
+        let values = values.ok_or_else(|| wrong("needs finite numbers"))?;
+        let vector = || match values[..] {
+            [x, y, z] => Ok(Some(DVec3::new(x, y, z))),
+            _ => Err(wrong("needs three numbers")),
+        };
+        let scalar = |ok: &dyn Fn(f64) -> bool, range: &str| match values[..] {
+            [v] if ok(v) => Ok(Some(v)),
+            _ => Err(wrong(&format!("needs one number {range}"))),
+        };
+        let key = match key.trim().to_ascii_lowercase().as_str() {
+            "az" => "azimuth",
+            "el" => "elevation",
+            key => KEYS.into_iter().find(|&known| known == key).ok_or_else(|| wrong("has an unknown key"))?,
+        };
+        match key {
+            "azimuth" => self.azimuth = scalar(&|_| true, "of degrees")?,
+            "elevation" => self.elevation = scalar(&|v| v.abs() <= 90.0, "from -90 to 90")?,
+            "zoom" => self.zoom = scalar(&|v| v > 0.0, "above 0")?,
+            "fov" => self.fov = scalar(&|v| v > 0.0 && v <= 179.0, "above 0, up to 179")?,
+            "ortho" => self.ortho = Some(scalar(&|v| v > 0.0, "above 0")?),
+            "eye" => self.eye = vector()?,
+            "target" => self.target = vector()?,
+            _ => self.up = vector()?,
+        }
+        Ok(key)
+    }
+
     /// The camera for a mesh with these bounds, whose coordinates are relative to `origin`; `aspect` is width over
     /// height.
     ///

@@ -69,16 +69,33 @@ fn rays_start_before_the_box() {
 fn bad_texts_are_refused_with_the_part_and_the_help() {
     for (text, part) in [
         ("sideways", "sideways"),
-        ("eye=1,2", "eye=1"),
+        ("eye=1,2", "eye=1,2"),
+        ("top,eye=1,nan,2", "eye=1,nan,2"),
         ("zoom=0", "zoom=0"),
         ("fov=200", "fov=200"),
         ("colour=3", "colour=3"),
-        ("eye=nan,1,2", "eye=nan"),
+        ("zoom=1,2,top", "zoom=1,2"),
     ] {
         let message = text.parse::<CameraSpec>().unwrap_err().to_string();
         assert!(message.contains(&format!("`{part}`")) && message.contains("azimuth"), "{message}");
     }
-    assert!("fov=20,ortho".parse::<CameraSpec>().is_err());
+    for (text, part) in [
+        ("fov=20,ortho", "fov and ortho"),
+        ("iso,top", "`top` is a second view"),
+        ("top,zoom=1,zoom=2", "`zoom=2` is a second zoom"),
+        ("az=3,azimuth=3", "second azimuth"),
+        ("ortho=2,ortho", "second ortho"),
+        ("iso,eye=1,2,3", "eye and view"),
+        ("eye=1,2,3,azimuth=3", "eye and azimuth"),
+        ("elevation=3,eye=1,2,3", "eye and elevation"),
+        ("top,azimuth=3,elevation=4", "two of the three"),
+    ] {
+        let message = text.parse::<CameraSpec>().unwrap_err().to_string();
+        assert!(message.contains(part), "{text}: {message}");
+    }
+    for text in ["front,elevation=20,zoom=2", "eye=1,2,3,target=0,0,0,up=0,1,0,fov=40,zoom=2", "azimuth=1,elevation=2,ortho=3"] {
+        text.parse::<CameraSpec>().unwrap();
+    }
     let same: CameraSpec = "eye=1,1,1,target=1,1,1".parse().unwrap();
     assert!(same.resolve(&BOX, [0.0; 3], 1.0).is_err());
 }

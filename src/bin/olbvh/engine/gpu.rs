@@ -35,9 +35,9 @@ impl Device {
         given.unwrap_or(self.0.report().memory)
     }
 
-    /// The device.
-    pub fn gpu(&self) -> &Gpu {
-        &self.0
+    /// The device, and the target of its kernels with its origin.
+    pub fn into_parts(self) -> (Gpu, Shapes) {
+        (self.0, self.1)
     }
 }
 

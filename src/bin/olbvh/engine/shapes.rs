@@ -1,5 +1,6 @@
 //! Selection of the target, that is of the tuning parameters of the kernels.
 
+use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
 use olbvh::gpu::DeviceReport;
 use olbvh::kernels::{Row, Target};
@@ -11,9 +12,9 @@ use std::path::{Path, PathBuf};
 pub enum Origin {
     /// The built-in row for the device's kind.
     Kind,
-    /// The built-in row that `--target NAME` names.
+    /// The built-in row that `--target` or `OLBVH_TARGET` names.
     Row,
-    /// The file that `--target FILE` names.
+    /// The file that `--target` or `OLBVH_TARGET` names.
     File(PathBuf),
     /// The profile that was saved for the device.
     Profile(PathBuf),
@@ -29,10 +30,11 @@ pub struct Shapes {
 }
 
 impl Shapes {
-    /// The target that `--target` names; without it, the device's profile, or else the built-in row for its kind.
+    /// The target that `--target` or `OLBVH_TARGET` names; without either, the device's profile, or else the built-in
+    /// row for its kind.
     pub fn of(common: &Common, device: &DeviceReport) -> Outcome<Self> {
-        if let Some(wanted) = &common.target {
-            return Self::wanted(wanted, device);
+        if let Some((wanted, named_by)) = common.wanted_target() {
+            return Self::wanted(&wanted, device).map_err(|failure| failure.about(named_by));
         }
         let kind = || Self { target: Row::of(device).target(&device.room), origin: Origin::Kind };
         let Some(folder) = folder().filter(|_| !common.no_profile) else { return Ok(kind()) };
@@ -48,7 +50,7 @@ impl Shapes {
 
     /// The built-in row with this name, or the profile in this file.
     fn wanted(wanted: &str, device: &DeviceReport) -> Outcome<Self> {
-        match wanted.parse::<Row>() {
+        match named::<Row>(wanted) {
             Ok(row) => Ok(Self { target: row.target(&device.room), origin: Origin::Row }),
             // This is a misspelt name, not a file.
             Err(error) if !wanted.contains(['.', '/', '\\']) && !Path::new(wanted).exists() => {
