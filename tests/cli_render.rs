@@ -137,10 +137,13 @@ fn locate_finds_points_and_values() {
 }
 
 #[test]
-fn devices_are_listed_or_there_are_none() {
+fn devices_are_listed() {
     let folder = TempDir::new().unwrap();
     let result = json(folder.path(), &["devices"]);
-    for device in result["devices"].as_array().unwrap() {
+    let devices = result["devices"].as_array().unwrap();
+    // The other tests of a row need its driver.
+    assert!(!devices.is_empty() || std::env::var_os("OLBVH_TEST_DRIVER").is_none(), "no device");
+    for device in devices {
         has_keys(device, &["name", "driver", "api", "subgroup", "qualifies", "missing"]);
     }
 }
@@ -148,10 +151,13 @@ fn devices_are_listed_or_there_are_none() {
 #[test]
 fn help_is_there_for_everything() {
     let folder = TempDir::new().unwrap();
-    for arguments in [&["--help"][..], &["devices", "--help"], &["info", "-h"], &["locate", "--help"], &["render", "--help"]] {
-        let out = olbvh(folder.path(), arguments);
-        assert_eq!(out.status.code(), Some(0));
-        assert!(text(&out.stdout).contains("Example"), "{arguments:?} has no example");
+    for command in ["", "devices", "info", "locate", "render", "slice", "overlap", "conformance", "bench", "tune"] {
+        for help in ["--help", "-h"] {
+            let arguments: Vec<_> = [command, help].into_iter().filter(|word| !word.is_empty()).collect();
+            let out = olbvh(folder.path(), &arguments);
+            assert_eq!(out.status.code(), Some(0));
+            assert!(text(&out.stdout).contains("Example"), "{arguments:?} has no example");
+        }
     }
     assert!(text(&olbvh(folder.path(), &["--help"]).stdout).contains("130"));
     let help = text(&olbvh(folder.path(), &["render", "--help"]).stdout);
@@ -214,7 +220,12 @@ fn bad_files_end_with_3_and_are_named() {
     let folder = TempDir::new().unwrap();
     std::fs::write(folder.path().join("bad.vtu"), "<VTKFile type=\"UnstructuredGrid\"><Unstruct").unwrap();
     std::fs::write(folder.path().join("p.csv"), "x,y\n1,2\n").unwrap();
-    for (mesh, part) in [("bad.vtu", "bad.vtu"), ("missing.vtu", "missing.vtu"), ("cube:3", "kuhn:NX,NY,NZ, graded:N"), (".", "folder; name a file in it (.vtu")] {
+    for (mesh, part) in [
+        ("bad.vtu", "bad.vtu"),
+        ("missing.vtu", "missing.vtu"),
+        ("cube:3", "kuhn:NX,NY,NZ, graded:N"),
+        (".", "folder; name a file in it (.vtu"),
+    ] {
         let message = fails(folder.path(), 3, &["info", mesh, "--device", "cpu"]);
         assert!(message.contains(part), "{message}");
     }
@@ -263,7 +274,9 @@ fn results_go_to_files_of_any_folder() {
     assert!(Command::new("mkfifo").arg(place("pipe.png")).status().unwrap().success());
     std::fs::create_dir(place("folder.png")).unwrap();
     std::os::unix::fs::symlink("/dev/null", place("null.png")).unwrap();
-    for (output, part) in [("pipe.png", "streams or devices"), ("null.png", "streams or devices"), ("-", "streams"), ("folder.png", "a folder")] {
+    for (output, part) in
+        [("pipe.png", "streams or devices"), ("null.png", "streams or devices"), ("-", "streams"), ("folder.png", "a folder")]
+    {
         let message = render(2, output);
         assert!(message.contains(part), "{output}: {message}");
     }
@@ -313,6 +326,7 @@ fn leaves_suit_what_is_asked() {
         let out = olbvh(folder.path(), &[arguments, &["--device", "cpu", "-v"]].concat());
         let message = text(&out.stderr);
         assert_eq!(out.status.code(), Some(0), "{arguments:?}: {message}");
+        assert!(!message.contains("INFO") && !message.contains("olbvh::"), "messages are plain sentences: {message}");
         ["points", "pictures"].map(|what| message.contains(&format!("suits {what} better")))
     };
     let (locate, slice) = (["locate", "kuhn:30,30,1", "p.csv", "-o", "o.csv"], ["slice", "kuhn:30,30,1", "-o", "s.npy", "--size", "8"]);

@@ -33,7 +33,10 @@ fn slices_become_files() {
     let kinds = std::fs::read(folder.join("a.kind.npy")).unwrap();
     let inside = kinds[kinds.len() - 210..].iter().map(|&k| u64::from(k == 2)).sum::<u64>();
     assert_eq!(inside, count("inside"));
-    assert_eq!((&json["origin"], &json["axis"]), (&serde_json::json!([0.2, 3.0 / 14.0, 1.0 / 3.0].map(|x: f64| f64::from(x as f32))), &"z".into()));
+    assert_eq!(
+        (&json["origin"], &json["axis"]),
+        (&serde_json::json!([0.2, 3.0 / 14.0, 1.0 / 3.0].map(|x: f64| f64::from(x as f32))), &"z".into())
+    );
     let near = |key: &str, wanted: [f64; 3]| (0..3).all(|i| (json[key][i].as_f64().unwrap() - wanted[i]).abs() < 1e-6);
     assert!(near("spacing", [0.4, 3.0 / 7.0, 2.0 / 3.0]) && json["axes"][2] == serde_json::json!([0.0, 0.0, 1.0]), "{json:#}");
     assert!((json["thickness"].as_f64().unwrap() - 2.0 / 3.0).abs() < 1e-6, "{json:#}");
@@ -80,7 +83,10 @@ fn slices_become_files() {
 fn remarks() {
     let folder = tempfile::tempdir().unwrap();
     for (arguments, wanted) in [
-        (&["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "8", "--at", "90"][..], "along z the mesh lies from 0 to 2, the layers from 89.75 to 90.25"),
+        (
+            &["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "8", "--at", "90"][..],
+            "along z the mesh lies from 0 to 2, the layers from 89.75 to 90.25",
+        ),
         (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8", "--layers", "2"], "2 of the 4 layers"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "7,9"], "no surface to be seen"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.5,9"], ""),

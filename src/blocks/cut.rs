@@ -119,6 +119,11 @@ impl<'a> Source<'a> {
         Ok(true)
     }
 
+    /// Whether the trees have the level that suits best, and not a coarser one for want of memory.
+    pub(super) fn has_level_wanted(&self) -> bool {
+        self.level == self.wanted
+    }
+
     /// The longest side of the bounds.
     pub(super) fn extent(&self) -> f64 {
         (0..3).map(|c| f64::from(self.grid.hi[c]) - f64::from(self.grid.lo[c])).fold(0.0, f64::max)

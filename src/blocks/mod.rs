@@ -129,7 +129,8 @@ impl Refused<'_, '_> {
         let why = why.map_or_else(String::new, |e| format!(" ({e})"));
         let enough = self.enough(limit.max(self.beside));
         let remedy = enough.map_or_else(String::new, |enough| format!("; allow {enough} bytes or more"));
-        let finer = if tets > LEAST { ", or a finer tree, whose cells cut the mesh in smaller blocks" } else { "" };
+        let finer = tets > LEAST && self.sources.iter().any(Source::has_level_wanted);
+        let finer = if finer { ", or a finer tree, whose cells cut the mesh in smaller blocks" } else { "" };
         Error::TooLarge(format!(
             "{limit} bytes of device memory are too few: a block of {tets} tetrahedra, which is not cut any further, takes {takes}{why}{remedy}{finer}"
         ))

@@ -89,7 +89,7 @@ impl RenderSettings {
             return fail(format!("a step of {step}; it is a length above 0"));
         }
         if let Some([lo, hi]) = self.range.filter(|[lo, hi]| !(lo <= hi && lo.is_finite() && hi.is_finite())) {
-            return fail(format!("a range from {lo} to {hi}; give LO:HI with LO below HI"));
+            return fail(format!("a range from {lo} to {hi}; it needs finite numbers, the first not above the second"));
         }
         if self.iso.len() > MAX_ISO || !self.iso.iter().all(|v| v.is_finite()) {
             return fail(format!("iso-surfaces at {:?}; give up to {MAX_ISO} finite values", self.iso));

@@ -88,8 +88,9 @@ impl TransferFunction {
     /// # Errors
     /// [`Error::Invalid`] if the text has neither form.
     pub fn parse_opacity(text: &str) -> Result<Vec<(f32, f32)>> {
-        let wrong =
-            || Error::Invalid(format!("`{text}` is no opacity; give one number from 0 to 1, or PLACE:OPACITY pairs such as 0:0,0.5:0.1,1:0.8"));
+        let wrong = || {
+            Error::Invalid(format!("`{text}` is no opacity; give one number from 0 to 1, or PLACE:OPACITY pairs such as 0:0,0.5:0.1,1:0.8"))
+        };
         if let Ok(all) = text.trim().parse::<f32>() {
             return Ok(vec![(0.0, all), (1.0, all)]);
         }
@@ -135,7 +136,9 @@ fn check<'a>(what: &str, points: impl Iterator<Item = (f32, &'a [f32])>) -> Resu
             return Err(Error::Invalid(format!("transfer function: {what} point at {place}: {bad} lies outside 0 to 1")));
         }
         if last.is_some_and(|last| place < last) {
-            return Err(Error::Invalid(format!("transfer function: places of {what} points must ascend, but {place} follows a larger one")));
+            return Err(Error::Invalid(format!(
+                "transfer function: places of {what} points must ascend, but {place} follows a larger one"
+            )));
         }
         last = Some(place);
     }
@@ -210,7 +213,9 @@ mod json {
                 range = Some([lo, hi]);
             }
             if let Some([lo, hi]) = range.filter(|[lo, hi]| !(lo < hi && (hi - lo).is_finite())) {
-                return Err(Error::Invalid(format!("transfer function: a range from {lo} to {hi}; LO must be below HI in \"range\": [LO, HI]")));
+                return Err(Error::Invalid(format!(
+                    "transfer function: a range from {lo} to {hi}; LO must be below HI in \"range\": [LO, HI]"
+                )));
             }
             let known = opacity.is_some();
             let function = Self::new(colors, opacity.unwrap_or_else(|| DEFAULT_OPACITY.to_vec()))?;

@@ -20,7 +20,7 @@ pub struct Common {
     #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|INDEX|cpu", value_parser = NonEmptyStringValueParser::new())]
     pub device: Option<String>,
     /// Tuning parameters of the kernels: portable, cpu, nvidia, amd, intel, apple, arm, qualcomm, or a file that `olbvh
-    /// tune` saved. They affect speed only, never results. Default: what the environment variable OLBVH_TARGET names,
+    /// tune` saved. They affect speed only, never results. Default: what the environment variable `OLBVH_TARGET` names,
     /// otherwise the profile that `olbvh tune` saved for the device, otherwise the parameters for its kind of device.
     #[arg(long, global = true, help_heading = "Global options", value_name = "NAME|FILE", value_parser = NonEmptyStringValueParser::new())]
     pub target: Option<String>,

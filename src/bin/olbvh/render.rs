@@ -68,8 +68,8 @@ pub struct Args {
     /// --opacity gives their opacities.
     #[arg(long, value_name = "V,V,…", value_parser = iso, allow_hyphen_values = true)]
     iso: Option<Iso>,
-    /// Values of the field at the two ends of the transfer function, LO below HI. Default: the range in the .json file of --tf if it
-    /// has one, otherwise the smallest and largest value of the field.
+    /// Values of the field at the two ends of the transfer function, LO below HI. Default: the range in the .json file
+    /// of --tf if it has one, otherwise the smallest and largest value of the field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
     /// Factor on the opacity: 2 makes the mesh as opaque as if it were twice as large.

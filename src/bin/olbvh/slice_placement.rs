@@ -56,7 +56,8 @@ impl Placement {
         [sum(f64::min), sum(f64::max)]
     }
 
-    /// A remark on voxels that are all empty: where the mesh and the layers lie along an axis, or else along the normal.
+    /// A remark on voxels that are all empty: where the mesh and the layers lie along this axis, or along the normal if
+    /// there is none.
     pub fn remark_on_emptiness(&self, axis: Option<&str>, bounds: &Bounds, mesh: &Mesh) -> String {
         let along = axis.map_or_else(|| format!("({})", joined(&self.axes[2].map(number), ", ")), str::to_owned);
         let ([mesh_lo, mesh_hi], [lo, hi]) = (self.mesh_span(bounds, mesh).map(number), self.layers_span().map(number));
