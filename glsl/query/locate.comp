@@ -47,10 +47,24 @@ struct Point {
     vec3 x;
 };
 
-Point point_at(Grid g, uint place) {
+// The same before it is normalised. Points in an order lie anywhere in memory, so each is fetched while the one before it
+// is located.
+struct Fetched {
+    uint i;
+    vec3 at;
+};
+
+Fetched fetch(uint place) {
     uint i = GUIDE == ORDER ? guides.at[place] : place;
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
-    return Point(i, at, normalise(g, at));
+    return Fetched(i, vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]));
+}
+
+// The point at a place before `end`; `next` is the one after it.
+Point point_at(Grid g, uint place, uint end, inout Fetched next) {
+    if (GUIDE != ORDER) next = fetch(place);
+    Point a = Point(next.i, next.at, normalise(g, next.at));
+    if (GUIDE == ORDER) next = fetch(min(place + 1u, end - 1u));
+    return a;
 }
 
 void main() {
@@ -58,7 +72,8 @@ void main() {
     if (place >= count) return;
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
-    Point a = point_at(g, place);
+    Fetched next = fetch(place);
+    Point a = point_at(g, place, end, next);
     uint from = NONE; // where the next stride starts
     uint left = 0u;   // steps that this stride may still take; 0: it has ended
     bool in_leaf = part > 0u; // whether this stride started in the point's leaf
@@ -77,7 +92,7 @@ void main() {
             if (sides.clear) {
                 owners.at[a.i] = stand.t;
                 barycentrics.at[a.i] = record(last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(stand, sides));
-                if (++place < end) a = point_at(g, place);
+                if (++place < end) a = point_at(g, place, end, next);
                 left = HINTED;
                 in_leaf = false;
             } else {
@@ -113,7 +128,7 @@ void main() {
         owners.at[a.i] = last == 0u ? best.owner : owner;
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
-            a = point_at(g, place);
+            a = point_at(g, place, end, next);
             // If the list continues in the next part, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;
