@@ -1,17 +1,22 @@
 /* Finds things inside tetrahedral meshes on any GPU; see README.md.
  *
- * Functions return OLBVH_STATUS_OK or the code of an error, whose text olbvh_last_error gives. A handle keeps what it was made from alive, so the order of
- * freeing means nothing. One handle may be used by many threads at a time, a recording by one. Structs and arrays are read during the call.
+ * Functions return OLBVH_STATUS_OK or an error code; olbvh_last_error then returns the message, one per thread. A
+ * handle keeps alive whatever it was made from, so handles may be freed in any order. Several threads may use one
+ * handle at the same time, except a recording, which only one thread may use at a time. Structs and arrays that are
+ * passed to a function are read during the call and need not live longer.
  *
- * Recording: olbvh_cmd_... append to a command buffer of the host's, of any queue family with compute, outside of a render pass. Nothing is submitted, waited
- * for, allocated or read back. Sizes come first: a plan is measured, and for every query a function ..._parts tells how many bytes its memory takes and where
- * in it the answers will be; parts of buffers begin at multiples of olbvh_plan_sizes.alignment, and all buffers have its usage flags. They are the host's and
- * stay as long as commands that use them are executed. Where nothing else is said, a command reads what it is given in compute shaders, uses its memory in
- * compute shaders and transfers, writes its answers in compute shaders, and no barrier stands before or behind it: the host records olbvh_cmd_barrier, or a
- * barrier of its own that it tells of by olbvh_recording_host_barrier, from compute shader and transfer writes to whatever reads the answers or uses the
- * memory next.
+ * Recording: functions olbvh_cmd_... append commands to a command buffer of the host, which may belong to any queue
+ * family with compute and must not be inside a render pass. They do not submit, wait, allocate or read back anything.
+ * - Memory: sizes are known first. olbvh_plan_measure measures a plan; for every query a function olbvh_..._parts
+ *   reports how many bytes of memory the query takes and where in that memory its results will be. Parts of buffers
+ *   start at multiples of olbvh_plan_sizes.alignment, and every buffer needs the usage flags given there. The buffers
+ *   belong to the host, which keeps them until the commands that use them have been executed.
+ * - Barriers: unless stated otherwise, a command reads its input in compute shaders, uses its memory in compute shaders
+ *   and transfers, writes its results in compute shaders, and records no barrier before or after itself. Before
+ *   anything reads the results or uses the memory again, the host records olbvh_cmd_barrier, or a barrier of its own
+ *   from compute shader and transfer writes to that use. It reports its own barrier with olbvh_recording_host_barrier.
  *
- * Generated from src/capi by cbindgen; scripts/c_api --write writes it anew. */
+ * Generated from src/capi by cbindgen; `scripts/c_api --write` generates it again. */
 
 #ifndef OLBVH_H
 #define OLBVH_H

@@ -78,6 +78,23 @@ fn slices_become_files() {
     assert_eq!(files(folder), made, "a refused slice leaves nothing");
 }
 
+/// A file of colours serves pictures of slices, too; its range is that of the colours.
+#[test]
+fn slices_have_the_colours_of_a_file() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("t.json"), r##"{"colors": [[0, "#f00"], [1, "#00f"]], "range": [1000, 2000]}"##).unwrap();
+    let (code, _, text) = olbvh(folder, &["slice", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--tf", "t.json"]);
+    assert_eq!(code, 0, "{text}");
+    let mut picture = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(folder.join("a.png")).unwrap())).read_info().unwrap();
+    let mut pixels = vec![0; picture.output_buffer_size().unwrap()];
+    picture.next_frame(&mut pixels).unwrap();
+    assert!(pixels.chunks_exact(4).all(|pixel| pixel == [255, 0, 0, 255]), "the field lies below the range");
+    std::fs::write(folder.join("t.json"), "{\"map\": ").unwrap();
+    let (code, _, text) = olbvh(folder, &["slice", "kuhn:4,3,2", "-o", "b.png", "--tf", "t.json"]);
+    assert!(code == 3 && text.contains("error: t.json: line 1, column 8: the file ends in the middle"), "{code} {text}");
+}
+
 /// Requests that look like mistakes are carried out, with a remark.
 #[test]
 fn remarks() {

@@ -67,7 +67,7 @@ fn compressed_files() {
 }
 
 #[test]
-fn points() {
+fn damaged_points_never_panic() {
     let folder = tempfile::tempdir().unwrap();
     let npy = folder.path().join("points.npy");
     olbvh::formats::write_npy(&npy, &[4, 3], &[0.5f32; 12]).unwrap();

@@ -36,7 +36,7 @@ fn small_files_agree() {
             let found = mesh.fields.iter().find(|f| f.on == on && (f.name == field || renamed.contains(&f.name.as_str())));
             match found {
                 Some(found) => assert_eq!(found.values, (0..count).map(f32::from).collect::<Vec<_>>(), "{name}: {field}"),
-                None => assert!(name.contains("mesh") && on == On::Points, "{name} lost {field}"),
+                None => assert!(name.ends_with(".tet") || name.contains("mesh") && on == On::Points, "{name} lost {field}"),
             }
         }
     }
@@ -206,6 +206,8 @@ fn content_decides_before_the_name() {
         ("*HEADING\nx\n*NODE\n", "f.inp", "Abaqus"),
         ("# UCD\n8 6 0 0 0\n", "g.inp", "AVS"),
         ("*VERTICES\n8 3 0 0\n", "h.veg", "Vega"),
+        ("*VERTICES\n8 3 0 0\n", "h.veg", "save it in a format that can be read (.vtu"),
+        ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1 2 3\n", "o.obj", "fill it with tetrahedra first"),
         ("CDF\x01xxxx", "i.e", "Exodus"),
         ("\u{89}", "j.xyz", ".vtu"),
         ("<!DOCTYPE html><html>", "k.vtu", "HTML"),
@@ -308,6 +310,33 @@ fn gmsh_physical_groups_of_4_0() {
     let Some(folder) = shared("formats") else { return };
     let mesh = open(folder.join("bracket_5k_40_ascii.msh")).mesh;
     assert!(mesh.field("gmsh:physical").unwrap().values.iter().all(|&v| v == 11.0));
+}
+
+#[test]
+fn tetrahedra_of_isaac_gym() {
+    let report = open_bytes("a.obj", replace("isaac.tet", b"v 1 0 0", b"f 1 2 3\nvn 0 0 1\nf 1 2 3\nv 1 0 0")).report;
+    assert_eq!((report.format.as_str(), report.tetrahedra), ("Isaac Gym .tet", 6));
+    assert_eq!(report.warnings, ["lines that are not read, as they start with neither v nor t: f, vn"]);
+    for (old, new, wanted) in [
+        (&b"v 1 0 0"[..], &b"v 1 0"[..], "line 3: 2 numbers after `v` instead of 3"),
+        (b"v 1 0 0", b"v 1 zero 0", "line 3: `zero` where a number should be"),
+        (b"t 0 1 3 7", b"t 0 1 3 7 8", "line 11: 5 numbers after `t` instead of 4"),
+        (b"t 0 1 3 7", b"t 0 1 3 8", "cell 0 (tetrahedron): names point 8, but points are 0 to 7"),
+    ] {
+        let error = load_bytes("a.tet", replace("isaac.tet", old, new), &LoadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains(wanted), "{error}");
+    }
+    let Some(folder) = shared("third_party") else { return };
+    let Loaded { mesh, report } = open(folder.join("isaac_icosphere.tet"));
+    assert_eq!((mesh.points.len(), mesh.tets.len(), report.negative * report.flat), (162, 427, 0));
+}
+
+#[test]
+fn warnings_name_what_they_are_about() {
+    let report = open_bytes("new.mesh", replace("text.mesh", b"MeshVersionFormatted 2", b"MeshVersionFormatted 9")).report;
+    assert_eq!(report.warnings, ["version 9 of the format is unknown; the file is read like version 2"]);
+    let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10\n10", b"CELL_TYPES 6\n42\n41")).report;
+    assert_eq!(report.warnings, ["volume cells of types that cannot be read are missing in the mesh: 1 polyhedron, 1 convex point set"]);
 }
 
 #[test]

@@ -77,6 +77,33 @@ fn arrays_of_points() {
 }
 
 #[test]
+fn arrays_of_other_types_are_refused_by_name() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.npy");
+    write_npy(&path, &[2, 3], &[1u32, 2, 3, 4, 5, 6]).unwrap();
+    assert_eq!(load_points(&path).unwrap(), [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]]);
+    let bytes = std::fs::read(&path).unwrap();
+    let (header, data) = split_npy(&bytes);
+    for (descr, found) in [
+        ("'<f2'", "half-precision numbers (`<f2`)"),
+        ("'<f16'", "extended-precision numbers (`<f16`)"),
+        ("'<c8'", "complex numbers (`<c8`)"),
+        ("'|b1'", "truth values (`|b1`)"),
+        ("'|O'", "Python objects (`|O`)"),
+        ("'<U4'", "texts (`<U4`)"),
+        ("[('x', '<f4'), ('y', '<f4')]", "records with fields"),
+        ("7", "an unreadable type"),
+    ] {
+        let header = header.replacen("'<u4'", descr, 1);
+        let length = (header.len() as u16).to_le_bytes();
+        std::fs::write(&path, [&bytes[..8], &length, header.as_bytes(), data].concat()).unwrap();
+        let error = load_points(&path).unwrap_err().to_string();
+        let wanted = format!("p.npy: header: an array of {found}; points need type f4 or f8, or whole numbers (i1 to i8, u1 to u8)");
+        assert!(error.ends_with(&wanted), "{error}");
+    }
+}
+
+#[test]
 fn tables_of_points() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("p.csv");
@@ -152,13 +179,14 @@ fn located_points() {
     assert!(matches!(write_located(folder.path().join("out.npy"), &short), Err(Error::Invalid(_))));
 }
 
-fn slices(path: &Path, owners: bool) {
-    let grid = SliceGrid {
-        size: [3, 2, 2],
-        origin: [0.5, 1.0, 2.0],
-        spacing: [1.0, 1.0, 0.5],
-        axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
-    };
+const GRID: SliceGrid = SliceGrid {
+    size: [3, 2, 2],
+    origin: [0.5, 1.0, 2.0],
+    spacing: [1.0, 1.0, 0.5],
+    axes: [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]],
+};
+
+fn slices(path: &Path, grid: SliceGrid, owners: bool) {
     let mut writer = SliceWriter::create(path, grid, owners).unwrap();
     for layer in 0..2u8 {
         let values: Vec<f32> = (0..6).map(|i| f32::from(i + 6 * layer)).collect();
@@ -172,8 +200,8 @@ fn slices(path: &Path, owners: bool) {
 #[test]
 fn stacks_of_slices() {
     let folder = tempfile::tempdir().unwrap();
-    slices(&folder.path().join("s.npy"), true);
-    slices(&folder.path().join("s.vti"), false);
+    slices(&folder.path().join("s.npy"), GRID, true);
+    slices(&folder.path().join("s.vti"), GRID, false);
     assert_eq!(names(folder.path()), ["s.kind.npy", "s.npy", "s.owner.npy", "s.vti"]);
     let values: Vec<u8> = (0..12u8).flat_map(|i| f32::from(i).to_ne_bytes()).collect();
     let bytes = std::fs::read(folder.path().join("s.npy")).unwrap();
@@ -191,6 +219,21 @@ fn stacks_of_slices() {
     assert_eq!(image[start + 56..start + 64], 12u64.to_ne_bytes());
     assert_eq!(image[start + 64..start + 76], [[1; 6], [2; 6]].concat());
     assert!(image.ends_with(b"\n</AppendedData>\n</VTKFile>\n"));
+}
+
+/// VTK takes positive spacings only: layers that go downwards have the opposite direction.
+#[test]
+fn images_have_positive_spacings() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("down.vti");
+    let spaced = |spacing: f64, layers: u32| SliceGrid { spacing: [1.0, 1.0, spacing], size: [3, 2, layers], ..GRID };
+    slices(&path, spaced(-0.5, 2), false);
+    let text = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
+    assert!(text.contains("Origin=\"0.5 1 2\" Spacing=\"1 1 0.5\" Direction=\"0 0 -1 1 0 0 0 1 0\""), "{text}");
+    let refused = SliceWriter::create(&path, spaced(0.0, 2), false).map(drop);
+    assert!(matches!(&refused, Err(Error::Invalid(why)) if why.contains("distance of 0")), "{refused:?}");
+    assert!(SliceWriter::create(&path, spaced(0.0, 1), false).is_ok());
+    assert!(SliceWriter::create(folder.path().join("flat.npy"), spaced(0.0, 2), false).is_ok());
 }
 
 #[test]

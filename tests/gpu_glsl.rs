@@ -2,9 +2,11 @@
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
+mod not_run;
 mod submit;
 
 use ash::vk;
+use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
@@ -176,7 +178,7 @@ fn check(binding: Binding) {
 fn by_address() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     if gpu.binding() == Binding::Descriptors {
-        println!("NOT RUN: the device has no buffer addresses");
+        not_run("the device has no buffer addresses");
         return;
     }
     check(Binding::Address);

@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
+mod not_run;
 mod submit;
 
 use ash::vk;
@@ -12,6 +13,7 @@ use host::counted::{ARMED, CALLS, counting};
 use host::live::{FAILING, FALLIBLE, live, watching};
 use host::queries::Queries;
 use host::{Frame, Host};
+use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder, Requirements};
 use olbvh::kernels::Target;
@@ -261,7 +263,7 @@ fn recording_neither_makes_nor_submits_nor_waits_by_address() {
     if Host::new().addresses {
         nothing_is_made(Binding::Address);
     } else {
-        println!("NOT RUN: the device has no buffer addresses");
+        not_run("the device has no buffer addresses");
     }
 }
 

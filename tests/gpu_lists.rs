@@ -2,8 +2,10 @@
 //! answers equal those of `Lists::All`.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod not_run;
 mod submit;
 
+use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
@@ -152,7 +154,7 @@ fn closed(gpu: &Gpu) -> Vec<Subject> {
         Subject::new(gpu, "jittered", kuhn_jittered([12; 3], 0.12, 3).unwrap()),
     ];
     if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") {
-        println!("NOT RUN: bracket_50k on SwiftShader, where it takes many minutes");
+        not_run("bracket_50k on SwiftShader, where it takes many minutes");
     } else {
         closed.push(Subject::new(gpu, "bracket_50k.vtu", loaded("bracket_50k.vtu")));
     }

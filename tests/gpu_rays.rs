@@ -2,6 +2,9 @@
 //! finds are right, and the points that it loses are counted.
 #![allow(clippy::unwrap_used)]
 
+mod not_run;
+
+use not_run::not_run;
 use olbvh::baseline::{RayMethod, Rays};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
@@ -15,7 +18,7 @@ use olbvh::reference::locate::Locator;
 fn has_rays(gpu: &Gpu, method: RayMethod) -> bool {
     let has = method.of(gpu);
     if !has {
-        println!("NOT RUN: {} traces no rays by {method:?}", gpu.report().name);
+        not_run(&format!("{} traces no rays by {method:?}", gpu.report().name));
         let driver = std::env::var("OLBVH_TEST_DRIVER").unwrap_or_default();
         assert!(!driver.starts_with("lavapipe25"), "{driver} is expected to trace rays");
     }

@@ -4,12 +4,14 @@
 #![allow(clippy::unwrap_used, unsafe_code)]
 
 mod host;
+mod not_run;
 mod submit;
 
 use ash::vk;
 use host::Frame;
 use host::baseline::Baseline;
 use host::queries::Queries;
+use not_run::not_run;
 use olbvh::Error;
 use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
@@ -200,7 +202,7 @@ fn barriers_of_a_host() {
 fn addresses_of_a_host() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     if gpu.binding() == Binding::Descriptors {
-        println!("NOT RUN: the device has no buffer addresses");
+        not_run("the device has no buffer addresses");
         return;
     }
     let frame = Frame::new(&gpu, &kuhn_jittered([3; 3], 0.3, 1).unwrap());

@@ -2,6 +2,9 @@
 //! flushed denormals, for meshes that the conformance suite lacks.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+mod not_run;
+
+use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -70,7 +73,7 @@ fn settings() -> Vec<SliceSettings> {
 fn by_address() {
     let gpu = Gpu::new(&GpuOptions { binding: Some(Binding::Address), ..GpuOptions::default() }).unwrap();
     if std::env::var("OLBVH_TEST_DRIVER").is_ok_and(|d| d == "swiftshader") {
-        println!("NOT RUN: slices with lists of 20,000 entries and of flow_sphere_50k on SwiftShader, where they take many minutes");
+        not_run("slices with lists of 20,000 entries and of flow_sphere_50k on SwiftShader, where they take many minutes");
         return;
     }
     // Lists that no dispatch can search in one go.

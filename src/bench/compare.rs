@@ -209,7 +209,7 @@ impl Comparison {
         let mut tables = Vec::new();
         if !self.different.is_empty() {
             let rows = self.different.iter().map(row).collect();
-            tables.push(Table { title: "WHAT DIFFERS BESIDE THE TIMES".into(), header: text_of(&["", "A", "B"]), rows });
+            tables.push(Table { title: "WHAT DIFFERS BESIDES THE TIMES".into(), header: text_of(&["", "A", "B"]), rows });
         }
         tables.push(self.summary());
         let mut meshes: Vec<&str> = self.compared.iter().map(|c| c.mesh.as_str()).collect();

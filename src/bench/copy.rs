@@ -57,7 +57,7 @@ impl CopyRate {
             })?;
             run(by_kernel)?;
             if gpu.download::<u32>(&to, to.all())? != data {
-                return Err(Error::Mismatch("a copy in device memory is not like the original".into()));
+                return Err(Error::Mismatch("a copy in device memory differs from the original".into()));
             }
             let times = (0..REPETITIONS).map(|_| run(by_kernel)).collect::<Result<Vec<f64>>>()?;
             Spread::of(times).ok_or_else(|| Error::Invalid("no copy was timed".into()))

@@ -76,7 +76,7 @@ fn main_tables(report: &Report) -> Vec<Table> {
         Some(format!("{}{part}", mebibytes(s.memory.total)))
     });
     let paper = by_structure(report, "Memory as the paper counts, with boxes and without PO, MiB", |_, s| s.memory.paper.map(mebibytes));
-    let lost = by_structure(report, "Points inside that are lost, of those inside", |_, s| {
+    let lost = by_structure(report, "Lost points, of those inside the mesh", |_, s| {
         s.lost.map(|l| format!("{} of {} ({:.4} %)", l.points, l.of, 100.0 * l.points as f64 / l.of.max(1) as f64))
     });
     let mut tables = vec![meshes(report)];
@@ -158,8 +158,8 @@ fn heading(report: &Report) -> String {
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
          medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
-         trees with lists `boundary` look for points near the one before where there is one to four tetrahedra or more (random ones are sorted for it, \
-         which is timed), and for samples of rays one by one, as all others do\n\
+         trees with lists `boundary` search for each point near the owner of the one before if there is at least one point for every four tetrahedra \
+         (random points are sorted first, which is timed); samples of rays, and all points in the other structures, are searched for independently\n\
          copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
         suite.name(),

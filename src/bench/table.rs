@@ -61,7 +61,7 @@ mod tests {
     use super::number;
 
     #[test]
-    fn numbers_have_three_digits() {
+    fn numbers_are_short() {
         let shown = [0.0, 0.000_12, 0.012_34, 0.5, 9.994, 9.996, 99.94, 99.96, 12_345.6, f64::NAN].map(number);
         assert_eq!(shown, ["0.00", "1.2e-4", "0.0123", "0.50", "9.99", "10.0", "99.9", "100", "12346", "–"]);
     }

@@ -112,7 +112,7 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
         && expected != found
     {
         let counts = [expected, found].map(|sets| sets.each_ref().map(Vec::len));
-        return wrong(format!("{:?} primitives overlap where there are {:?}", counts[1], counts[0]));
+        return wrong(format!("{:?} tetrahedra of the two meshes intersect the other mesh, not {:?}", counts[1], counts[0]));
     }
     Ok(matches!(kind, Kind::Rays(_)).then_some(lost))
 }
@@ -123,11 +123,11 @@ pub(super) fn check_tree(subject: &Subject<'_>, topology: &Topology, tree: &Tree
     let host = tree.download()?;
     let wrong = |what: &str| Err(Error::Mismatch(format!("α={} {}: {what}", options.alpha, options.assign)));
     if host != build(subject.mesh, topology, options)? {
-        return wrong("the tree is not the reference's");
+        return wrong("the tree differs from that of the reference implementation");
     }
     let locator = Locator::new(subject.mesh, topology, &host);
     let same =
         |(points, owners): (&[[f32; 3]], &Vec<u32>)| locator.locate_all(points).iter().zip(owners).all(|(e, &found)| e.owner == found);
     let right = subject.points.iter().map(|(_, points)| points.as_slice()).zip(&answers.owners).all(same);
-    if right { Ok(()) } else { wrong("owners are not the reference's") }
+    if right { Ok(()) } else { wrong("owners differ from those of the reference implementation") }
 }

@@ -41,7 +41,7 @@ impl Guarded {
             let found = format!("{:#x}", content[self.words + i]);
             return Err(fail(
                 stage,
-                &format!("{} (guard behind {} words)", self.name, self.words),
+                &format!("{} (guard after {} words)", self.name, self.words),
                 Some(self.words + i),
                 "untouched",
                 &found,

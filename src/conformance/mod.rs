@@ -5,6 +5,9 @@
 //! serves both the tests and the command line; it needs nothing but a device. For a case that fails, [`Failure`] names
 //! the kernel or stage, the array, the first index that differs, the expected value and the value found.
 //!
+//! Some cases also compare answers from different trees. Where tetrahedra of the mesh overlap, these may differ without
+//! any fault of the device; such a case passes, and its [`Report`] names the difference and two of the tetrahedra.
+//!
 //! ```text
 //! reduce/add/65537/host                    operation, length, where the count is known [, keys] [, target]
 //! scan/100003/indirect-below/narrow        length, count [, target]

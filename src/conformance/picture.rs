@@ -72,11 +72,11 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
             let all = Plan { drawn: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
             let all = render(device, &tree, &all, (&field.values, field.on), normals, &|_, _| {})?;
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
-            let same = compare(&stage, "colours beside those of every sample", &bits(&all.colors), &bits(&drawn.colors));
+            let same = compare(&stage, "colours compared with those of every sample", &bits(&all.colors), &bits(&drawn.colors));
             twin.same_unless_tangled(same)?;
         }
         if let Some(first) = &first {
-            let same = near(&stage, "pixels beside those of alpha 0", first, &pixels, 1, 0);
+            let same = near(&stage, "pixels compared with those of alpha 0", first, &pixels, 1, 0);
             // From full lists, samples get other owners only if others have been skipped before them.
             if lists == all && !hides { same } else { twin.same_unless_tangled(same) }?;
         }

@@ -158,10 +158,10 @@ impl<'a> Assembly<'a> {
     pub fn finish(mut self) -> Result<(Mesh, Report)> {
         if self.tets.is_empty() {
             let found: Vec<String> = self.counts.iter().map(|c| format!("{} {}", c.count, c.name)).collect();
-            let found = if found.is_empty() { "no cells at all".into() } else { found.join(", ") };
+            let found = if found.is_empty() { "and no other cells".into() } else { format!("only {}", found.join(", ")) };
             let also = self.warnings.join("; ");
             let also = if also.is_empty() { also } else { format!(" ({also})") };
-            return Err(self.source.error(format!("no tetrahedra, hexahedra, wedges or pyramids in it: {found}{also}")));
+            return Err(self.source.error(format!("the file has no tetrahedra, hexahedra, wedges or pyramids, {found}{also}")));
         }
         if self.points.len() >= u32::MAX as usize || self.tets.len() >= (u32::MAX / 4) as usize {
             let message = format!("{}: {} points and {} tetrahedra", self.source.path.display(), self.points.len(), self.tets.len());
@@ -172,17 +172,17 @@ impl<'a> Assembly<'a> {
         let origin = Self::origin(lo, hi);
         let points = self.convert(&used, origin)?;
         let fields = self.fields();
-        let unused = used.iter().filter(|&&u| !u).count();
-        let unsupported: u64 = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| c.count).sum();
-        if unsupported > 0 {
-            self.warnings.push(format!("{unsupported} volume cells are of types that cannot be read; they are missing in the mesh"));
+        let missing = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| format!("{} {}", c.count, c.name));
+        let missing = missing.collect::<Vec<_>>().join(", ");
+        if !missing.is_empty() {
+            self.warnings.push(format!("volume cells of types that cannot be read are missing in the mesh: {missing}"));
         }
         let report = Report {
             format: self.format,
             bytes: self.bytes,
             seconds: 0.0,
             points: points.len() as u64,
-            unused_points: unused as u64,
+            unused_points: used.iter().filter(|&&u| !u).count() as u64,
             cells: self.counts,
             tetrahedra: self.tets.len() as u64,
             negative: self.negative,

@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use super::isaac;
 use super::source::Source;
 use crate::error::Result;
 
@@ -14,10 +15,11 @@ pub(crate) enum Format {
     Medit,
     MeditBinary,
     TetGen,
+    Isaac,
 }
 
 /// File name extensions of the formats that can be read.
-pub(crate) const READABLE: &str = ".vtu, .vtk, .msh, .mesh, .meshb, .node with .ele";
+pub(crate) const READABLE: &str = ".vtu, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
@@ -25,7 +27,7 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     let bytes = source.bytes.as_slice();
     let ending = ending(&source.path);
     if bytes.iter().all(u8::is_ascii_whitespace) {
-        return Err(source.error(if bytes.is_empty() { "the file is empty" } else { "nothing but white space in it" }));
+        return Err(source.error(if bytes.is_empty() { "the file is empty" } else { "the file has nothing but white space" }));
     }
     if let Some(found) = foreign_binary(bytes, &ending) {
         return Err(source.error(found));
@@ -44,8 +46,11 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     if is(b"MeshVersionFormatted") {
         return Ok(Format::Medit);
     }
+    if is(b"v ") && isaac::has_tetrahedra(bytes) {
+        return Ok(Format::Isaac);
+    }
     if let Some(found) = foreign_text(&is, &ending) {
-        return Err(source.error(format!("{found}; {CONVERT}")));
+        return Err(source.error(found));
     }
     let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
     match ending.as_str() {
@@ -106,25 +111,27 @@ fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {
     Some(format!("a file in {found}, which cannot be read; {CONVERT}"))
 }
 
-fn foreign_text(is: &dyn Fn(&[u8]) -> bool, ending: &str) -> Option<&'static str> {
+fn foreign_text(is: &dyn Fn(&[u8]) -> bool, ending: &str) -> Option<String> {
     let any = |prefixes: &[&str]| prefixes.iter().any(|p| is(p.as_bytes()));
-    Some(if any(&["MFEM "]) {
-        "an MFEM mesh, which cannot be read"
+    let save = || format!("save it in a format that can be read ({READABLE}) with the program that made it");
+    let (found, advice) = if any(&["MFEM "]) {
+        ("an MFEM mesh, which cannot be read", save())
     } else if any(&["*VERTICES", "*ELEMENTS"]) || (ending == "veg" && any(&["*"])) {
-        "a Vega FEM mesh, which cannot be read"
+        ("a Vega FEM mesh, which cannot be read", save())
     } else if any(&["*HEADING", "*NODE", "*PART", "*INCLUDE", "*PREPRINT"]) {
-        "an Abaqus input file, which cannot be read"
+        ("an Abaqus input file, which cannot be read", CONVERT.into())
     } else if any(&["*KEYWORD"]) {
-        "an LS-DYNA keyword file, which cannot be read"
+        ("an LS-DYNA keyword file, which cannot be read", save())
     } else if any(&["FoamFile", "/*--------------------------------*- C++ -*-"]) {
-        "an OpenFOAM file, which cannot be read"
+        ("an OpenFOAM file, which cannot be read", "convert it to .vtu, for example with ParaView".into())
     } else if any(&["TITLE", "VARIABLES"]) && ["dat", "plt", "tec"].contains(&ending) {
-        "a Tecplot file, which cannot be read"
+        ("a Tecplot file, which cannot be read", CONVERT.into())
     } else if any(&["(0 ", "(1 ", "(2 "]) {
-        "a Fluent mesh, which cannot be read"
+        ("a Fluent mesh, which cannot be read", CONVERT.into())
     } else if any(&["solid ", "OFF\n", "ply\n", "ply\r", "v "]) {
-        "a surface or other geometry without volume cells"
+        ("a surface or other geometry without volume cells", "fill it with tetrahedra first, for example with TetGen or Gmsh".into())
     } else {
         return None;
-    })
+    };
+    Some(format!("{found}; {advice}"))
 }

@@ -108,13 +108,13 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
             );
         }
     }
-    if let Some(version) = version.filter(|v| !(1..=4).contains(v)) {
-        content.skipped.push(format!("(version {version} is unknown, read like version 2)"));
-    }
     let name = version.map_or_else(|| "without a version".into(), |v| format!("version {v}"));
     let mut assembly = Assembly::new(source, format!("Medit text, {name}"));
+    if let Some(version) = version.filter(|v| !(1..=4).contains(v)) {
+        assembly.warnings.push(format!("version {version} of the format is unknown; the file is read like version 2"));
+    }
     if dimension.is_none() {
-        assembly.warnings.push("no Dimension in it; 3 is assumed".into());
+        assembly.warnings.push("there is no keyword Dimension; 3 is assumed".into());
     }
     content.assemble(source, &mut assembly)?;
     if let Some((token, at)) = tokens.next_token() {

@@ -22,6 +22,7 @@ mod gmsh_data;
 mod gmsh_elements;
 mod gmsh_reader;
 mod integers;
+mod isaac;
 mod medit;
 mod meditb;
 mod npy;
@@ -119,6 +120,7 @@ fn read(source: &Source, options: &LoadOptions, start: Instant) -> Result<Loaded
             companion = tetgen::companion(source)?;
             tetgen::read(source, &companion)?
         }
+        Format::Isaac => isaac::read(source)?,
     };
     let (mesh, mut report) = assembly.finish()?;
     report.seconds = start.elapsed().as_secs_f64();

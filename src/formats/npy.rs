@@ -48,7 +48,8 @@ pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
     let name = quote.and_then(|q| descr[1..].split_once(q)).map(|(name, _)| name);
     let kind = name.and_then(scalar);
     let (scalar, big_endian) = kind.ok_or_else(|| {
-        source.error_in("header", format!("an array of type {}; floating-point numbers are needed", printable(descr.as_bytes())))
+        let found = describe(descr, name);
+        source.error_in("header", format!("an array of {found}; points need type f4 or f8, or whole numbers (i1 to i8, u1 to u8)"))
     })?;
     let fortran = field("fortran_order")?.starts_with("True");
     let shape = field("shape")?.strip_prefix('(').and_then(|s| s.split_once(')')).map(|(s, _)| s);
@@ -73,6 +74,25 @@ pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
     } else {
         values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect()
     })
+}
+
+/// Names the type of an array that cannot be read; `descr` is the header from that type on.
+fn describe(descr: &str, name: Option<&str>) -> String {
+    let Some(name) = name else {
+        return if descr.starts_with('[') { "records with fields" } else { "an unreadable type" }.into();
+    };
+    let kind = name.trim_start_matches(['<', '>', '|', '=']);
+    let what = match kind.chars().next() {
+        Some('f') if kind == "f2" => "half-precision numbers",
+        Some('f') => "extended-precision numbers",
+        Some('c') => "complex numbers",
+        Some('b' | '?') => "truth values",
+        Some('O') => "Python objects",
+        Some('U' | 'S' | 'a') => "texts",
+        Some('M' | 'm') => "times",
+        _ => "another type",
+    };
+    format!("{what} (`{}`)", printable(name.as_bytes()))
 }
 
 /// Parses a NumPy type such as `<f8` into number type and byte order (`true`: big-endian).

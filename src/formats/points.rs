@@ -7,10 +7,10 @@ use super::npy;
 use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::Result;
 
-/// Reads points from a `.npy` file of shape (n, 3) with any numeric type, or from a text table with one point per line
-/// and columns separated by commas, semicolons or white space. The first line of a table may name the columns: if it
-/// names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that start with `#` are
-/// comments. A table without points is valid, even an empty file.
+/// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
+/// point per line and columns separated by commas, semicolons or white space. The first line of a table may name the
+/// columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that
+/// start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.

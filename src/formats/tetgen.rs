@@ -31,18 +31,18 @@ pub(crate) fn read<'a>(main: &'a Source, companion: &Source) -> Result<Assembly<
 }
 
 /// The lines of a file that are neither empty nor comments.
-struct Lines<'a> {
+pub(super) struct Lines<'a> {
     source: &'a Source,
     tokens: Tokens<'a>,
 }
 
 impl<'a> Lines<'a> {
-    fn new(source: &'a Source) -> Self {
+    pub(super) fn new(source: &'a Source) -> Self {
         Self { source, tokens: Tokens::new(source, 0..source.bytes.len(), Some(b'#')) }
     }
 
     /// Puts the words of the next line into `words` and returns the position of the line.
-    fn next(&mut self, words: &mut Vec<&'a [u8]>) -> Option<usize> {
+    pub(super) fn next(&mut self, words: &mut Vec<&'a [u8]>) -> Option<usize> {
         self.tokens.skip_space();
         let (line, at) = self.tokens.line()?;
         let mut rest = Tokens::new(self.source, at..at + line.len(), Some(b'#'));

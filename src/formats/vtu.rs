@@ -122,10 +122,10 @@ impl Parser<'_, '_> {
             }
         }
         let Some((mut codec, format)) = self.codec.take() else {
-            return Err(self.source.error("no element <VTKFile> in it: not a VTK file"));
+            return Err(self.source.error("no element <VTKFile>: not a VTK file"));
         };
         if self.pieces.is_empty() {
-            return Err(self.source.error("no <Piece> in it"));
+            return Err(self.source.error("there is no element <Piece>"));
         }
         if let Some((attributes, end)) = appended {
             codec.appended = Some(self.appended(&attributes, end)?);

@@ -223,7 +223,7 @@ fn check_size(size: u64, scalar: Scalar, count: Option<u64>) -> Result<(), Strin
             return Err(format!("it has {size} bytes where {count} values of {each} bytes need {wanted}"));
         }
     }
-    if size.is_multiple_of(each) { Ok(()) } else { Err(format!("{size} bytes are no whole number of values of {each} bytes")) }
+    if size.is_multiple_of(each) { Ok(()) } else { Err(format!("{size} bytes are not a whole number of values of {each} bytes")) }
 }
 
 fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts: &[Range<usize>], count: Option<u64>) -> Result<Vec<T>> {

@@ -44,12 +44,13 @@ impl TransferFunction {
         Self { colors, opacity: None, range: None }
     }
 
-    /// A built-in map by name; the suffix `_r` reverses it.
+    /// A built-in map by name, in upper or lower case; the suffix `_r` reverses it.
     ///
     /// # Errors
     /// [`Error::Invalid`] for an unknown name; the message lists the known ones.
     pub fn named(name: &str) -> Result<Self> {
-        let (base, reverse) = name.strip_suffix("_r").map_or((name, false), |base| (base, true));
+        let lower = name.to_ascii_lowercase();
+        let (base, reverse) = lower.strip_suffix("_r").map_or((lower.as_str(), false), |base| (base, true));
         let map = maps::find(base).ok_or_else(|| {
             let names: Vec<_> = maps::MAPS.iter().map(|map| map.name).collect();
             Error::Invalid(format!(
@@ -70,8 +71,8 @@ impl TransferFunction {
     /// # Errors
     /// [`Error::Invalid`] if a list is empty, places descend, or a place or channel lies outside 0…1.
     pub fn new(colors: Vec<(f32, [f32; 3])>, opacity: Vec<(f32, f32)>) -> Result<Self> {
-        check("colour", colors.iter().map(|(place, c)| (*place, &c[..])))?;
-        check("opacity", opacity.iter().map(|(place, a)| (*place, std::slice::from_ref(a))))?;
+        check("colours", colors.iter().map(|(place, c)| (*place, &c[..])))?;
+        check("opacities", opacity.iter().map(|(place, a)| (*place, std::slice::from_ref(a))))?;
         Ok(Self { colors, opacity: Some(opacity), range: None })
     }
 
@@ -130,19 +131,21 @@ fn interpolate<T: Copy>(points: &[(f32, T)], x: f32, mix: impl Fn(T, T, f32) -> 
 
 /// Checks that the places ascend within 0…1 and that the channels lie in 0…1.
 fn check<'a>(what: &str, points: impl Iterator<Item = (f32, &'a [f32])>) -> Result<()> {
+    let wrong = |why: String| Err(Error::Invalid(format!("{what} of a transfer function: {why}")));
     let mut last = None;
     for (place, channels) in points {
-        if let Some(bad) = std::iter::once(&place).chain(channels).find(|v| !(0.0..=1.0).contains(*v)) {
-            return Err(Error::Invalid(format!("transfer function: {what} point at {place}: {bad} lies outside 0 to 1")));
+        if !(0.0..=1.0).contains(&place) {
+            return wrong(format!("the place {place} lies outside 0 to 1"));
         }
-        if last.is_some_and(|last| place < last) {
-            return Err(Error::Invalid(format!(
-                "transfer function: places of {what} points must ascend, but {place} follows a larger one"
-            )));
+        if let Some(bad) = channels.iter().find(|v| !(0.0..=1.0).contains(*v)) {
+            return wrong(format!("at place {place}, the value {bad} lies outside 0 to 1"));
+        }
+        if let Some(last) = last.filter(|&last| place < last) {
+            return wrong(format!("places must ascend, but {place} follows {last}"));
         }
         last = Some(place);
     }
-    last.map(|_| ()).ok_or_else(|| Error::Invalid(format!("transfer function: no {what} points")))
+    last.map_or_else(|| wrong("there are none".into()), |_| Ok(()))
 }
 
 /// 0xRRGGBB as channels.
@@ -150,88 +153,19 @@ fn from_hex(rgb: u32) -> [f32; 3] {
     [16, 8, 0].map(|shift| (rgb >> shift & 255) as f32 / 255.0)
 }
 
-/// Parses `#rrggbb`, with or without the `#`.
+/// Parses `#rrggbb` or `#rgb`, with or without the `#`.
 pub fn parse_color(text: &str) -> Option<[f32; 3]> {
-    let digits = text.trim().trim_start_matches('#');
-    (digits.len() == 6).then(|| u32::from_str_radix(digits, 16).ok()).flatten().map(from_hex)
+    let digits = text.trim();
+    let digits: Vec<u32> = digits.strip_prefix('#').unwrap_or(digits).chars().map(|c| c.to_digit(16)).collect::<Option<_>>()?;
+    let byte = match digits[..] {
+        [r, g, b] => [17 * r, 17 * g, 17 * b],
+        [r, s, g, h, b, c] => [16 * r + s, 16 * g + h, 16 * b + c],
+        _ => return None,
+    };
+    Some(byte.map(|byte| byte as f32 / 255.0))
 }
 
 #[cfg(feature = "formats")]
-mod json {
-    use super::{DEFAULT_OPACITY, Error, Result, TransferFunction, parse_color};
-
-    /// A colour as written in the file.
-    #[derive(serde::Deserialize)]
-    #[serde(untagged)]
-    enum Color {
-        Hex(String),
-        Channels([f32; 3]),
-    }
-
-    /// The meaning of places.
-    #[derive(Clone, Copy, Default, PartialEq, serde::Deserialize)]
-    #[serde(rename_all = "lowercase")]
-    enum Positions {
-        #[default]
-        Fractions,
-        Values,
-    }
-
-    /// The content of the file.
-    #[derive(serde::Deserialize)]
-    #[serde(deny_unknown_fields)]
-    struct File {
-        map: Option<String>,
-        colors: Option<Vec<(f32, Color)>>,
-        opacity: Option<Vec<(f32, f32)>>,
-        range: Option<[f32; 2]>,
-        #[serde(default)]
-        positions: Positions,
-    }
-
-    impl TransferFunction {
-        /// A function from its JSON form ([`JSON_HELP`](super::JSON_HELP)).
-        ///
-        /// # Errors
-        /// [`Error::Invalid`] with the line of a syntax error, or as [`TransferFunction::new`].
-        pub fn from_json(text: &str) -> Result<Self> {
-            let file: File = serde_json::from_str(text).map_err(|e| Error::Invalid(format!("transfer function: {e}")))?;
-            let mut colors = match (file.map, file.colors) {
-                (Some(map), None) => Self::named(&map)?.colors,
-                (None, Some(colors)) => colors.into_iter().map(|(place, color)| Ok((place, channels(color)?))).collect::<Result<_>>()?,
-                _ => return Err(Error::Invalid("transfer function: needs either \"map\" or \"colors\"".into())),
-            };
-            let mut opacity = file.opacity;
-            let mut range = file.range;
-            if file.positions == Positions::Values {
-                // Places given as values are rescaled to the range that they span together, or to the given range.
-                let places = || colors.iter().map(|c| c.0).chain(opacity.iter().flatten().map(|o| o.0));
-                let [lo, hi] = range.unwrap_or_else(|| [places().fold(f32::MAX, f32::min), places().fold(f32::MIN, f32::max)]);
-                for place in colors.iter_mut().map(|c| &mut c.0).chain(opacity.iter_mut().flatten().map(|o| &mut o.0)) {
-                    *place = (*place - lo) / (hi - lo);
-                }
-                range = Some([lo, hi]);
-            }
-            if let Some([lo, hi]) = range.filter(|[lo, hi]| !(lo < hi && (hi - lo).is_finite())) {
-                return Err(Error::Invalid(format!(
-                    "transfer function: a range from {lo} to {hi}; LO must be below HI in \"range\": [LO, HI]"
-                )));
-            }
-            let known = opacity.is_some();
-            let function = Self::new(colors, opacity.unwrap_or_else(|| DEFAULT_OPACITY.to_vec()))?;
-            Ok(Self { range, opacity: function.opacity.filter(|_| known), ..function })
-        }
-    }
-
-    fn channels(color: Color) -> Result<[f32; 3]> {
-        match color {
-            Color::Channels(channels) => Ok(channels),
-            Color::Hex(text) => {
-                parse_color(&text).ok_or_else(|| Error::Invalid(format!("transfer function: `{text}` is no colour such as #1a2a6c")))
-            }
-        }
-    }
-}
-
+mod json;
 #[cfg(test)]
 mod tests;

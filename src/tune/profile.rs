@@ -78,7 +78,7 @@ impl Profile {
     pub fn read(path: &Path) -> Result<Self> {
         let text = std::fs::read_to_string(path).map_err(|source| Error::Io { path: path.into(), source })?;
         let wrong = |place: String, e: &dyn std::fmt::Display| {
-            let message = format!("{e}; it is no profile of this version of `olbvh tune`: remove it, or tune again");
+            let message = format!("{e}; this is not a profile of this version of `olbvh tune`; remove it, or tune again");
             Error::File { path: path.into(), place, message }
         };
         let profile: Self = serde_json::from_str(&text).map_err(|e| wrong(format!("line {}: ", e.line()), &e))?;

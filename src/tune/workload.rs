@@ -92,11 +92,15 @@ impl<'a> Workload<'a> {
         let topology = topology(self.mesh)?;
         let tree = build(self.mesh, &topology, &BuildOptions { lists: Lists::All, ..BuildOptions::default() })?;
         if self.expected.trees.first() != Some(&tree) {
-            return Err(Error::Mismatch("the tree is not the reference's; `olbvh conformance` tells where".into()));
+            return Err(Error::Mismatch(
+                "the tree differs from that of the reference implementation; `olbvh conformance` shows in which step".into(),
+            ));
         }
         let owners: Vec<u32> = Locator::new(self.mesh, &topology, &tree).locate_all(&self.points).iter().map(|l| l.owner).collect();
         if self.expected.owners.first() != Some(&owners) {
-            return Err(Error::Mismatch("owners are not the reference's; `olbvh conformance` tells where".into()));
+            return Err(Error::Mismatch(
+                "owners differ from those of the reference implementation; `olbvh conformance` shows in which step".into(),
+            ));
         }
         Ok(())
     }

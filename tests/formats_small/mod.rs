@@ -3,20 +3,24 @@
 #![allow(dead_code)] // not every test uses all of it
 #![allow(clippy::format_push_string, clippy::format_collect, clippy::unwrap_used)] // simple code matters more than speed here
 
+#[path = "../not_run/mod.rs"]
+mod not_run;
+
+use not_run::not_run;
 use std::path::{Path, PathBuf};
 
 pub const POINTS: [[f64; 3]; 8] =
     [[0., 0., 0.], [1., 0., 0.], [0., 1., 0.], [1., 1., 0.], [0., 0., 1.], [1., 0., 1.], [0., 1., 1.], [1., 1., 1.25]];
 pub const TETS: [[u32; 4]; 6] = [[0, 1, 3, 7], [0, 1, 5, 7], [0, 2, 3, 7], [0, 2, 6, 7], [0, 4, 5, 7], [0, 4, 6, 7]];
 
-/// The folder with the shared meshes, if it exists; prints a message if it does not.
+/// The folder with the shared meshes; `None`, with a message, if it does not exist.
 pub fn shared(folder: &str) -> Option<PathBuf> {
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../shared/meshes");
     let root = if root.is_dir() { root } else { Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/meshes") };
     if root.is_dir() {
         return Some(root.join(folder));
     }
-    eprintln!("NOT RUN: ../shared/meshes/{folder} is missing, so these files were not tested");
+    not_run(&format!("the files of ../shared/meshes/{folder}, which is missing"));
     None
 }
 
@@ -45,6 +49,7 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("pair.node", tetgen(1).0),
         ("zero.ele", tetgen(0).1),
         ("zero.node", tetgen(0).0),
+        ("isaac.tet", isaac()),
     ]
 }
 
@@ -70,6 +75,13 @@ fn vtu_ascii() -> Vec<u8> {
         array("UInt8", "types", 1, join([10; 6])),
     )
     .into_bytes()
+}
+
+fn isaac() -> Vec<u8> {
+    let line = |keyword: &str, numbers: String| format!("{keyword} {numbers}\n");
+    let points: String = POINTS.iter().map(|p| line("v", join(p))).collect();
+    let tets: String = TETS.iter().map(|t| line("t", join(t))).collect();
+    format!("# a cube\n{points}\n{tets}").into_bytes()
 }
 
 fn base64(bytes: &[u8]) -> Vec<u8> {

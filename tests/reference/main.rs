@@ -4,7 +4,6 @@
 mod assign;
 mod boundary;
 mod build;
-mod claim;
 mod lists;
 mod locate;
 mod oracle;
@@ -13,6 +12,7 @@ mod overlap;
 mod slice;
 mod slice_files;
 mod traverse;
+mod unflagged_leaves;
 mod validate;
 
 use olbvh::mesh::Mesh;

@@ -6,6 +6,7 @@ use olbvh::error::Error;
 use olbvh::formats::{LoadOptions, Loaded, load};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
+use olbvh::render::TransferFunction;
 use std::io::ErrorKind;
 use std::path::Path;
 use std::time::Instant;
@@ -135,6 +136,18 @@ pub fn field<'a>(mesh: &'a Mesh, name: Option<&str>) -> Outcome<Option<&'a Field
         return Ok(mesh.fields.iter().find(|f| f.on == On::Points).or(mesh.fields.first()));
     };
     mesh.field(name).map(Some).ok_or_else(|| Failure::Usage(format!("no field `{name}`; {}", fields(mesh))))
+}
+
+/// The transfer function of a .json file, or the colour map of this name.
+pub fn transfer(name: &str) -> Outcome<TransferFunction> {
+    if !name.to_ascii_lowercase().ends_with(".json") {
+        return Ok(TransferFunction::named(name)?);
+    }
+    let text = std::fs::read_to_string(name).map_err(|source| Failure::input(Error::Io { path: name.into(), source }))?;
+    TransferFunction::from_json(&text).map_err(|error| match error {
+        Error::Invalid(why) => Failure::Input(format!("{name}: {why}")),
+        other => other.into(),
+    })
 }
 
 /// The names of a mesh's fields as part of a sentence.

@@ -1,13 +1,13 @@
 //! The subcommand `olbvh render`.
 
 use crate::arguments::{message, named, range, vector};
-use crate::common::{Common, Failure, Outcome};
+use crate::common::{Common, Outcome};
 use crate::engine::{self, Drawn};
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{self, Progress};
 use crate::text::{grouped, in_blocks, milliseconds};
 use olbvh::blocks::View;
-use olbvh::error::{Error, Result};
+use olbvh::error::Result;
 use olbvh::formats::{OutputFormat, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::Fineness;
@@ -164,13 +164,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 
 impl Args {
     fn settings(&self) -> Outcome<RenderSettings> {
-        let mut transfer = if self.tf.to_ascii_lowercase().ends_with(".json") {
-            let path = PathBuf::from(&self.tf);
-            let text = std::fs::read_to_string(&path).map_err(|source| Failure::input(Error::Io { path, source }))?;
-            TransferFunction::from_json(&text).map_err(|e| Failure::Input(format!("{}: {e}", self.tf)))?
-        } else {
-            TransferFunction::named(&self.tf)?
-        };
+        let mut transfer = input::transfer(&self.tf)?;
         if let Some(Opacity(points)) = &self.opacity {
             transfer = transfer.with_opacity(points.clone())?;
         }

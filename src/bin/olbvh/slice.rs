@@ -13,7 +13,8 @@ use olbvh::formats::OutputFormat;
 use olbvh::mesh::{Field, On};
 use olbvh::options::Fineness;
 use olbvh::reference::boundary::valid_grid;
-use olbvh::render::{Bounds, TransferFunction, transfer};
+use olbvh::render::Bounds;
+use olbvh::render::transfer::DEFAULT_MAP;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 use serde_json::json;
 use std::path::PathBuf;
@@ -77,11 +78,13 @@ pub struct Args {
     /// Also write the cell id of each voxel: to NAME.owner.npy, or as an array of the .vti.
     #[arg(long)]
     owners: bool,
-    /// Colour map of .png pictures, as for `render --tf`. Default: viridis.
-    #[arg(long, value_name = "MAP")]
+    /// Colours of .png pictures: the name of a colour map, or a .json file, as for `render --tf` (whose opacities are
+    /// not used). Default: viridis.
+    #[arg(long, value_name = "MAP|FILE.json")]
     tf: Option<String>,
     /// Values of the field at the two ends of the colour map (and of the value channel of an .svx package), LO below
-    /// HI. Default: the smallest and largest value of the field.
+    /// HI. Default: the range in the .json file of --tf if it has one, otherwise the smallest and largest value of the
+    /// field.
     #[arg(long, value_name = "LO:HI", value_parser = range, allow_hyphen_values = true)]
     range: Option<[f32; 2]>,
     /// Metres per unit of the mesh, for .svx. Default: 0.001, that is the mesh is in millimetres.
@@ -116,7 +119,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
             return Err(Failure::Usage(format!("{option} is for {endings} files")));
         }
     }
-    let colors = TransferFunction::named(args.tf.as_deref().unwrap_or(transfer::DEFAULT_MAP))?;
+    let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
@@ -146,7 +149,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let all = grouped(voxels.voxels());
         return Err(Failure::Usage(format!("{all} voxels, more than the maximum of 2^40; take fewer --layers or a smaller --size")));
     }
-    let range = args.range.or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
+    let range = args.range.or(colors.range()).or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
     let materials = field.and_then(materials);
     if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
         common.remark(format_args!(

@@ -16,7 +16,7 @@ pub struct SliceGrid {
     pub size: [u32; 3],
     /// Centre of the first voxel, in the coordinates of the mesh file.
     pub origin: [f64; 3],
-    /// Distance between neighbouring voxels along width, height and layers.
+    /// Distance between neighbouring voxels along width, height and layers, negative where they go against the axis.
     pub spacing: [f64; 3],
     /// Unit vectors along width, height and layers.
     pub axes: [[f64; 3]; 3],
@@ -41,7 +41,8 @@ impl SliceWriter {
     /// Creates the files.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for another extension, [`Error::Io`] if the files cannot be written.
+    /// [`Error::Invalid`] for another extension, for slices without voxels, and for an image with several layers at one
+    /// place; [`Error::Io`] if the files cannot be written.
     pub fn create(path: impl AsRef<Path>, grid: SliceGrid, owners: bool) -> Result<Self> {
         let path = path.as_ref();
         let format = OutputFormat::of(path, &Self::FORMATS)?;
@@ -73,10 +74,17 @@ impl SliceWriter {
     fn image(&mut self, path: &Path, owners: bool) -> Result<()> {
         let join = |v: &[f64]| v.iter().map(f64::to_string).collect::<Vec<_>>().join(" ");
         let SliceGrid { size, origin, spacing, axes } = self.grid;
+        if (0..3).any(|c| size[c] > 1 && spacing[c] == 0.0) {
+            let message =
+                "several layers at one place, with a distance of 0; an image for VTK (.vti) needs another distance, an .npy does not";
+            return Err(Error::Invalid(message.into()));
+        }
         let [x, y, z] = size.map(|n| i64::from(n) - 1);
         let extent = format!("0 {x} 0 {y} 0 {z}");
-        // The matrix whose columns are the axes, row by row.
-        let direction: Vec<f64> = (0..3).flat_map(|row| axes.map(|axis| axis[row])).collect();
+        // The matrix whose columns are the axes, row by row; they point from voxel to voxel, since VTK's spacings are
+        // positive (whatever that of a single layer is).
+        let direction: Vec<f64> = (0..3).flat_map(|row| [0, 1, 2].map(|c| axes[c][row] * 1f64.copysign(spacing[c]) + 0.0)).collect();
+        let spacing = spacing.map(|s| if s == 0.0 { 1.0 } else { s.abs() });
         let mut xml = format!(
             "<?xml version=\"1.0\"?>\n<VTKFile type=\"ImageData\" version=\"1.0\" byte_order=\"{BYTE_ORDER}\" header_type=\"UInt64\">\n<ImageData WholeExtent=\"{extent}\" Origin=\"{}\" Spacing=\"{}\" Direction=\"{}\">\n<Piece Extent=\"{extent}\">\n<PointData Scalars=\"value\">\n",
             join(&origin),

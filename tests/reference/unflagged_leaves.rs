@@ -21,16 +21,18 @@ fn unflagged_leaves_are_inside() {
             let tree = tree(&mesh, &topology, alpha, assign);
             let locator = Locator::new(&mesh, &topology, &tree);
             let mut random = Random(3);
-            let (mut wrong, mut outside) = (0, 0);
+            let (mut wrong, mut outside, mut in_leaves) = (0, 0, 0);
             for _ in 0..20_000 {
                 let p = [0, 1, 2].map(|c| tree.grid.lo[c] + (tree.grid.hi[c] - tree.grid.lo[c]) * random.next());
                 let a = [p[0], s * (p[1] + p[2]), s * (p[2] - p[1])];
                 let q = [s * (a[0] + a[1]), s * (a[1] - a[0]), a[2]];
                 if q.iter().any(|x| !(-0.01..=8.01).contains(x)) {
                     outside += 1;
+                    in_leaves += u32::from(tree.find_leaf(tree.grid.quantize(p)).is_some());
                     wrong += u32::from(locator.locate(p).found().is_some());
                 }
             }
+            assert!(outside > 10_000 && in_leaves > 5_000, "{assign} {alpha}: {outside} points outside, {in_leaves} of them in leaves");
             assert_eq!(wrong, 0, "{assign} {alpha}: {wrong} of {outside} points outside have an owner");
         }
     }
