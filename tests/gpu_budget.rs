@@ -11,7 +11,7 @@ use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
-use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate, locate};
+use olbvh::query::{LocateOptions, LocateOutput, OverlapMemory, Path, PointInput, Rounds, Scene, cmd_locate, cmd_overlap, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
@@ -258,4 +258,39 @@ fn every_capacity() {
     }
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
+}
+
+/// A recorded tree that does not fit its capacity is empty to the queries recorded behind it, whatever lay in its memory.
+#[test]
+fn what_does_not_fit_answers_as_empty() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([4; 3]).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let (tets, count, view, options) = (mesh.tets.len() as u32, mesh.points.len() as u32, device.view(), BuildOptions::default());
+    let whole = Scene::new(&device, &Tree::build(&gpu, &device, &options).unwrap()).unwrap();
+    for level in [0, 2] {
+        let capacity = Capacity { candidates: 64 * tets, ..Capacity::for_entries(tets / 2, level) };
+        let carve = |a: &mut Arena| {
+            let tree = TreeMemory::carve(a, &capacity, &options)?;
+            let scene = Scene { mesh: view, tree, longest_leaf: tets };
+            let output = LocateOutput { owners: a.words(u64::from(count))?, barycentrics: a.take(16 * u64::from(count))? };
+            Ok((BuildScratch::carve(&gpu, a, tets, &capacity, &options)?, scene, output, OverlapMemory::carve(a, &whole, &scene)?))
+        };
+        let memory = gpu.upload("olbvh.test.filled", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
+        let (scratch, scene, output, overlap) = carve(&mut Arena::new(memory.all())).unwrap();
+        let points = PointInput { points: device.input().positions, stride: 3, count, hints: None, order: None };
+        submit(&gpu, "olbvh.test.empty", |r| {
+            cmd_build(r, &view, &scene.tree, &options, &scratch)?;
+            cmd_locate(r, &scene, &points, &output, &LocateOptions { path: Path::Traversal(8), ..LocateOptions::default() })?;
+            r.barrier("locate → overlap");
+            cmd_overlap(r, &whole, &scene, &overlap, Rounds::begin(4))
+        })
+        .unwrap();
+        let status: BuildStatus = gpu.download_one(&memory, scene.tree.status).unwrap();
+        assert_eq!(status.overflow, 1);
+        let owners: Vec<u32> = gpu.download(&memory, output.owners.part(0, 4 * u64::from(count))).unwrap();
+        assert!(owners.iter().all(|&owner| owner == u32::MAX), "level {level}: {owners:?}");
+        let hits: Vec<u32> = gpu.download(&memory, overlap.hits[0].part(0, 4 * u64::from(tets.div_ceil(32)))).unwrap();
+        assert!(hits.iter().all(|&word| word == 0), "level {level}: {hits:x?}");
+    }
 }

@@ -5,12 +5,13 @@
 
 use olbvh::Error;
 use olbvh::baseline::{Lbvh, RayMethod, Rays};
-use olbvh::build::{BadCells, DeviceMesh, FieldRanges, Tree};
-use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::build::{BadCells, Capacity, DeviceMesh, FieldRanges, Tree, TreeMemory};
+use olbvh::gpu::{DescriptorPools, Gpu, GpuOptions, Recorder};
 use olbvh::layout::Grid;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateOptions, OverlapInput, locate, locate_all, overlap, render, slice};
+use olbvh::primitives::Arena;
+use olbvh::query::{LocateOptions, OverlapInput, Path, locate, locate_all, overlap, render, slice};
 use olbvh::render::{Bounds, Plan, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;
@@ -68,8 +69,40 @@ fn another_device_is_refused() {
     let [a, b] = [(&gpu, &here), (&elsewhere, &there)].map(|(gpu, mesh)| Tree::build(gpu, mesh, &options).unwrap());
     let [a, b] = [OverlapInput { mesh: &here, tree: &a }, OverlapInput { mesh: &there, tree: &b }];
     refused("overlap", "on another device", overlap(a, b, false, &|_, _| {}));
+    let values = vec![0.0; mesh.points.len()];
+    let mut ranges = FieldRanges::new(&here, a.tree, (&values, On::Points)).unwrap();
+    refused("ranges", "on another device", ranges.update(&there, b.tree, (&values, On::Points)));
+    let buffer = elsewhere.buffer("olbvh.test.elsewhere", 64).unwrap();
+    refused("download", "buffer or device", gpu.download::<u32>(&buffer, buffer.all()));
+    let mut pools = DescriptorPools::new(&elsewhere);
+    refused("pools", "another device", Recorder::rehearse(&gpu).with_pools(&mut pools).map(|_| ()));
     let same = gpu.with_memory(1 << 20).with_target(gpu.target().clone()).unwrap();
     Tree::build(&same, &here, &options).unwrap();
+}
+
+/// Sizes that a host has made by hand, and that kernels rely on.
+#[test]
+fn wrong_sizes_are_refused() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([2; 3]).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let (values, settings) = (vec![0.0; mesh.points.len()], RenderSettings { size: [16, 16], ..RenderSettings::default() });
+    let mut plan = Plan::new(&settings, &Bounds::from(device.grid()), mesh.origin, Some([0.0, 1.0])).unwrap();
+    plan.table.truncate(2);
+    refused("render", "2 colours", render(&device, &tree, &plan, (&values, On::Points), None, &|_, _| {}));
+    let deep = Capacity { level: 13, ..Capacity::for_entries(1000, 22) };
+    refused("level", "level 13", Arena::measure(|a| TreeMemory::carve(a, &deep, &BuildOptions::default())));
+    let [small, large] = [64, 128].map(|bytes| gpu.buffer("olbvh.test.copied", bytes).unwrap());
+    let mut recorder = Recorder::rehearse(&gpu);
+    recorder.copy(large.all(), small.all());
+    refused("copy", "copy of 128 bytes", recorder.finish());
+    // A stack of any size gives the same owners.
+    let located = |stack| {
+        let options = LocateOptions { path: Path::Traversal(stack), ..LocateOptions::default() };
+        locate(&device, &tree, &mesh.points, None, &options, &|_, _| {}).unwrap().owners
+    };
+    assert_eq!(located(u32::MAX), located(8));
 }
 
 /// A structure keeps the memory of its mesh: otherwise, a later mesh at the same place would be taken for the first.
