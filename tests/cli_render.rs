@@ -287,6 +287,9 @@ fn results_go_to_files_of_any_folder() {
     if Path::new("/proc/self").is_dir() {
         let message = render(1, "/proc/a.png");
         assert!(message.contains("/proc/a.png: ") && !message.contains(".part"), "{message}");
+        // It is told before the mesh is read.
+        let message = fails(folder.path(), 1, &["render", "missing.vtu", "-o", "/proc/a.png", "--device", "cpu"]);
+        assert!(message.contains("/proc/a.png: ") && !message.contains("missing.vtu"), "{message}");
     }
 }
 

@@ -62,7 +62,7 @@ pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outc
 }
 
 /// Announces a result with any extension: it must not be a folder, device, pipe or socket, nor one of the `inputs`, and
-/// its folder must exist.
+/// its folder must exist and take new files.
 pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     let existing = std::fs::metadata(path).ok();
     if existing.as_ref().is_some_and(std::fs::Metadata::is_dir) {
@@ -79,6 +79,7 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     if !folder(&destination).is_dir() {
         return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(&destination).display())));
     }
+    drop(OutputFile::create(path)?);
     begin(path);
     Ok(())
 }
