@@ -7,7 +7,6 @@
 #include "shared/grid.glsl"
 ARGUMENTS(7)
     uint capacity;
-    uint nodes; // capacity of the node arrays
 END_ARGUMENTS
 BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, entries)

@@ -180,7 +180,6 @@ pub(crate) fn cmd_splits(r: &mut Recorder<'_>, tree: &TreeMemory, entries: Count
             po,
             co,
             capacity: capacity.entries,
-            nodes: capacity.nodes,
         };
         r.dispatch(
             &arguments,
