@@ -128,14 +128,16 @@ impl Refused<'_, '_> {
         let why = why.map_or_else(String::new, |e| format!(" ({e})"));
         let finer = tets > LEAST && self.sources.iter().any(Source::has_level_wanted);
         let finer = if finer { ", or a finer tree, whose cells cut the mesh into smaller blocks" } else { "" };
-        Error::TooLarge(match self.enough(limit.max(self.beside)) {
-            Some(enough) => {
-                format!("{limit} bytes of device memory are too few for blocks of the mesh{why}; allow {enough} bytes or more{finer}")
-            }
-            None => format!(
-                "{limit} bytes of device memory are too few: a block of {tets} tetrahedra, which is not cut any further, takes {bytes} bytes{why}{finer}"
-            ),
-        })
+        if let Some(enough) = self.enough(limit.max(self.beside)) {
+            return Error::TooLarge(format!(
+                "{limit} bytes of device memory are too few for blocks of the mesh{why}; allow {enough} bytes or more{finer}"
+            ));
+        }
+        let block = if self.sources.len() == 1 { "a block" } else { "a pair of blocks" };
+        let takes = if bytes == u64::MAX { "more than 32-bit indices reach".into() } else { format!("about {bytes} bytes") };
+        Error::TooLarge(format!(
+            "{limit} bytes of device memory are too few: {block} of {tets} tetrahedra, which is not cut any further, takes {takes}{why}{finer}"
+        ))
     }
 
     /// An amount of memory above `least` in which all blocks fit: the first of a sequence that grows by half.

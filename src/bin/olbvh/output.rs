@@ -79,8 +79,8 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     if !folder(&destination).is_dir() {
         return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(&destination).display())));
     }
-    drop(OutputFile::create(path)?);
     begin(path);
+    drop(OutputFile::create(path)?); // better refused now than after the work
     Ok(())
 }
 
