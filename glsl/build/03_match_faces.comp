@@ -1,6 +1,6 @@
 #version 460
 // Finds the two tetrahedra that share each face (SPEC 2.3) with a hash table with open addressing. A face is searched
-// for first in the slots near the place of its smallest vertex, which its neighbours in the file have just used, so
+// for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so
 // that this memory is likely to be cached; then anywhere in the table. mates[face] receives the other face (see
 // mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
 #include "shared/kernel.glsl"
@@ -57,8 +57,8 @@ void main() {
             uvec3 face = face_of(ids, f);
             bool positive = (vol >= 0.0) == ((r[f] & 1u) == 1u);
             uint me = (4u * t + f) | (positive ? SIDE : 0u);
-            uint h = mix_bits(face.y ^ mix_bits(face.z));
-            uint near_base = min(face.x * near_slots, slots - near_slots), place, unused;
+            uint h = mix_bits(face.x ^ mix_bits(face.z));
+            uint near_base = min(face.y * near_slots, slots - near_slots), place, unused;
             umulExtended(h, near_slots, place, unused);
             uint probe = 0u;
             for (; probe < MAX_PROBES; ++probe) {
@@ -66,7 +66,7 @@ void main() {
                 place = place + 1u == near_slots ? 0u : place + 1u;
                 // Every probe is hashed anew: where the faces of many vertices crowd, long stretches of the table are
                 // full.
-                if (probe >= NEAR_PROBES) umulExtended(mix_bits(h ^ face.x ^ probe * 0x9e3779b9u), slots, slot, unused);
+                if (probe >= NEAR_PROBES) umulExtended(mix_bits(h ^ face.y ^ probe * 0x9e3779b9u), slots, slot, unused);
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
                 uint other_face = other & ~SIDE;
