@@ -31,8 +31,8 @@ void main() {
     const float FAR = uintBitsToFloat(LIMIT);
     vec3 lo = vec3(FAR), hi = vec3(-FAR);
     uint bad_cells = 0u;
-    uint begin = group_index() * share, end = min(begin + share, tets);
-    for (uint t = begin + local_index(); t < end; t += WORKGROUP) {
+    uvec2 items = items_of_share(share, tets);
+    for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         uvec4 v = words(cells.at[t]);
         bool ok = max(max(v.x, v.y), max(v.z, v.w)) < points && v.x != v.y && v.x != v.z && v.x != v.w && v.y != v.z && v.y != v.w && v.z != v.w;
         if (ok) {

@@ -32,8 +32,8 @@ void main() {
     Grid g = grid.at[0];
     uvec2 sums[12];
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
-    uint begin = group_index() * share, end = min(begin + share, tets);
-    for (uint t = begin + local_index(); t < end; t += WORKGROUP) {
+    uvec2 items = items_of_share(share, tets);
+    for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);
         vec3 a = position(ids.x, stride), b = position(ids.y, stride), c = position(ids.z, stride), d = position(ids.w, stride);

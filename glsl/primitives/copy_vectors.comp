@@ -9,9 +9,6 @@ BUFFER16(0, readonly, uvec4, from)
 BUFFER16(1, writeonly, uvec4, to)
 
 void main() {
-    uint first = group_index() * WORKGROUP * ROWS + local_index();
-    for (uint row = 0u; row < ROWS; ++row) {
-        uint i = first + row * WORKGROUP;
-        if (i < count) to.at[i] = from.at[i];
-    }
+    uvec2 items = items_of_share(WORKGROUP * ROWS, count);
+    for (uint i = items.x; i < items.y; i += gl_SubgroupSize) to.at[i] = from.at[i];
 }

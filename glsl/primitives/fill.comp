@@ -8,9 +8,6 @@ END_ARGUMENTS
 BUFFER(0, writeonly, uint, to)
 
 void main() {
-    uint first = group_index() * WORKGROUP * ROWS + local_index();
-    for (uint row = 0u; row < ROWS; ++row) {
-        uint i = first + row * WORKGROUP;
-        if (i < count) to.at[i] = value;
-    }
+    uvec2 items = items_of_share(WORKGROUP * ROWS, count);
+    for (uint i = items.x; i < items.y; i += gl_SubgroupSize) to.at[i] = value;
 }

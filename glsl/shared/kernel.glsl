@@ -31,6 +31,7 @@
     name##Block name = name##Block(address[slot]);
 #endif
 #define BUFFER(slot, access, T, name) ALIGNED_BUFFER(4, slot, access, T, name)
+#define BUFFER8(slot, access, T, name) ALIGNED_BUFFER(8, slot, access, T, name)
 // Elements of 16 bytes at addresses that are multiples of 16: one load each.
 #define BUFFER16(slot, access, T, name) ALIGNED_BUFFER(16, slot, access, T, name)
 
@@ -51,6 +52,14 @@ uint local_index() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocat
 
 // The first of the ROWS consecutive items of this invocation.
 uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
+
+// The first item of this invocation, and the end, where a workgroup takes `share` items (a multiple of WORKGROUP) of
+// `count`; then every gl_SubgroupSize-th. A subgroup takes consecutive items: processors run the subgroups of a workgroup
+// one after the other, and read memory faster in order.
+uvec2 items_of_share(uint share, uint count) {
+    uint each = share / gl_NumSubgroups, begin = group_index() * share + gl_SubgroupID * each;
+    return uvec2(begin + gl_SubgroupInvocationID, min(begin + each, count));
+}
 
 // The item of this invocation, where each takes one.
 uint item_index() { return group_index() * WORKGROUP + local_index(); }
