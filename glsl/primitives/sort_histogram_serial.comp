@@ -7,6 +7,7 @@ ARGUMENTS(3)
     uint count;
     uint shift;
     uint mask; // of the digit: the last pass may have fewer bits
+    uint spacing; // words from one key to the next
 END_ARGUMENTS
 BUFFER(0, readonly, uint, live)
 BUFFER(1, readonly, uint, keys)
@@ -23,7 +24,7 @@ void main() {
     uint first = tile * ROWS;
     uint end = min(n, first + ROWS);
     for (uint i = first; i < end; ++i) {
-        uint d = keys.at[i] >> shift & mask;
+        uint d = keys.at[i * spacing] >> shift & mask;
         counts.at[d * stride + tile] += 1u;
     }
 }

@@ -2,16 +2,17 @@
 
 use super::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{
     SortHistogramBallot, SortHistogramBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
-    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec,
+    SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortSplitPairs, SortSplitPairsSpec, SortTarget,
 };
 
 /// Scratch memory of a sort.
 #[derive(Clone, Copy, Debug)]
 pub struct SortScratch {
-    keys: BufferRef,
+    /// A copy of the pairs: serial tiles keep key and value side by side, others first all keys and then all values.
+    pairs: BufferRef,
     values: BufferRef,
     table: BufferRef,
     arguments: BufferRef,
@@ -37,9 +38,11 @@ impl SortScratch {
                 format!("{max} pairs in tiles of {}; shaders number {} counts at most: larger tiles make fewer", target.tile(), i32::MAX);
             return Err(Error::TooLarge(message));
         }
+        let half = (4 * u64::from(max)).next_multiple_of(ALIGNMENT);
+        let pairs = arena.take(2 * half)?;
         Ok(Self {
-            keys: arena.words(u64::from(max))?,
-            values: arena.words(u64::from(max))?,
+            pairs,
+            values: pairs.part(half, half),
             table: arena.words(table)?,
             arguments: arena.words(3)?,
             table_length: arena.words(1)?,
@@ -91,42 +94,91 @@ pub fn cmd_sort_pairs(
         Some(_) => Count::device(table_max, scratch.table_length),
         None => Count::host(table_max),
     };
-    let (mut from, mut to) = ((keys, values), (scratch.keys, scratch.values));
-    for pass in 0..passes {
-        r.barrier("keys → sort.histogram");
-        // 1 (histogram): counts[digit][tile]. 2 (scan): places. 3 (scatter): moves the pairs.
-        let shift = pass * digit_bits;
-        let mask = (1 << digit_bits.min(bits - shift)) - 1;
-        let (counts, n) = (scratch.table, count.max);
-        let (workgroup, rows) = (target.workgroup, target.rows);
-        if target.serial {
-            let spec = SortHistogramSerialSpec { workgroup, rows, digit_bits };
-            r.dispatch(&SortHistogramSerial { live, keys: from.0, counts, count: n, shift, mask }, spec, groups)?;
-        } else {
-            let spec = SortHistogramBallotSpec { workgroup, rows, digit_bits };
-            r.dispatch(&SortHistogramBallot { live, keys: from.0, counts, count: n, shift, mask }, spec, groups)?;
-        }
-        cmd_exclusive_scan(r, counts, counts, scratch.total, table, &scratch.scan)?;
+    let sort = PairSort { keys, values, count, live, passes, digit_bits, bits, groups, table, scratch };
+    if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target) }
+}
+
+/// What all passes of a sort have in common.
+struct PairSort<'a> {
+    keys: BufferRef,
+    values: BufferRef,
+    count: Count,
+    live: BufferRef,
+    passes: u32,
+    digit_bits: u32,
+    bits: u32,
+    groups: Groups,
+    /// Length of the table of counts.
+    table: Count,
+    scratch: &'a SortScratch,
+}
+
+impl PairSort<'_> {
+    /// Position of a pass's digit in the keys, and its mask.
+    fn digit(&self, pass: u32) -> (u32, u32) {
+        let shift = pass * self.digit_bits;
+        (shift, (1 << self.digit_bits.min(self.bits - shift)) - 1)
+    }
+
+    /// From counts[digit][tile] to places.
+    fn cmd_scan(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let SortScratch { table, total, scan, .. } = *self.scratch;
+        cmd_exclusive_scan(r, table, table, total, self.table, &scan)?;
         r.barrier("sort.scan → sort.scatter");
-        let (sorted_keys, sorted_values) = to;
-        if target.serial {
-            let spec = SortScatterSerialSpec { workgroup, rows, digit_bits };
-            let arguments =
-                SortScatterSerial { live, keys: from.0, values: from.1, places: counts, sorted_keys, sorted_values, count: n, shift, mask };
-            r.dispatch(&arguments, spec, groups)?;
-        } else {
-            let spec = SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups: workgroup / gpu.subgroup_size().max(1) };
-            let arguments =
-                SortScatterBallot { live, keys: from.0, values: from.1, places: counts, sorted_keys, sorted_values, count: n, shift, mask };
-            r.dispatch(&arguments, spec, groups)?;
+        Ok(())
+    }
+
+    /// Serial tiles. Even passes write pairs of a key and a value, which odd passes read: half as many scattered writes
+    /// or reads as if keys and values were apart all the time.
+    fn cmd_serial(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
+        let Self { keys, values, live, passes, digit_bits, groups, .. } = *self;
+        let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
+        let SortScratch { pairs, table: places, .. } = *self.scratch;
+        for pass in 0..passes {
+            let (shift, mask) = self.digit(pass);
+            let from_pairs = pass % 2;
+            let (keys_at, spacing) = if from_pairs == 0 { (keys, 1) } else { (pairs, 2) };
+            r.barrier("keys → sort.histogram");
+            let histogram = SortHistogramSerial { live, keys: keys_at, counts: places, count, shift, mask, spacing };
+            r.dispatch(&histogram, SortHistogramSerialSpec { workgroup, rows, digit_bits }, groups)?;
+            self.cmd_scan(r)?;
+            let scatter = SortScatterSerial { live, keys, values, pairs, places, count, shift, mask };
+            r.dispatch(&scatter, SortScatterSerialSpec { workgroup, rows, digit_bits, from_pairs }, groups)?;
         }
-        std::mem::swap(&mut from, &mut to);
+        if passes % 2 == 1 {
+            r.barrier("sort.scatter → sort.split");
+            let split = SortSplitPairs { live, pairs, keys, values, count };
+            r.dispatch(&split, SortSplitPairsSpec { workgroup, rows, digit_bits }, groups)?;
+        }
+        Ok(())
     }
-    if passes % 2 == 1 {
-        r.barrier("sort.scatter → sort.copy");
-        let bytes = 4 * u64::from(count.max);
-        r.copy(scratch.keys.part(0, bytes), keys);
-        r.copy(scratch.values.part(0, bytes), values);
+
+    /// Tiles of whole workgroups.
+    fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
+        let Self { keys, values, live, passes, digit_bits, groups, .. } = *self;
+        let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
+        let max_subgroups = workgroup / r.gpu().subgroup_size().max(1);
+        let (counts, bytes) = (self.scratch.table, 4 * u64::from(count));
+        let copy = (self.scratch.pairs.part(0, bytes), self.scratch.values);
+        let (mut from, mut to) = ((keys, values), copy);
+        for pass in 0..passes {
+            let (shift, mask) = self.digit(pass);
+            r.barrier("keys → sort.histogram");
+            let histogram = SortHistogramBallot { live, keys: from.0, counts, count, shift, mask };
+            r.dispatch(&histogram, SortHistogramBallotSpec { workgroup, rows, digit_bits }, groups)?;
+            self.cmd_scan(r)?;
+            let (sorted_keys, sorted_values) = to;
+            let spec = SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups };
+            let scatter =
+                SortScatterBallot { live, keys: from.0, values: from.1, places: counts, sorted_keys, sorted_values, count, shift, mask };
+            r.dispatch(&scatter, spec, groups)?;
+            std::mem::swap(&mut from, &mut to);
+        }
+        if passes % 2 == 1 {
+            r.barrier("sort.scatter → sort.copy");
+            r.copy(copy.0, keys);
+            r.copy(copy.1.part(0, bytes), values);
+        }
+        Ok(())
     }
-    Ok(())
 }
