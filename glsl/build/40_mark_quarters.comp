@@ -18,12 +18,12 @@ BUFFER(6, READ_WRITE, uint, p)
 #include "shared/quarters.glsl"
 
 void main() {
-    uint n = min(entries.at[0], capacity), first = first_item();
-    if (first == 0u) grid.at[0].ids = id_mask;
-    if (first >= n || status.at[0].overflow != 0u) return;
+    uvec2 items = items_of_share(WORKGROUP * ROWS, min(entries.at[0], capacity));
+    if (items.x == 0u) grid.at[0].ids = id_mask;
+    if (status.at[0].overflow != 0u) return;
     Grid g = grid.at[0];
     g.ids = id_mask;
-    for (uint i = first; i < min(n, first + ROWS); ++i) {
+    for (uint i = items.x; i < items.y; i += gl_SubgroupSize) {
         uvec4 ids = words(cells.at[p.at[i]]);
         uvec3 lo = uvec3(1023u), hi = uvec3(0u);
         for (uint k = 0u; k < 4u; ++k) {
