@@ -12,6 +12,7 @@ ARGUMENTS(7)
     uint tets;
     uint slots;      // of the table
     uint near_slots; // of the table per vertex, searched first
+    uint share;      // tetrahedra per workgroup
 END_ARGUMENTS
 RECORDS(0, vec4, vertices)
 RECORDS(1, uvec4, cells)
@@ -20,6 +21,8 @@ BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled wit
 BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
 BUFFER(5, READ_WRITE, MeshStatus, status)
 BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
+
+#include "shared/bad.glsl"
 
 const uint NEAR_PROBES = 16u;
 const uint MAX_PROBES = 8192u;
@@ -40,18 +43,18 @@ uvec3 face_of(uvec4 v, uint f) {
 }
 
 void main() {
-    uint t = item_index();
-    bool live = t < tets && (bad.at[min(t, tets - 1u) >> 5u] >> (t & 31u) & 1u) == 0u;
     uint without_volume = 0u, negative = 0u;
-    if (live) {
+    uvec2 items = items_of_share(share, tets);
+    for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
+        if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);
         Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
         float vol = volume(tet);
         // The sign of the volume in the caller's order of vertices follows from the parity of the permutation.
         uvec4 r = tet.rank;
         uint inversions = uint(r.y < r.x) + uint(r.z < r.x) + uint(r.w < r.x) + uint(r.z < r.y) + uint(r.w < r.y) + uint(r.w < r.z);
-        without_volume = uint(vol == 0.0);
-        negative = uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
+        without_volume += uint(vol == 0.0);
+        negative += uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
         if (vol == 0.0) atomicOr(flat_cells.at[t >> 5u], 1u << (t & 31u));
         for (uint f = 0u; f < 4u; ++f) {
             uvec3 face = face_of(ids, f);

@@ -5,6 +5,7 @@
 #include "shared/mates.glsl"
 ARGUMENTS(5)
     uint tets;
+    uint share; // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER(0, readonly, uint, bad)
 BUFFER(1, readonly, uint, flat_cells) // one bit per tetrahedron, set if it has no volume
@@ -16,9 +17,10 @@ BUFFER(4, READ_WRITE, MeshStatus, status)
 bool is_flat(uint t) { return (flat_cells.at[t >> 5u] >> (t & 31u) & 1u) != 0u; }
 
 void main() {
-    uint t = item_index();
-    uint on_boundary = 0u;
-    if (t < tets) {
+    uint boundary_cells = 0u;
+    uvec2 items = items_of_share(share, tets);
+    for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
+        uint on_boundary = 0u;
         uvec4 mates = neighbours.at[t], across = uvec4(NONE);
         if (!is_bad(t)) {
             for (uint f = 0u; f < 4u; ++f) {
@@ -33,7 +35,8 @@ void main() {
             if (on_boundary != 0u) atomicOr(boundary.at[t >> 5u], 1u << (t & 31u));
         }
         neighbours.at[t] = across;
+        boundary_cells += on_boundary;
     }
-    on_boundary = subgroupAdd(on_boundary);
-    if (on_boundary > 0u && subgroupElect()) atomicAdd(status.at[0].boundary, on_boundary);
+    boundary_cells = subgroupAdd(boundary_cells);
+    if (boundary_cells > 0u && subgroupElect()) atomicAdd(status.at[0].boundary, boundary_cells);
 }

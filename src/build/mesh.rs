@@ -16,7 +16,7 @@ use std::sync::Arc;
 /// Most tetrahedra of one mesh: a face number must fit 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
 /// Most workgroups of a kernel that ends with a sum over all tetrahedra.
-const SUMMING_GROUPS: u32 = 256;
+const SUMMING_GROUPS: u32 = 1024;
 
 /// A mesh in device memory, owned by the caller or by this crate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -149,7 +149,8 @@ fn cmd_prepare(
     let MeshArrays { status, grid, bad, boundary, vertices, neighbours } = *arrays;
     let workgroup = r.gpu().target().each;
     let once = r.gpu().subgroup_size();
-    let all_tets = Groups::Count(tets.div_ceil(workgroup));
+    let share = summing_share(tets, workgroup);
+    let shares = Groups::Count(tets.div_ceil(share));
     r.stage("mesh.clear", |r| {
         r.fill(status, 0);
         r.fill(bad, 0);
@@ -160,9 +161,8 @@ fn cmd_prepare(
     })?;
     r.barrier("mesh.clear → mesh.check_cells");
     r.stage("mesh.bounds", |r| {
-        let share = summing_share(tets, workgroup);
         let spec = CheckCellsSpec { workgroup, ..Default::default() };
-        r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, share }, spec, Groups::Count(tets.div_ceil(share)))?;
+        r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, share }, spec, shares)?;
         r.barrier("mesh.check_cells → mesh.make_grid");
         if let Some(given) = given {
             r.copy(given, grid.part(0, given.size));
@@ -181,13 +181,13 @@ fn cmd_prepare(
         let near_slots = (slots / points.max(1)).max(1);
         let spec = MatchFacesSpec { workgroup, ..Default::default() };
         r.dispatch(
-            &MatchFaces { vertices, cells, bad, table, mates: neighbours, status, flat_cells, tets, slots, near_slots },
+            &MatchFaces { vertices, cells, bad, table, mates: neighbours, status, flat_cells, tets, slots, near_slots, share },
             spec,
-            all_tets,
+            shares,
         )?;
         r.barrier("mesh.match_faces → mesh.find_neighbours");
         let spec = FindNeighboursSpec { workgroup, ..Default::default() };
-        r.dispatch(&FindNeighbours { bad, flat_cells, neighbours, boundary, status, tets }, spec, all_tets)
+        r.dispatch(&FindNeighbours { bad, flat_cells, neighbours, boundary, status, tets, share }, spec, shares)
     })
 }
 
