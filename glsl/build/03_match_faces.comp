@@ -1,8 +1,9 @@
 #version 460
 // Finds the two tetrahedra that share each face (SPEC 2.3) with a hash table with open addressing. A face is searched
-// for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so
-// that this memory is likely to be cached; then anywhere in the table. mates[face] receives the other face (see
-// mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
+// for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so that
+// this memory is likely to be cached; then anywhere in the table. (The smallest vertex of a face would not do: a vertex
+// before all its neighbours is that of all its faces, which its slots cannot hold.) mates[face] receives the other face
+// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -21,7 +22,6 @@ BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled wit
 BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
 BUFFER(5, READ_WRITE, MeshStatus, status)
 BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
-
 #include "shared/bad.glsl"
 
 const uint NEAR_PROBES = 16u;

@@ -47,24 +47,24 @@ struct Point {
     vec3 x;
 };
 
-// The same before it is normalised. Points in an order lie anywhere in memory, so each is fetched while the one before it
-// is located.
-struct Fetched {
-    uint i;
-    vec3 at;
-};
+// The points of a run in an order lie anywhere in memory, so they are fetched together: their cache misses overlap.
+uint run_i[RUN];
+vec3 run_at[RUN];
 
-Fetched fetch(uint place) {
-    uint i = GUIDE == ORDER ? guides.at[place] : place;
-    return Fetched(i, vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]));
-}
+vec3 coordinates(uint i) { return vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]); }
 
-// The point at a place before `end`; `next` is the one after it.
-Point point_at(Grid g, uint place, uint end, inout Fetched next) {
-    if (GUIDE != ORDER) next = fetch(place);
-    Point a = Point(next.i, next.at, normalise(g, next.at));
-    if (GUIDE == ORDER) next = fetch(min(place + 1u, end - 1u));
-    return a;
+// The point at a place of this invocation's run.
+Point point_at(Grid g, uint place, uint end) {
+    if (GUIDE != ORDER) {
+        vec3 at = coordinates(place);
+        return Point(place, at, normalise(g, at));
+    }
+    uint k = place % RUN;
+    if (k == 0u) {
+        for (uint j = 0u; j < RUN; ++j) run_i[j] = guides.at[min(place + j, end - 1u)];
+        for (uint j = 0u; j < RUN; ++j) run_at[j] = coordinates(run_i[j]);
+    }
+    return Point(run_i[k], run_at[k], normalise(g, run_at[k]));
 }
 
 void main() {
@@ -72,8 +72,7 @@ void main() {
     if (place >= count) return;
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
-    Fetched next = fetch(place);
-    Point a = point_at(g, place, end, next);
+    Point a = point_at(g, place, end);
     uint from = NONE; // where the next stride starts
     uint left = 0u;   // steps that this stride may still take; 0: it has ended
     bool in_leaf = part > 0u; // whether this stride started in the point's leaf
@@ -92,7 +91,7 @@ void main() {
             if (sides.clear) {
                 owners.at[a.i] = stand.t;
                 barycentrics.at[a.i] = record(last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(stand, sides));
-                if (++place < end) a = point_at(g, place, end, next);
+                if (++place < end) a = point_at(g, place, end);
                 left = HINTED;
                 in_leaf = false;
             } else {
@@ -128,7 +127,7 @@ void main() {
         owners.at[a.i] = last == 0u ? best.owner : owner;
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
-            a = point_at(g, place, end, next);
+            a = point_at(g, place, end);
             // If the list continues in the next part, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;
