@@ -1,7 +1,6 @@
 #version 460
 // Radix sort, serial tiles: splits pairs into keys and values, after an odd number of passes.
 #include "shared/kernel.glsl"
-#include "shared/sort.glsl"
 ARGUMENTS(4)
     uint count;
 END_ARGUMENTS

@@ -67,7 +67,7 @@ impl Row {
         let (cpu, simt) = (true, false);
         match self {
             // Few long tiles, and no barriers.
-            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),   query: 64 },
+            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),  query: 64 },
             Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256 },
             Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128 },
             Self::Amd      => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64 },

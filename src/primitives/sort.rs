@@ -57,7 +57,7 @@ impl SortScratch {
 ///
 /// Starts with a barrier, so `keys` and `values` need none before, unless there is nothing to sort (fewer than two
 /// pairs, or no bits). A count in device memory must be visible before. Ends without a barrier; the last writes are
-/// those of compute shaders or, after an odd number of passes, transfers.
+/// those of compute shaders or transfers.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -128,8 +128,8 @@ impl PairSort<'_> {
         Ok(())
     }
 
-    /// Serial tiles. Even passes write pairs of a key and a value, which odd passes read: half as many scattered writes
-    /// or reads as if keys and values were apart all the time.
+    /// Serial tiles. Even passes write pairs of a key and a value, half as many scattered writes as of keys and values
+    /// apart; odd passes read these pairs.
     fn cmd_serial(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
         let Self { keys, values, live, passes, digit_bits, groups, .. } = *self;
         let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
@@ -148,7 +148,7 @@ impl PairSort<'_> {
         if passes % 2 == 1 {
             r.barrier("sort.scatter → sort.split");
             let split = SortSplitPairs { live, pairs, keys, values, count };
-            r.dispatch(&split, SortSplitPairsSpec { workgroup, rows, digit_bits }, groups)?;
+            r.dispatch(&split, SortSplitPairsSpec { workgroup, rows }, groups)?;
         }
         Ok(())
     }
