@@ -136,6 +136,41 @@ fn locate_finds_points_and_values() {
     assert_eq!(table("a.csv", &[]), table("b.csv", &["--coherent"]));
 }
 
+/// `-` stands for standard input and output; they carry what the files would, and nothing else.
+#[test]
+fn results_go_to_standard_output() {
+    use std::io::Write as _;
+    let (folder, temporary) = (TempDir::new().unwrap(), TempDir::new().unwrap());
+    let piped = |arguments: &[&str], input: &str| {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_olbvh"));
+        command.args(arguments).args(["--device", "cpu"]).current_dir(folder.path()).env("TMPDIR", temporary.path());
+        command.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).stderr(std::process::Stdio::piped());
+        let mut child = command.spawn().unwrap();
+        child.stdin.take().unwrap().write_all(input.as_bytes()).unwrap();
+        child.wait_with_output().unwrap()
+    };
+    let points = "0.5,0.25,0.125\n9,9,9\n";
+    std::fs::write(folder.path().join("p.csv"), points).unwrap();
+    for (arguments, named, file) in [
+        (vec!["locate", "kuhn:3,3,3", "-"], "p.csv", "o.csv"),
+        (vec!["locate", "kuhn:3,3,3", "-", "--all"], "p.csv", "all.csv"),
+        (vec!["overlap", "kuhn:2,2,2", "kuhn:3,3,3"], "", "o.json"),
+        (vec!["render", "kuhn:2,2,2", "--size", "9"], "", "a.png"),
+    ] {
+        let of_file: Vec<&str> = arguments.iter().map(|&a| if a == "-" { named } else { a }).collect();
+        json(folder.path(), &[&of_file[..], &["-o", file, "--device", "cpu"]].concat());
+        let out = piped(&[&arguments[..], &["-o", "-"]].concat(), points);
+        assert_eq!(out.status.code(), Some(0), "{arguments:?}: {}", text(&out.stderr));
+        assert!(out.stdout == std::fs::read(folder.path().join(file)).unwrap(), "{arguments:?}");
+        assert!(text(&out.stderr).starts_with("-: "), "the summary: {}", text(&out.stderr));
+    }
+    let both = piped(&["render", "kuhn:2,2,2", "-o", "-", "--json"], "");
+    assert!(both.status.code() == Some(2) && text(&both.stderr).contains("--json") && both.stdout.is_empty());
+    let broken = piped(&["locate", "kuhn:2,2,2", "-", "-o", "-"], "1,2,3\n4,five,6\n");
+    assert!(broken.status.code() == Some(3) && text(&broken.stderr).contains("-: line 2: `five`"), "{}", text(&broken.stderr));
+    assert_eq!(std::fs::read_dir(temporary.path()).unwrap().count(), 0, "nothing is left");
+}
+
 #[test]
 fn devices_are_listed() {
     let folder = TempDir::new().unwrap();
@@ -274,9 +309,7 @@ fn results_go_to_files_of_any_folder() {
     assert!(Command::new("mkfifo").arg(place("pipe.png")).status().unwrap().success());
     std::fs::create_dir(place("folder.png")).unwrap();
     std::os::unix::fs::symlink("/dev/null", place("null.png")).unwrap();
-    for (output, part) in
-        [("pipe.png", "streams or devices"), ("null.png", "streams or devices"), ("-", "streams"), ("folder.png", "a folder")]
-    {
+    for (output, part) in [("pipe.png", "stream or device"), ("null.png", "stream or device"), ("folder.png", "a folder")] {
         let message = render(2, output);
         assert!(message.contains(part), "{output}: {message}");
     }

@@ -48,7 +48,7 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::mesh::Mesh;
 use detect::Format;
-pub use points::load_points;
+pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
 use source::Source;
 pub use write::{

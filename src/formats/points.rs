@@ -1,11 +1,12 @@
 //! Readers for points to locate: NumPy arrays and text tables.
 
+use std::io::Read;
 use std::path::Path;
 
 use super::detect::ending;
 use super::npy;
 use super::source::{Source, Tokens, parse_float, printable};
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
 /// point per line and columns separated by commas, semicolons or white space. The first line of a table may name the
@@ -15,9 +16,22 @@ use crate::error::Result;
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
 pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
-    let source = Source::read(path.as_ref(), ".npy or a table of text")?;
-    if source.bytes.starts_with(npy::MAGIC) || ending(path.as_ref()) == "npy" && source.bytes.is_empty() {
-        return npy::read_points(&source);
+    points(&Source::read(path.as_ref(), ".npy or a table of text")?)
+}
+
+/// Reads points from a stream, such as standard input, in the formats of [`load_points`].
+///
+/// # Errors
+/// As for [`load_points`]; the stream's name is `-`.
+pub fn read_points(mut stream: impl Read) -> Result<Vec<[f64; 3]>> {
+    let (path, mut bytes) = (Path::new("-"), Vec::new());
+    stream.read_to_end(&mut bytes).map_err(|source| Error::Io { path: path.into(), source })?;
+    points(&Source::new(path, bytes))
+}
+
+fn points(source: &Source) -> Result<Vec<[f64; 3]>> {
+    if source.bytes.starts_with(npy::MAGIC) || ending(&source.path) == "npy" && source.bytes.is_empty() {
+        return npy::read_points(source);
     }
     if source.bytes.starts_with(b"PK\x03\x04") {
         return Err(source.error("an archive (.npz?); save the array of points as .npy"));
@@ -25,7 +39,7 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
     if let Some(at) = source.bytes.iter().position(|&b| b == 0) {
         return Err(source.error_byte(at, "a byte 0: neither a .npy file nor a table of text"));
     }
-    table(&source)
+    table(source)
 }
 
 fn table(source: &Source) -> Result<Vec<[f64; 3]>> {

@@ -3,10 +3,10 @@
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
-use crate::output::{self, Progress};
+use crate::output::{Destination, Progress};
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Points};
-use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, write_json, write_located, write_npy};
+use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
 use olbvh::options::Fineness;
 use olbvh::query::{self, LocateOptions};
@@ -22,6 +22,7 @@ Examples:
   olbvh locate bracket.vtu points.csv -o values.csv
   olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
   olbvh locate bracket.vtu points.csv -o cells.csv --all   every cell that contains the point
+  echo 40,30,20 | olbvh locate bracket.vtu - -o -   without files
 
 Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder, the first \
 along the curve). Where cells of the mesh overlap each other, another of the cells that contain the point may be named, which depends on \
@@ -35,9 +36,10 @@ With --all, the result has one row per point and cell: .csv, .npy (n×2) or .jso
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers) or .csv (x,y,z).
+    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers) or .csv (x,y,z). `-`: standard input.
     points: PathBuf,
-    /// Output file; its extension selects the format: .npy, .npz, .csv, .vtu or .json (with --all .csv, .npy or .json).
+    /// Output file; its extension selects the format: .csv, .npy, .npz, .vtu or .json (with --all .csv, .npy or .json).
+    /// `-`: a .csv on standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Name of the field to interpolate. Default: the first field of points, or else the first field of cells.
@@ -74,13 +76,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", args.tolerance)));
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
-    let format = output::announce(&args.output, formats, &[&args.mesh, &args.points])?;
+    let output = Destination::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
-    let points = load_points(&args.points).map_err(Failure::input)?;
+    let points = if args.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&args.points) };
+    let points = points.map_err(Failure::input)?;
     if points.is_empty() {
         common.remark(format_args!("{}: no points in it", args.points.display()));
     }
@@ -95,14 +98,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let done = if args.all {
         let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
-        Done { found: every_owner(args, format, mesh, &owners)?, took }
+        Done { found: every_owner(&output, mesh, &owners)?, took }
     } else {
         let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();
         let bary: Vec<[f32; 4]> = located.iter().map(|l| l.bary).collect();
         let value: Vec<f32> = located.iter().map(|l| l.value).collect();
-        write_located(&args.output, &Located { points: &points, owner: &owner, bary: &bary, value: field.map(|_| &value[..]) })?;
+        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &bary, value: field.map(|_| &value[..]) })?;
         Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), took }
     };
     drop(progress);
@@ -125,11 +128,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         engine.name(),
         in_blocks(&took)
     );
-    output::summary(common, &json, &text)
+    output.finish(common, &json, &text)
 }
 
 /// Writes every owner of every point as rows (point, cell); returns how many points have an owner.
-fn every_owner(args: &Args, format: OutputFormat, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
+fn every_owner(output: &Destination, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
     let cells = |tets: &Vec<u32>| {
         let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
         cells.sort_unstable();
@@ -138,10 +141,10 @@ fn every_owner(args: &Args, format: OutputFormat, mesh: &Mesh, owners: &[Vec<u32
     };
     let owners: Vec<Vec<u32>> = owners.iter().map(cells).collect();
     let rows: Vec<[u32; 2]> = (0..).zip(&owners).flat_map(|(i, cells)| cells.iter().map(move |&cell| [i, cell])).collect();
-    match format {
-        OutputFormat::Csv => write_rows(&args.output, &rows)?,
-        OutputFormat::Json => write_json(&args.output, &json!({ "owners": owners }))?,
-        _ => write_npy(&args.output, &[rows.len(), 2], rows.as_flattened())?,
+    match output.format {
+        OutputFormat::Csv => write_rows(output.path(), &rows)?,
+        OutputFormat::Json => write_json(output.path(), &json!({ "owners": owners }))?,
+        _ => write_npy(output.path(), &[rows.len(), 2], rows.as_flattened())?,
     }
     Ok(owners.iter().filter(|o| !o.is_empty()).count())
 }

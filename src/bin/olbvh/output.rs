@@ -10,8 +10,12 @@ use std::sync::{Mutex, PoisonError};
 
 /// Prints text, which ends with a newline, on standard output.
 pub fn print(text: &str) -> Outcome {
+    to_standard_output(|out| out.write_all(text.as_bytes()))
+}
+
+fn to_standard_output(write: impl FnOnce(&mut std::io::StdoutLock<'_>) -> std::io::Result<()>) -> Outcome {
     let mut out = std::io::stdout().lock();
-    out.write_all(text.as_bytes()).and_then(|()| out.flush()).map_err(|e| match e.kind() {
+    write(&mut out).and_then(|()| out.flush()).map_err(|e| match e.kind() {
         std::io::ErrorKind::BrokenPipe => Failure::Closed,
         _ => Failure::Failed(format!("standard output: {e}")),
     })
@@ -22,15 +26,18 @@ pub fn result(common: &Common, json: &serde_json::Value, text: &str) -> Outcome 
     if common.json { print(&format!("{json:#}\n")) } else { print(text) }
 }
 
-/// Results that have been announced and may be incomplete.
-static PENDING: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
+/// Results that have been announced and may be incomplete, and whether the file is itself a temporary one.
+static PENDING: Mutex<Vec<(PathBuf, bool)>> = Mutex::new(Vec::new());
 
 /// Makes Ctrl-C remove the temporary files of unfinished results and end the program with code 130, as is usual for
 /// shells.
 pub fn clean_up_on_interrupt() {
     let handler = || {
-        for path in PENDING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
+        for (path, temporary) in PENDING.lock().unwrap_or_else(PoisonError::into_inner).iter() {
             remove_parts(path);
+            if *temporary {
+                let _ = std::fs::remove_file(path);
+            }
         }
         let _ = writeln!(std::io::stderr(), "olbvh: interrupted");
         std::process::exit(130);
@@ -61,6 +68,51 @@ pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outc
     Ok(OutputFormat::of(path, formats)?)
 }
 
+/// The one file of a result, or standard output, for which `-` stands. What goes there is collected in a temporary
+/// file first: half a result could not be taken back.
+pub struct Destination {
+    name: PathBuf,
+    collected: Option<tempfile::TempPath>,
+    /// The format of the result.
+    pub format: OutputFormat,
+}
+
+impl Destination {
+    /// Announces a result like [`announce`]; standard output gets the first of `formats`, and does not go with
+    /// `--json`.
+    pub fn announce(name: &Path, formats: &[OutputFormat], inputs: &[&Path], common: &Common) -> Outcome<Self> {
+        let (collected, format) = match formats {
+            [first, ..] if name == Path::new("-") => {
+                if common.json {
+                    return Err(Failure::Usage("-o - and --json both need standard output; name a file for one of them".into()));
+                }
+                let file = tempfile::Builder::new().prefix("olbvh.").suffix(first.ending()).tempfile();
+                let file = file.map_err(|e| Failure::Failed(format!("no temporary file for the result: {e}")))?;
+                let path = file.into_temp_path();
+                pending(path.to_path_buf(), true);
+                (Some(path), *first)
+            }
+            _ => (None, announce(name, formats, inputs)?),
+        };
+        Ok(Self { name: name.into(), collected, format })
+    }
+
+    /// The file to write.
+    pub fn path(&self) -> &Path {
+        self.collected.as_deref().unwrap_or(&self.name)
+    }
+
+    /// Sends what was collected to standard output, and prints the summary, then on standard error.
+    pub fn finish(self, common: &Common, json: &serde_json::Value, text: &str) -> Outcome {
+        let Some(collected) = self.collected else { return summary(common, json, text) };
+        let failed = |e| Failure::Failed(format!("the collected result: {e}"));
+        let mut file = std::fs::File::open(&collected).map_err(failed)?;
+        to_standard_output(|out| std::io::copy(&mut file, out).map(drop))?;
+        common.remark(text.trim_end());
+        Ok(())
+    }
+}
+
 /// Announces a result with any extension: it must not be a folder, device, pipe or socket, nor one of the `inputs`, and
 /// its folder must exist and take new files.
 pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
@@ -69,7 +121,7 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
         return Err(Failure::Usage(format!("{}: a folder; name a file in it", path.display())));
     }
     if path == Path::new("-") || existing.is_some_and(|existing| !existing.is_file()) {
-        return Err(Failure::Usage(format!("{}: results go to files, not to streams or devices", path.display())));
+        return Err(Failure::Usage(format!("{}: this result goes to a file, not to a stream or device", path.display())));
     }
     let place = std::fs::canonicalize(path).ok();
     if place.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == place) {
@@ -86,7 +138,11 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
 
 /// Registers a file of a result that consists of several files, before it is written.
 pub fn begin(path: &Path) {
-    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push(destination(path));
+    pending(destination(path), false);
+}
+
+fn pending(path: PathBuf, temporary: bool) {
+    PENDING.lock().unwrap_or_else(PoisonError::into_inner).push((path, temporary));
 }
 
 /// Writes a text file, completely or not at all.

@@ -4,7 +4,7 @@ use crate::arguments::vector;
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{MemoryArgs, TreeArgs};
-use crate::output::{self, Progress};
+use crate::output::{Destination, Progress};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
 use olbvh::blocks::Meshes;
@@ -34,7 +34,8 @@ pub struct Args {
     a: PathBuf,
     /// Mesh B, likewise.
     b: PathBuf,
-    /// Output file: .json, or .vtu for the cells of A that intersect B as a mesh.
+    /// Output file: .json, or .vtu for the cells of A that intersect B as a mesh. `-`: the .json on standard output,
+    /// while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
     /// Also find all pairs of intersecting cells; only .json files hold them.
@@ -55,7 +56,8 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let format = output::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b])?;
+    let output = Destination::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b], common)?;
+    let format = output.format;
     if args.pairs && format != OutputFormat::Json {
         return Err(Failure::Usage(format!("{}: --pairs needs a .json file; a .vtu file holds no pairs", args.output.display())));
     }
@@ -91,13 +93,13 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let primitives = (a.tets.len() + b.tets.len()) as u64;
     let share = narrow as f64 / primitives.max(1) as f64;
     if format == OutputFormat::Vtu {
-        write_mesh(&args.output, &part(&a, &overlap.a))?;
+        write_mesh(output.path(), &part(&a, &overlap.a))?;
     } else {
         let mut result = json!({ "a": ids_a, "b": ids_b });
         if let Some(pairs) = &pairs {
             result["pairs"] = json!(pairs);
         }
-        write_json(&args.output, &result)?;
+        write_json(output.path(), &result)?;
     }
     let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
     let json = json!({
@@ -118,7 +120,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         milliseconds(seconds * 1e3),
         engine.name()
     );
-    output::summary(common, &json, &text)
+    output.finish(common, &json, &text)
 }
 
 /// Transforms the points of B into the coordinates of A: rotated, moved, and relative to A's origin.

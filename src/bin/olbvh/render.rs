@@ -4,7 +4,7 @@ use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Drawn};
 use crate::input::{self, MemoryArgs, TreeArgs};
-use crate::output::{self, Progress};
+use crate::output::{Destination, Progress};
 use crate::text::{grouped, in_blocks, milliseconds};
 use olbvh::blocks::View;
 use olbvh::error::Result;
@@ -38,7 +38,7 @@ drawn fast.";
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// Output file, a .png picture.
+    /// Output file, a .png picture. `-`: standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
     /// Name of the field to draw. Default: the first field of points, or else of cells; without any field, the height
@@ -108,7 +108,7 @@ struct Iso(Vec<f32>);
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    output::announce(&args.output, &[OutputFormat::Png], &[&args.mesh])?;
+    let output = Destination::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
     let mut options = args.tree.suited(Fineness::Pictures)?;
     let mut settings = args.settings()?;
     settings.check()?;
@@ -138,7 +138,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         ));
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
-    write_png(&args.output, settings.size[0], settings.size[1], &picture.pixels)?;
+    write_png(output.path(), settings.size[0], settings.size[1], &picture.pixels)?;
     let json = json!({
         "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi], "iso": settings.iso,
         "step": step, "samples": picture.samples, "skipped_samples": picture.skipped_samples, "found_samples": picture.found_samples,
@@ -159,7 +159,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         engine.name(),
         in_blocks(&took)
     );
-    output::summary(common, &json, &text)
+    output.finish(common, &json, &text)
 }
 
 impl Args {

@@ -26,7 +26,7 @@ pub struct Located<'a> {
 
 impl Located<'_> {
     /// Formats that [`write_located`] supports.
-    pub const FORMATS: [OutputFormat; 5] = [OutputFormat::Npy, OutputFormat::Npz, OutputFormat::Csv, OutputFormat::Vtu, OutputFormat::Json];
+    pub const FORMATS: [OutputFormat; 5] = [OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Npz, OutputFormat::Vtu, OutputFormat::Json];
 
     fn value(&self, i: usize) -> f32 {
         self.value.map_or(f32::NAN, |v| v[i])

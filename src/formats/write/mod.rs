@@ -48,15 +48,15 @@ pub enum OutputFormat {
 
 impl OutputFormat {
     const ALL: [(Self, &str); 9] = [
-        (Self::Npy, "npy"),
-        (Self::Npz, "npz"),
-        (Self::Csv, "csv"),
-        (Self::Vtu, "vtu"),
-        (Self::Vti, "vti"),
-        (Self::Png, "png"),
-        (Self::Svx, "svx"),
-        (Self::Json, "json"),
-        (Self::Md, "md"),
+        (Self::Npy, ".npy"),
+        (Self::Npz, ".npz"),
+        (Self::Csv, ".csv"),
+        (Self::Vtu, ".vtu"),
+        (Self::Vti, ".vti"),
+        (Self::Png, ".png"),
+        (Self::Svx, ".svx"),
+        (Self::Json, ".json"),
+        (Self::Md, ".md"),
     ];
 
     /// The format of `path`, which must be one of `allowed`. Call this before long work.
@@ -66,11 +66,16 @@ impl OutputFormat {
     pub fn of(path: impl AsRef<Path>, allowed: &[Self]) -> Result<Self> {
         let path = path.as_ref();
         let ending = ending(path);
-        let found = Self::ALL.iter().find(|(format, name)| *name == ending && allowed.contains(format));
+        let found = Self::ALL.iter().find(|(format, name)| name[1..] == ending && allowed.contains(format));
         found.map(|f| f.0).ok_or_else(|| {
-            let names: Vec<String> = Self::ALL.iter().filter(|f| allowed.contains(&f.0)).map(|f| format!(".{}", f.1)).collect();
+            let names: Vec<&str> = Self::ALL.iter().filter(|f| allowed.contains(&f.0)).map(|f| f.1).collect();
             Error::Invalid(format!("{}: the ending of the output must be one of {}", path.display(), names.join(", ")))
         })
+    }
+
+    /// The extension of files in this format, with its dot.
+    pub fn ending(self) -> &'static str {
+        Self::ALL.iter().find(|f| f.0 == self).map_or("", |f| f.1)
     }
 }
 
