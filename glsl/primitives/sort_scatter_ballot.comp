@@ -1,6 +1,6 @@
 #version 460
-// Radix sort, one tile per workgroup: equal digits of a subgroup find each other by ballots, so the order within a tile
-// is kept. A tile is processed row by row; the next place of every digit stays in shared memory.
+// Radix sort, one tile per workgroup, of which every subgroup takes consecutive rows: equal digits of a row find each
+// other by ballots, so the order within a tile is kept. Subgroups count by themselves and meet only once, for the places.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
 layout(constant_id = 3) const uint MAX_SUBGROUPS = 8; // at least WORKGROUP / subgroup size
@@ -16,8 +16,8 @@ BUFFER(3, readonly, uint, places)
 BUFFER(4, writeonly, uint, sorted_keys)
 BUFFER(5, writeonly, uint, sorted_values)
 
-shared uint running[DIGITS];
-shared uint row_counts[MAX_SUBGROUPS * DIGITS];
+// Per subgroup and digit: its pairs in the rows so far, and after all rows the place of its first pair.
+shared uint held[MAX_SUBGROUPS * DIGITS];
 
 void main() {
     uint n = min(count, live.at[0]);
@@ -26,12 +26,16 @@ void main() {
     uint stride = sort_stride(tiles);
     uint tile = group_index();
     if (tile >= tiles) return;
-    for (uint d = local_index(); d < DIGITS; d += WORKGROUP) running[d] = places.at[d * stride + tile];
+    uint own = gl_SubgroupID * DIGITS;
+    for (uint d = gl_SubgroupInvocationID; d < DIGITS; d += gl_SubgroupSize) held[own + d] = 0u;
+    subgroupBarrier();
+    uint first = tile * tile_items + gl_SubgroupID * gl_SubgroupSize * ROWS + gl_SubgroupInvocationID;
+    uint key[ROWS], rank[ROWS]; // of the pair in each row: its key, and how many of the subgroup's are before it
     for (uint row = 0u; row < ROWS; ++row) {
-        uint i = tile * tile_items + row * WORKGROUP + local_index();
+        uint i = first + row * gl_SubgroupSize;
         bool live_item = i < n;
-        uint key = live_item ? keys.at[i] : 0u;
-        uint d = key >> shift & mask;
+        key[row] = live_item ? keys.at[i] : 0u;
+        uint d = key[row] >> shift & mask;
         uvec4 peers = subgroupBallot(live_item);
         for (uint b = 0u; b < DIGIT_BITS; ++b) {
             bool bit = (d >> b & 1u) != 0u;
@@ -39,27 +43,27 @@ void main() {
             peers &= bit ? set : ~set;
         }
         uint before = subgroupBallotExclusiveBitCount(peers);
-        uint size = subgroupBallotBitCount(peers);
-        for (uint s = local_index(); s < gl_NumSubgroups * DIGITS; s += WORKGROUP) row_counts[s] = 0u;
-        barrier();
-        if (live_item && before == 0u) row_counts[gl_SubgroupID * DIGITS + d] = size;
-        barrier();
-        // Places of this row: for each digit, one invocation goes through the subgroups.
-        for (uint digit = local_index(); digit < DIGITS; digit += WORKGROUP) {
-            uint place = running[digit];
-            for (uint s = 0u; s < gl_NumSubgroups; ++s) {
-                uint c = row_counts[s * DIGITS + digit];
-                row_counts[s * DIGITS + digit] = place;
-                place += c;
-            }
-            running[digit] = place;
+        uint earlier = held[own + d];
+        rank[row] = earlier + before;
+        subgroupBarrier();
+        if (live_item && before == 0u) held[own + d] = earlier + subgroupBallotBitCount(peers);
+        subgroupBarrier();
+    }
+    barrier();
+    for (uint d = local_index(); d < DIGITS; d += WORKGROUP) {
+        uint place = places.at[d * stride + tile];
+        for (uint s = 0u; s < gl_NumSubgroups; ++s) {
+            uint pairs = held[s * DIGITS + d];
+            held[s * DIGITS + d] = place;
+            place += pairs;
         }
-        barrier();
-        if (live_item) {
-            uint place = row_counts[gl_SubgroupID * DIGITS + d] + before;
-            sorted_keys.at[place] = key;
-            sorted_values.at[place] = values.at[i];
-        }
-        barrier();
+    }
+    barrier();
+    for (uint row = 0u; row < ROWS; ++row) {
+        uint i = first + row * gl_SubgroupSize;
+        if (i >= n) break;
+        uint place = held[own + (key[row] >> shift & mask)] + rank[row];
+        sorted_keys.at[place] = key[row];
+        sorted_values.at[place] = values.at[i];
     }
 }

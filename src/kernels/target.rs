@@ -7,6 +7,8 @@ use std::borrow::Cow;
 /// Most iterations of a loop in a kernel. The self-test runs a loop of this length, since some drivers silently end
 /// longer ones.
 pub(crate) const LONGEST_LOOP: u32 = 32_768;
+/// Most pairs per invocation of a sort by ballots, which keeps them in registers.
+const MOST_BALLOT_ROWS: u32 = 64;
 /// Shared memory that every supported device has; rows of the table leave an eighth of it to the driver.
 const SHARED_BYTES: u32 = 16 << 10;
 
@@ -77,21 +79,15 @@ impl SortTarget {
         (passes, bits.div_ceil(passes).max(1))
     }
 
-    /// Bytes of shared memory: a table of digits per subgroup, and one for the workgroup.
+    /// Bytes of shared memory: a table of digits per subgroup.
     fn shared_bytes(self, subgroup: u32) -> u32 {
-        let tables = if self.serial { 0 } else { self.workgroup / subgroup.max(1) + 1 };
+        let tables = if self.serial { 0 } else { self.workgroup / subgroup.max(1) };
         (4 * tables) << self.digit_bits
     }
 
-    /// Loop iterations of the busiest invocation: digits and pairs if serial; otherwise, per row, the bits of a digit
-    /// and the digits of all subgroups.
-    fn iterations(self, subgroup: u32) -> u32 {
-        let digits = 1u32 << self.digit_bits;
-        if self.serial {
-            return self.rows + digits;
-        }
-        let tables = self.workgroup / subgroup.max(1);
-        self.rows * (self.digit_bits + (tables * digits).div_ceil(self.workgroup) + tables * digits.div_ceil(self.workgroup))
+    /// Loop iterations of an invocation that clears its digits and counts its pairs, if it does so serially.
+    fn iterations(self) -> u32 {
+        if self.serial { self.rows + (1 << self.digit_bits) } else { 0 }
     }
 }
 
@@ -157,6 +153,9 @@ impl Target {
                 return wrong(&format!("{name} is {rows}; it must be from 1 to {}", LONGEST_LOOP - 1));
             }
         }
+        if !self.sort.serial && self.sort.rows > MOST_BALLOT_ROWS {
+            return wrong(&format!("sort.rows is {}; with ballots, it must be from 1 to {MOST_BALLOT_ROWS}", self.sort.rows));
+        }
         if !(1..=12).contains(&self.sort.digit_bits) {
             return wrong(&format!("sort.digit_bits is {}; it must be from 1 to 12", self.sort.digit_bits));
         }
@@ -164,7 +163,7 @@ impl Target {
         if bytes > shared_bytes {
             return wrong(&format!("the sort takes {bytes} bytes of shared memory of {shared_bytes}; sort.digit_bits must be smaller"));
         }
-        let iterations = self.sort.iterations(subgroup);
+        let iterations = self.sort.iterations();
         if iterations > LONGEST_LOOP {
             return wrong(&format!("the sort loops {iterations} times, {LONGEST_LOOP} are allowed; sort.rows must be smaller"));
         }
