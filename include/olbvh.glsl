@@ -65,7 +65,7 @@ struct olbvh_MeshStatus {
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
     uint overflow;  // Not 0: the table of faces was too small. Never happens with the planned size.
-    uint pad;       // Unused.
+    uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
@@ -759,7 +759,7 @@ vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
 }
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
 // and their order are the same. Needs candidates.glsl, cells and neighbours.
-const uint olbvh_STAR = 128u;    // most tetrahedra of a star
+const uint olbvh_STAR = 128u;    // most tetrahedra of a star; see corners.glsl for larger ones
 const uint olbvh_STEPS = 512u;   // most steps of part 1
 const uint olbvh_HINTED = 16u;   // most steps of a stride from a hint
 const uint olbvh_STRIDE = 64u;   // most steps of a stride through a leaf

@@ -35,7 +35,7 @@
 //! fn plan(gpu: &Gpu, (positions, points): (BufferRef, u32), (cells, tets): (BufferRef, u32)) -> Result<Frame> {
 //!     let capacity = Capacity::usual(tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
 //!     let carve = |a: &mut Arena| {
-//!         let (arrays, scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?);
+//!         let (arrays, scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, points, tets)?);
 //!         let tree = TreeMemory::carve(a, &capacity, &BuildOptions::default())?;
 //!         Ok((arrays, scratch, tree, BuildScratch::carve(gpu, a, tets, &capacity, &BuildOptions::default())?))
 //!     };

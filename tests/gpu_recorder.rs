@@ -267,7 +267,7 @@ fn construction() {
     for gpu in targets(&Gpu::new(&GpuOptions::default()).unwrap()) {
         let sink = gpu.buffer("olbvh.test.sink", 4096).unwrap();
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-        let carve = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?));
+        let carve = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, points, tets)?));
         let (_memory, (arrays, scratch)) = Arena::reserve(&gpu, "olbvh.test.mesh", carve).unwrap();
         let barriers = every_barrier_counts(&gpu, "mesh", |r| {
             cmd_prepare_mesh(r, device.input(), &arrays, &scratch)?;

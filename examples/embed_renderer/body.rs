@@ -77,7 +77,8 @@ impl Body {
         let options = BuildOptions::default();
         let capacity = Capacity::usual(tets, 7);
         let carve_slot = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?));
-        let carve_scratch = |a: &mut Arena| Ok((MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?));
+        let carve_scratch =
+            |a: &mut Arena| Ok((MeshScratch::carve(a, points, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?));
         let device_buffer = |name: &str, size| host.buffer(name, size, USAGE, MemoryLocation::GpuOnly);
         let scratch = device_buffer("scratch", Arena::measure(carve_scratch)?)?;
         let (mesh_scratch, build_scratch) = carve_scratch(&mut Arena::new(scratch.part()))?;

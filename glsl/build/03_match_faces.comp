@@ -3,13 +3,15 @@
 // for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so that
 // this memory is likely to be cached; then anywhere in the table. (The smallest vertex of a face would not do: a vertex
 // before all its neighbours is that of all its faces, which its slots cannot hold.) mates[face] receives the other face
-// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
+// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow. Also counts
+// crowded vertices (see corners.glsl).
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/mates.glsl"
-ARGUMENTS(7)
+#include "shared/corners.glsl"
+ARGUMENTS(8)
     uint tets;
     uint slots;      // of the table
     uint near_slots; // of the table per vertex, searched first
@@ -22,6 +24,7 @@ BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled wit
 BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
 BUFFER(5, READ_WRITE, MeshStatus, status)
 BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
+BUFFER(7, READ_WRITE, uint, thin) // thin corners at every vertex; zeroed
 #include "shared/bad.glsl"
 
 const uint NEAR_PROBES = 16u;
@@ -56,6 +59,9 @@ void main() {
         without_volume += uint(vol == 0.0);
         negative += uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
         if (vol == 0.0) atomicOr(flat_cells.at[t >> 5u], 1u << (t & 31u));
+        for (uint corners = thin_corners(tet, vol), f = 0u; corners != 0u && f < 4u; ++f) {
+            if ((corners >> r[f] & 1u) != 0u && atomicAdd(thin.at[ids[f]], 1u) == MOST_THIN) atomicAdd(status.at[0].crowded, 1u);
+        }
         for (uint f = 0u; f < 4u; ++f) {
             uvec3 face = face_of(ids, f);
             bool positive = (vol >= 0.0) == ((r[f] & 1u) == 1u);

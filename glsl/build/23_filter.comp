@@ -56,7 +56,8 @@ void main() {
         sift(g.level, box, at, n, centres_of(tet, h, box), bits, centres);
         if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) centres = 0u;
     }
-    if (ASSIGN != 0u) bits = touching(make_filter(tet, g, g.level, ASSIGN), box, at, bits);
+    // Inside the mesh no candidate is marked, and no planes need to be made.
+    if (ASSIGN != 0u && bits != 0u) bits = touching(make_filter(tet, g, g.level, ASSIGN), box, at, bits);
     bool doubt = false;
     uint i = 0u;
     for (; centres != 0u; centres &= centres - 1u) {

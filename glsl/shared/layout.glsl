@@ -21,7 +21,7 @@ struct MeshStatus {
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
     uint overflow;  // Not 0: the table of faces was too small. Never happens with the planned size.
-    uint pad;       // Unused.
+    uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
 };
 
 // The result of a build (SPEC 2.4, 2.5).

@@ -1,6 +1,6 @@
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
 // and their order are the same. Needs candidates.glsl, cells and neighbours.
-const uint STAR = 128u;    // most tetrahedra of a star
+const uint STAR = 128u;    // most tetrahedra of a star; see corners.glsl for larger ones
 const uint STEPS = 512u;   // most steps of part 1
 const uint HINTED = 16u;   // most steps of a stride from a hint
 const uint STRIDE = 64u;   // most steps of a stride through a leaf

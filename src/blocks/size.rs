@@ -98,7 +98,7 @@ impl Size {
         let nodes = leaves.min(u64::from(entries)) as u32 / 7 * 8 + 64;
         let capacity = Capacity { candidates, entries, nodes, level };
         let kept = 12 * u64::from(points) + 16 * u64::from(tets) + Arena::measure(|a| MeshArrays::carve(a, points, tets))?;
-        let faces = Arena::measure(|a| MeshScratch::carve(a, tets))?;
+        let faces = Arena::measure(|a| MeshScratch::carve(a, points, tets))?;
         let tree = Arena::measure(|a| {
             CountScratch::carve(gpu, a, tets)?;
             FilterScratch::carve(gpu, a, tets, options, &capacity)?;

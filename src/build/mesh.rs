@@ -77,11 +77,13 @@ pub struct MeshView {
     pub arrays: MeshArrays,
 }
 
-/// Scratch memory of stage 0: 20 bytes and a bit per tetrahedron.
+/// Scratch memory of stage 0: 20 bytes and a bit per tetrahedron, 4 bytes per point.
 #[derive(Clone, Copy, Debug)]
 pub struct MeshScratch {
     table: BufferRef,
     flat_cells: BufferRef,
+    /// Thin corners at every vertex.
+    thin: BufferRef,
 }
 
 impl MeshScratch {
@@ -91,9 +93,13 @@ impl MeshScratch {
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.
-    pub fn carve(arena: &mut Arena, tets: u32) -> Result<Self> {
+    pub fn carve(arena: &mut Arena, points: u32, tets: u32) -> Result<Self> {
         let tets = u64::from(tets);
-        Ok(Self { table: arena.words((5 * tets + 16).min(1 << 31))?, flat_cells: arena.words(tets.div_ceil(32))? })
+        Ok(Self {
+            table: arena.words((5 * tets + 16).min(1 << 31))?,
+            flat_cells: arena.words(tets.div_ceil(32))?,
+            thin: arena.words(u64::from(points))?,
+        })
     }
 }
 
@@ -147,6 +153,7 @@ fn cmd_prepare(
     check_tets(tets)?;
     check_points("positions", points, stride)?;
     let MeshArrays { status, grid, bad, boundary, vertices, neighbours } = *arrays;
+    let MeshScratch { table, flat_cells, thin } = *scratch;
     let workgroup = r.gpu().target().each;
     let once = r.gpu().subgroup_size();
     let share = summing_share(tets, workgroup);
@@ -155,8 +162,9 @@ fn cmd_prepare(
         r.fill(status, 0);
         r.fill(bad, 0);
         r.fill(boundary, 0);
-        r.fill(scratch.flat_cells, 0);
-        cmd_fill(r, scratch.table, u32::MAX)?;
+        r.fill(flat_cells, 0);
+        r.fill(thin, 0);
+        cmd_fill(r, table, u32::MAX)?;
         cmd_fill(r, neighbours, 0)
     })?;
     r.barrier("mesh.clear → mesh.check_cells");
@@ -176,18 +184,17 @@ fn cmd_prepare(
     })?;
     r.barrier("mesh.normalise_vertices → mesh.match_faces");
     r.stage("mesh.boundary", |r| {
-        let MeshScratch { table, flat_cells } = *scratch;
         let slots = (table.size / 4) as u32;
         let near_slots = (slots / points.max(1)).max(1);
         let spec = MatchFacesSpec { workgroup, ..Default::default() };
         r.dispatch(
-            &MatchFaces { vertices, cells, bad, table, mates: neighbours, status, flat_cells, tets, slots, near_slots, share },
+            &MatchFaces { vertices, cells, bad, table, mates: neighbours, status, flat_cells, thin, tets, slots, near_slots, share },
             spec,
             shares,
         )?;
         r.barrier("mesh.match_faces → mesh.find_neighbours");
         let spec = FindNeighboursSpec { workgroup, ..Default::default() };
-        r.dispatch(&FindNeighbours { bad, flat_cells, neighbours, boundary, status, tets, share }, spec, shares)
+        r.dispatch(&FindNeighbours { bad, flat_cells, neighbours, boundary, status, cells, thin, tets, share }, spec, shares)
     })
 }
 
@@ -252,7 +259,7 @@ impl DeviceMesh {
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
         let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
-        let carve = |a: &mut Arena| MeshScratch::carve(a, tets);
+        let carve = |a: &mut Arena| MeshScratch::carve(a, points, tets);
         let (_memory, scratch) = Arena::reserve(gpu, "olbvh.mesh.scratch", carve)?;
         let ((), time) = gpu.submit("olbvh.mesh", |r| cmd_prepare(r, &input, &arrays, &scratch, given.as_ref().map(Buffer::all)))?;
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;

@@ -3,6 +3,7 @@
 use super::Group;
 use super::data::Random;
 use crate::error::Result;
+use crate::mesh::cases::axle;
 use crate::mesh::{Mesh, kuhn, kuhn_jittered};
 
 /// A named mesh.
@@ -93,6 +94,7 @@ const RECIPES: &[Entry] = &[
     ("cloud-33", Group::Full, || cloud(33)),
     ("cloud-65", Group::Full, || cloud(65)),
     ("fan-700", Group::Full, || fan(700)),
+    ("axle-40", Group::Full, || axle(40)),
 ];
 
 /// All meshes of the suite.

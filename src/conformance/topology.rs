@@ -22,6 +22,7 @@ pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
     let expected_words = placed(vertices.normalised.iter().zip(&vertices.cell).map(pack).collect());
     let words = placed(found.vertices()?.into_iter().map(|v| v.map(f32::to_bits)).collect());
     compare("build.normalise_vertices", "vertices", &expected_words, &words)?;
+    compare_one("build.match_faces", "status.crowded", &counts.crowded, &status.crowded)?;
     compare_one("build.match_faces", "status.zero_volume", &counts.flat, &status.zero_volume)?;
     compare_one("build.match_faces", "status.negative", &counts.negative, &status.negative)?;
     compare_one("build.match_faces", "status.overflow", &0, &status.overflow)?;

@@ -1,6 +1,6 @@
 //! Small procedural meshes that are degenerate, invalid or otherwise difficult, for tests and the conformance suite.
 
-use super::{Mesh, kuhn_jittered};
+use super::{Mesh, kuhn, kuhn_jittered};
 use crate::error::Result;
 
 /// A named mesh.
@@ -24,6 +24,33 @@ pub fn cases() -> Result<Vec<Case>> {
     cases.extend(bad());
     cases.extend(grids()?);
     Ok(cases)
+}
+
+/// A solid cylinder of three rings of this many sectors and eight layers, with its cells in no order. Twice as many
+/// tetrahedra as sectors, and more, meet at a vertex on the axis, which is vertex 0, 4·(`sectors` + 1), and so on.
+///
+/// # Errors
+/// Those of [`kuhn`].
+pub fn axle(sectors: u32) -> Result<Mesh> {
+    const RINGS: u32 = 3;
+    const LAYERS: u32 = 8;
+    let mut mesh = kuhn([RINGS, sectors, LAYERS])?;
+    for p in &mut mesh.points {
+        let [radius, sector, height] = *p;
+        let (sin, cos) = (sector * std::f32::consts::TAU / sectors as f32).sin_cos();
+        *p = [radius * cos, radius * sin, height];
+    }
+    // The sectors close to a ring, and the innermost ones meet on the axis.
+    let welded = |v: u32| {
+        let (ring, row) = (v % (RINGS + 1), v / (RINGS + 1));
+        let (sector, layer) = (row % (sectors + 1), row / (sectors + 1));
+        let sector = if ring == 0 { 0 } else { sector % sectors };
+        ring + (RINGS + 1) * (sector + (sectors + 1) * layer)
+    };
+    let mut tets: Vec<_> = mesh.tets.iter().map(|t| t.map(welded)).collect();
+    tets.retain(|t| (1..4).all(|i| !t[..i].contains(&t[i])));
+    tets.sort_by_key(|t| t.iter().fold(0u32, |hash, &v| (hash ^ v).wrapping_mul(0x9e37_79b1).rotate_left(13)));
+    Ok(Mesh::new(mesh.points, tets))
 }
 
 fn case(name: &'static str, points: &[[f32; 3]], tets: &[[u32; 4]]) -> Case {

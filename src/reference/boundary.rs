@@ -1,6 +1,7 @@
 //! Topology of a mesh: bad tetrahedra, neighbours across faces, boundary tetrahedra, bounds (SPEC 2.3). Twin of
 //! `glsl/build/0*`.
 
+use super::corners::{MOST_THIN, thin_corners_at};
 use super::grid::{COORDINATE_LIMIT, Grid, canonical};
 use super::tet::Tet;
 use crate::error::{Error, Result};
@@ -18,12 +19,14 @@ pub struct Counts {
     pub cells: u32,
     /// Bad tetrahedra, which are left out of every structure; see [`Fault`].
     pub bad: u32,
-    /// Boundary tetrahedra: flat, without neighbour across a face, or at a fold.
+    /// Boundary tetrahedra: flat, without neighbour across a face, at a fold, or at a crowded vertex.
     pub boundary: u32,
     /// Tetrahedra of negative signed volume in the caller's order of vertices.
     pub negative: u32,
     /// Tetrahedra of zero volume.
     pub flat: u32,
+    /// Crowded vertices; see [`super::corners`].
+    pub crowded: u32,
 }
 
 /// Why a tetrahedron is bad.
@@ -124,13 +127,16 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
     let neighbours = neighbours(mesh, &valid);
     let normalised: Vec<_> = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
     let signs: Vec<Signs> = mesh.tets.par_iter().enumerate().map(|(t, &ids)| Signs::new(bit(&valid, t as u32), ids, &normalised)).collect();
-    let is_boundary = |t: u32| bit(&valid, t) && on_boundary(mesh, &neighbours, &signs, t);
+    let thin = thin_corners_at(mesh, &normalised, &valid);
+    let at_crowded = |t: u32| mesh.tets[t as usize].iter().any(|&v| thin[v as usize] > MOST_THIN);
+    let is_boundary = |t: u32| bit(&valid, t) && (on_boundary(mesh, &neighbours, &signs, t) || at_crowded(t));
     let boundary = words(mesh.tets.len(), &is_boundary);
     let count = |pick: fn(&Signs) -> bool| signs.par_iter().filter(|s| pick(s)).count() as u32;
     let counts = Counts {
         boundary: boundary.iter().map(|w| w.count_ones()).sum(),
         negative: count(|s| s.caller < 0),
         flat: count(|s| s.valid && s.sorted == 0),
+        crowded: thin.iter().filter(|&&count| count > MOST_THIN).count() as u32,
         ..counts
     };
     Ok(Topology { neighbours, boundary, valid, grid, counts, bad })

@@ -7,6 +7,7 @@ pub mod brute;
 pub mod build;
 pub mod candidates;
 pub mod codes;
+pub mod corners;
 pub mod depth;
 pub mod grid;
 pub mod leaf_walk;

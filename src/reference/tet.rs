@@ -74,8 +74,8 @@ pub struct Weights {
 /// The bounding box of a tetrahedron, and its margin.
 #[derive(Clone, Copy, Debug)]
 pub struct Bounds {
-    lo: Vec3,
-    hi: Vec3,
+    pub(super) lo: Vec3,
+    pub(super) hi: Vec3,
     /// The margin of [`Weights::margin`].
     margin: f32,
 }

@@ -22,7 +22,7 @@ use super::grid::{reciprocal, two_to};
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::mesh::{Field, Mesh, On};
 
-/// Most tetrahedra of a star.
+/// Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see [`super::corners`].
 pub const STAR: usize = 128;
 /// Most steps of part 1.
 pub const STEPS: u32 = 512;

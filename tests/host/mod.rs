@@ -180,7 +180,7 @@ impl Frame {
         let options = BuildOptions::default();
         let capacity = Capacity::for_entries(20 * tets, 10);
         let carve = |a: &mut Arena| {
-            let (arrays, mesh_scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, tets)?);
+            let (arrays, mesh_scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, points, tets)?);
             let (tree, build_scratch) =
                 (TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
             let output = LocateOutput { owners: a.words(u64::from(points))?, barycentrics: a.take(16 * u64::from(points))? };

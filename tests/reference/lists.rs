@@ -1,13 +1,13 @@
 //! `Lists::Boundary`: its trees keep every rule, and walks find the same owners as `Lists::All`.
 
 use super::{Random, options, prepared};
-use olbvh::mesh::cases::cases;
+use olbvh::mesh::cases::{axle, cases};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Locator, order_of};
-use olbvh::reference::walk::{DETOURS, STEPS};
+use olbvh::reference::walk::{DETOURS, STAR, STEPS};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
@@ -137,6 +137,27 @@ fn every_walk_ends() {
         "{walked} of {n} points walked to, {detours} of them by way of another, the others searched in lists; longest walk {longest} steps"
     );
     assert!(walked > n / 4);
+}
+
+/// Stars that a walk could not hold: their vertices are crowded, and lie in lists.
+#[test]
+fn owners_at_crowded_vertices_are_those_of_the_lists() {
+    for sectors in [10, 70, 300] {
+        let (mesh, topology) = prepared(axle(sectors).unwrap());
+        let axis = |t: &&[u32; 4]| t.contains(&(4 * (sectors + 1) * 4));
+        let met = mesh.tets.iter().filter(axis).count();
+        assert_eq!(met > STAR, topology.counts.crowded >= 7, "{sectors} sectors: {met} tetrahedra at a vertex on the axis");
+        let [all, tree] = both(&mesh, &topology, 0.0, Assign::Planes);
+        let (all, walking) = (Locator::new(&mesh, &topology, &all), Locator::new(&mesh, &topology, &tree));
+        let mut walked = 0;
+        for i in 0..=512u16 {
+            let p = [0.0, 0.0, f32::from(i) / 64.0];
+            assert_eq!(all.owners(p), walking.owners(p), "{sectors} sectors, {p:?}");
+            assert_eq!(all.locate(p), walking.locate(p), "{sectors} sectors, {p:?}");
+            walked += usize::from(walking.walk(p).is_some());
+        }
+        assert!(met > STAR || walked > 0, "{sectors} sectors: no walk is tested");
+    }
 }
 
 #[test]

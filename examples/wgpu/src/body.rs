@@ -60,7 +60,7 @@ impl Body {
         let (options, capacity) = (BuildOptions::default(), Capacity::usual(tets, 7));
         let carve = |a: &mut Arena| {
             let (arrays, tree) = (MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?);
-            let (mesh, build) = (MeshScratch::carve(a, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
+            let (mesh, build) = (MeshScratch::carve(a, points, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
             Ok((arrays, tree, mesh, build, a.take(16 * pixels)?))
         };
         let memory = buffer("memory", Arena::measure(carve)?)?;

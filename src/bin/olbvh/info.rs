@@ -70,6 +70,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "boundary_cells": s.counts.boundary,
         "negative_cells": s.counts.negative,
         "flat_cells": s.counts.flat,
+        "crowded_points": s.counts.crowded,
         "tangled_cells": loaded.report.tangled,
         "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
         "bounds": { "min": lo, "max": hi },
@@ -115,6 +116,9 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     page.row("boundary cells", grouped(counts.boundary));
     page.row("negative cells", grouped(counts.negative));
     page.row("flat cells", grouped(counts.flat));
+    if counts.crowded > 0 {
+        page.row("crowded points", format_args!("{}, whose many cells count as boundary", grouped(counts.crowded)));
+    }
     if report.tangled > 0 {
         page.row("tangled cells", format_args!("{}, whose pieces overlap", grouped(report.tangled)));
     }

@@ -104,7 +104,7 @@ impl OlbvhPlan {
 
     fn scratch(&self, gpu: &Gpu, arena: &mut Arena, planned: &Planned) -> Result<(MeshScratch, BuildScratch)> {
         let Planned { options, capacity } = planned;
-        Ok((MeshScratch::carve(arena, self.tets)?, BuildScratch::carve(gpu, arena, self.tets, capacity, options)?))
+        Ok((MeshScratch::carve(arena, self.points, self.tets)?, BuildScratch::carve(gpu, arena, self.tets, capacity, options)?))
     }
 }
 

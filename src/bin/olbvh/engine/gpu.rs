@@ -69,6 +69,7 @@ impl Engine for Device {
                 boundary: cells.boundary,
                 negative: cells.negative,
                 flat: cells.zero_volume,
+                crowded: cells.crowded,
             },
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
             bounds: tree.grid().into(),

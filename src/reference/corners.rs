@@ -1,0 +1,51 @@
+//! Crowded vertices (SPEC 2.6): those at which more tetrahedra may meet than a star can hold, such as the vertices on the
+//! axis of a swept mesh. Their tetrahedra count as boundary, so such a vertex lies in leaves with whole lists, and no walk
+//! ends there. Twin of `glsl/shared/corners.glsl`.
+//!
+//! Counting the tetrahedra at every vertex would take an atomic operation for each of their corners. Only thin corners
+//! are counted instead, of which most meshes have few. A corner with edges a, b, c has the solid angle ω with
+//! tan(ω/2) = |det(a, b, c)| / D, where D ≤ 4 |a| |b| |c|. So where ω < 0.152, det² ≤ 3/32 a² b² c²; such a corner is
+//! called thin, as are some others. The solid angles round a vertex sum to 4π at most where tetrahedra do not overlap, so
+//! at most 82 of them are 0.152 or more: of more than [`STAR`](super::walk::STAR) = 128 corners, more than 46 are thin.
+//!
+//! Edges are scaled by a power of two, so that the largest is about 1. Coordinates are multiples of 2^-24 of the extent,
+//! and one edge of a corner is at least half as long as the longest; so a² b² c² is 0 or at least 2^-104, and denormals
+//! decide nothing.
+
+use super::boundary::bit;
+use super::grid::two_to;
+use super::tet::{Bounds, Tet, Vec3, dot};
+use crate::mesh::Mesh;
+
+/// Most thin corners at a vertex that is not crowded.
+pub const MOST_THIN: u32 = 46;
+
+/// Whether the corner at each vertex, in ascending index, is thin.
+pub fn thin_corners(tet: &Tet) -> [bool; 4] {
+    let bounds = Bounds::new(tet.v);
+    let size = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
+    let exponent = (size[0].max(size[1]).max(size[2]).to_bits() >> 23) as i32 - 127;
+    let scale = two_to(-exponent);
+    let squared = |a: Vec3, b: Vec3| {
+        let edge = [0, 1, 2].map(|c| (b[c] - a[c]) * scale);
+        dot(edge, edge)
+    };
+    let [a, b, c, d] = tet.v;
+    let (ab, ac, ad, bc, bd, cd) = (squared(a, b), squared(a, c), squared(a, d), squared(b, c), squared(b, d), squared(c, d));
+    let det = ((tet.volume() * scale) * scale) * scale;
+    let square = det * det;
+    [(ab * ac) * ad, (ab * bc) * bd, (ac * bc) * cd, (ad * bd) * cd].map(|room| square <= room * 0.09375)
+}
+
+/// The number of thin corners at every vertex, of valid tetrahedra.
+pub(super) fn thin_corners_at(mesh: &Mesh, normalised: &[Vec3], valid: &[u32]) -> Vec<u32> {
+    let mut counts = vec![0; mesh.points.len()];
+    for (_, &ids) in (0..).zip(&mesh.tets).filter(|&(t, _)| bit(valid, t)) {
+        let tet = Tet::new(ids, normalised);
+        let thin = thin_corners(&tet);
+        for (&v, rank) in ids.iter().zip(tet.rank) {
+            counts[v as usize] += u32::from(thin[rank]);
+        }
+    }
+    counts
+}
