@@ -1006,7 +1006,7 @@ vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
 olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;
-    [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !olbvh_settled(best); ++way) {
+    [[dont_unroll]] for (uint way = 0u; way < olbvh_ARRIVALS + olbvh_DETOURS && !(way < olbvh_ARRIVALS ? best.inside : olbvh_settled(best)); ++way) {
         if (way < olbvh_ARRIVALS) {
             if (!olbvh_walk_towards(t, s, way > 0u, x, best)) {
                 way = olbvh_ARRIVALS - 1u;

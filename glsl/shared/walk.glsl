@@ -114,7 +114,7 @@ vec3 cell_point(LeafCell cell, uint k) {
 Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;
-    [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !settled(best); ++way) {
+    [[dont_unroll]] for (uint way = 0u; way < ARRIVALS + DETOURS && !(way < ARRIVALS ? best.inside : settled(best)); ++way) {
         if (way < ARRIVALS) {
             if (!walk_towards(t, s, way > 0u, x, best)) {
                 way = ARRIVALS - 1u;

@@ -34,8 +34,8 @@ pub const STRIDE: u32 = 64;
 pub const LEG: u32 = 1024;
 /// Points of the cell to go by in parts 2 and 3; the first one is the centre.
 pub const DETOURS: u32 = 8;
-/// Number of stars that part 1 searches. The second one can only be that of the same gap between faces; otherwise x is
-/// not there.
+/// Number of stars that part 1 searches. Some tetrahedra round an edge may be too far from x to belong to its star, so the
+/// first one may not reach the tetrahedron that contains x; the walk then goes on to another side of the edge.
 const ARRIVALS: u32 = 2;
 /// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap between tetrahedra that is due to
 /// rounding, and the nearest tetrahedron owns it.
@@ -219,7 +219,8 @@ impl Walker<'_> {
             }
             if weights.near() {
                 arrivals += 1;
-                if self.arrive(t, x, &mut walked.best) || arrivals == ARRIVALS {
+                self.arrive(t, x, &mut walked.best);
+                if walked.best.inside || arrivals == ARRIVALS {
                     break;
                 }
             }
