@@ -766,6 +766,7 @@ const uint olbvh_STRIDE = 64u;   // most steps of a stride through a leaf
 const uint olbvh_LEG = 1024u;    // most steps along one segment
 const uint olbvh_DETOURS = 8u;   // points of the cell to walk by, the first its centre
 const uint olbvh_ARRIVALS = 2u;  // stars that part 1 searches
+const uint olbvh_ROUND = olbvh_STAR;   // most steps of part 1 after the first one
 const float olbvh_GAP = -7.62939453125e-6; // -2^-17
 
 // Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
@@ -945,15 +946,15 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
 
 bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.smallest >= olbvh_GAP); }
 
-// Part 1, from `t`, which step number `s` has reached and which is left first with `leave`. Returns whether `t` is now
-// near x. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
-bool olbvh_walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout olbvh_Best best) {
+// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been searched
+// without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
+bool olbvh_walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout olbvh_Best best) {
+    if (arrived) s = max(s, olbvh_STEPS - olbvh_ROUND);
     for (; s < olbvh_STEPS; ++s) {
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
         if (w.clear) best = olbvh_Best(t, true, true, 0.0);
-        if (w.clear || (olbvh_near(w) && !leave)) return !w.clear;
-        leave = false;
+        if (w.clear || (arrived ? w.inside : olbvh_near(w))) return !w.clear;
         vec4 own = olbvh_own_weights(w, tet);
         uint face = olbvh_outermost(own), next = own[face] < 0.0 ? olbvh_words(olbvh_neighbours.at[t])[face] : olbvh_NONE;
         if (next == olbvh_NONE) return false;
@@ -1002,7 +1003,8 @@ vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
 }
 
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
-// DETOURS points. All of it is one loop, so that a kernel contains each part only once.
+// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second. All
+// of it is one loop, so that a kernel contains each part only once.
 olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;

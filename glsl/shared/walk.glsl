@@ -7,6 +7,7 @@ const uint STRIDE = 64u;   // most steps of a stride through a leaf
 const uint LEG = 1024u;    // most steps along one segment
 const uint DETOURS = 8u;   // points of the cell to walk by, the first its centre
 const uint ARRIVALS = 2u;  // stars that part 1 searches
+const uint ROUND = STAR;   // most steps of part 1 after the first one
 const float GAP = -7.62939453125e-6; // -2^-17
 
 #include "shared/stride.glsl"
@@ -53,15 +54,15 @@ void arrive(uint first, vec3 x, inout Best best) {
 
 bool settled(Best best) { return best.inside || (best.in_box && best.smallest >= GAP); }
 
-// Part 1, from `t`, which step number `s` has reached and which is left first with `leave`. Returns whether `t` is now
-// near x. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
-bool walk_towards(inout uint t, inout uint s, bool leave, vec3 x, inout Best best) {
+// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been searched
+// without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
+bool walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout Best best) {
+    if (arrived) s = max(s, STEPS - ROUND);
     for (; s < STEPS; ++s) {
         Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
         if (w.clear) best = Best(t, true, true, 0.0);
-        if (w.clear || (near(w) && !leave)) return !w.clear;
-        leave = false;
+        if (w.clear || (arrived ? w.inside : near(w))) return !w.clear;
         vec4 own = own_weights(w, tet);
         uint face = outermost(own), next = own[face] < 0.0 ? words(neighbours.at[t])[face] : NONE;
         if (next == NONE) return false;
@@ -110,7 +111,8 @@ vec3 cell_point(LeafCell cell, uint k) {
 }
 
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
-// DETOURS points. All of it is one loop, so that a kernel contains each part only once.
+// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second. All
+// of it is one loop, so that a kernel contains each part only once.
 Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;

@@ -1,4 +1,4 @@
-//! Crowded vertices (SPEC 2.6): those at which more tetrahedra may meet than a star can hold, such as the vertices on the
+//! Crowded vertices (SPEC 2.3): those at which more tetrahedra may meet than a star can hold, such as the vertices on the
 //! axis of a swept mesh. Their tetrahedra count as boundary, so such a vertex lies in leaves with whole lists, and no walk
 //! ends there. Twin of `glsl/shared/corners.glsl`.
 //!
@@ -8,12 +8,12 @@
 //! called thin, as are some others. The solid angles round a vertex sum to 4π at most where tetrahedra do not overlap, so
 //! at most 82 of them are 0.152 or more: of more than [`STAR`](super::walk::STAR) = 128 corners, more than 46 are thin.
 //!
-//! Edges are scaled by a power of two, so that the largest is about 1. Coordinates are multiples of 2^-24 of the extent,
-//! and one edge of a corner is at least half as long as the longest; so a² b² c² is 0 or at least 2^-104, and denormals
-//! decide nothing.
+//! Everything is scaled by a power of two, so that the largest edge is about 1, and edges are rounded up to multiples of
+//! 2^-20. So lengths are never too small, and their products are never denormal, since one of the edges of a corner is at
+//! least half as long as the longest.
 
 use super::boundary::bit;
-use super::grid::two_to;
+use super::grid::{canonical, two_to};
 use super::tet::{Bounds, Tet, Vec3, dot};
 use crate::mesh::Mesh;
 
@@ -24,16 +24,17 @@ pub const MOST_THIN: u32 = 46;
 pub fn thin_corners(tet: &Tet) -> [bool; 4] {
     let bounds = Bounds::new(tet.v);
     let size = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
-    let exponent = (size[0].max(size[1]).max(size[2]).to_bits() >> 23) as i32 - 127;
-    let scale = two_to(-exponent);
+    // Coordinates are multiples of 2^-42.
+    let exponent = ((size[0].max(size[1]).max(size[2]).to_bits() >> 23) as i32 - 127).max(-42);
     let squared = |a: Vec3, b: Vec3| {
-        let edge = [0, 1, 2].map(|c| (b[c] - a[c]) * scale);
+        let edge = [0, 1, 2].map(|c| ((b[c] - a[c]).abs() * two_to(20 - exponent)).ceil() * two_to(-20));
         dot(edge, edge)
     };
     let [a, b, c, d] = tet.v;
     let (ab, ac, ad, bc, bd, cd) = (squared(a, b), squared(a, c), squared(a, d), squared(b, c), squared(b, d), squared(c, d));
-    let det = ((tet.volume() * scale) * scale) * scale;
-    let square = det * det;
+    let scale = two_to(-exponent);
+    let det = canonical(((tet.volume() * scale) * scale) * scale);
+    let square = canonical(det * det);
     [(ab * ac) * ad, (ab * bc) * bd, (ac * bc) * cd, (ad * bd) * cd].map(|room| square <= room * 0.09375)
 }
 

@@ -34,9 +34,9 @@ pub const STRIDE: u32 = 64;
 pub const LEG: u32 = 1024;
 /// Points of the cell to go by in parts 2 and 3; the first one is the centre.
 pub const DETOURS: u32 = 8;
-/// Number of stars that part 1 searches. Some tetrahedra round an edge may be too far from x to belong to its star, so the
-/// first one may not reach the tetrahedron that contains x; the walk then goes on to another side of the edge.
-const ARRIVALS: u32 = 2;
+/// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to its
+/// star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if there is one.
+const ROUND: u32 = STAR as u32;
 /// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap between tetrahedra that is due to
 /// rounding, and the nearest tetrahedron owns it.
 const GAP: f32 = -two_to(-17);
@@ -209,20 +209,21 @@ impl Walker<'_> {
 
     /// Part 1, from `t`. Returns whether the owner is settled.
     fn towards(&self, mut t: u32, x: Vec3, walked: &mut Walked) -> bool {
-        let mut arrivals = 0;
-        for _ in 0..STEPS {
+        let (mut arrived, mut step) = (false, 0);
+        while step < STEPS {
             walked.steps += 1;
             let (tet, weights) = self.weights(t, x);
             if weights.clear {
                 walked.best = Best::inside(t);
                 return true;
             }
-            if weights.near() {
-                arrivals += 1;
+            if if arrived { weights.inside } else { weights.near() } {
                 self.arrive(t, x, &mut walked.best);
-                if walked.best.inside || arrivals == ARRIVALS {
+                if walked.best.inside {
                     break;
                 }
+                arrived = true;
+                step = step.max(STEPS - ROUND);
             }
             let own = tet.rank.map(|r| weights.w[r]);
             let face = outermost(own);
@@ -231,6 +232,7 @@ impl Walker<'_> {
                 break;
             }
             t = next;
+            step += 1;
         }
         walked.best.inside || (walked.best.in_box && walked.best.smallest >= GAP)
     }

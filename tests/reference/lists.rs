@@ -7,7 +7,8 @@ use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Locator, order_of};
-use olbvh::reference::walk::{DETOURS, STAR, STEPS};
+use olbvh::reference::tet::Tet;
+use olbvh::reference::walk::{DETOURS, LeafCell, STAR, STEPS, Walker};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 
@@ -158,6 +159,40 @@ fn owners_at_crowded_vertices_are_those_of_the_lists() {
         }
         assert!(met > STAR || walked > 0, "{sectors} sectors: no walk is tested");
     }
+}
+
+/// Round an edge, some cells may be near a point and others between them not, so that its star falls into parts. A walk
+/// that meets the wrong one must go on.
+#[test]
+fn walks_do_not_end_in_the_wrong_part_of_a_star() {
+    let mut random = Random(5);
+    let mut parted = 0;
+    for ring in 0..20_000 {
+        let [s, c] = [random.next() * 0.8 + 0.1, random.next() * 0.8 + 0.1];
+        let tilted = |[x, y, z]: [f32; 3]| [x, y + s * x + c * z, z + c * x];
+        let mut points = vec![[0.0; 3], [1.0, 0.0, 0.0]].into_iter().map(tilted).collect::<Vec<_>>();
+        for i in 0..8u8 {
+            let (sin, cos) = ((f32::from(i) + 0.8 * random.next()) * std::f32::consts::FRAC_PI_4).sin_cos();
+            let radius = (random.next() * 5.0 - 4.0).exp2();
+            points.push(tilted([random.next(), radius * cos, radius * sin]));
+        }
+        let (mesh, topology) = prepared(Mesh::new(points, (0..8).map(|i| [0, 1, 2 + i, 2 + (i + 1) % 8]).collect()));
+        let normalised: Vec<_> = mesh.points.iter().map(|&p| topology.grid.normalise(p)).collect();
+        let walker = Walker { mesh: &mesh, neighbours: &topology.neighbours, normalised: &normalised };
+        let tets: Vec<_> = mesh.tets.iter().map(|&ids| Tet::new(ids, &normalised)).collect();
+        let away = (random.next() * 6.0 - 19.0).exp2();
+        let (sin, cos) = (random.next() * std::f32::consts::TAU).sin_cos();
+        let x = topology.grid.normalise(tilted([0.5, away * cos, away * sin]));
+        let weights: Vec<_> = tets.iter().map(|tet| tet.weights(x)).collect();
+        let Some(owner) = weights.iter().position(|w| w.inside) else { continue };
+        parted += usize::from(weights.iter().filter(|w| w.near()).count() > 2 && weights.iter().any(|w| !w.near()));
+        for (seed, tet) in (0..).zip(&tets) {
+            let centre = [0, 1, 2].map(|c| tet.v.iter().map(|v| v[c] / 4.0).sum());
+            let walk = walker.walk(seed, &LeafCell { centre, half: [0.0; 3] }, x);
+            assert_eq!((walk.best.owner, walk.best.inside), (owner as u32, true), "ring {ring} from {seed}: {walk:?}");
+        }
+    }
+    assert!(parted > 1000, "{parted} stars in parts");
 }
 
 #[test]

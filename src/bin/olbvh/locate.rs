@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
-use crate::output::{Destination, Progress};
+use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
@@ -76,7 +76,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", args.tolerance)));
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
-    let output = Destination::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
+    let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
@@ -132,7 +132,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 }
 
 /// Writes every owner of every point as rows (point, cell); returns how many points have an owner.
-fn every_owner(output: &Destination, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
+fn every_owner(output: &ResultOutput, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
     let cells = |tets: &Vec<u32>| {
         let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
         cells.sort_unstable();

@@ -70,14 +70,14 @@ pub fn announce(path: &Path, formats: &[OutputFormat], inputs: &[&Path]) -> Outc
 
 /// The one file of a result, or standard output, for which `-` stands. What goes there is collected in a temporary
 /// file first: half a result could not be taken back.
-pub struct Destination {
+pub struct ResultOutput {
     name: PathBuf,
     collected: Option<tempfile::TempPath>,
     /// The format of the result.
     pub format: OutputFormat,
 }
 
-impl Destination {
+impl ResultOutput {
     /// Announces a result like [`announce`]; standard output gets the first of `formats`, and does not go with
     /// `--json`.
     pub fn announce(name: &Path, formats: &[OutputFormat], inputs: &[&Path], common: &Common) -> Outcome<Self> {

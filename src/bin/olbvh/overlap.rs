@@ -4,7 +4,7 @@ use crate::arguments::vector;
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{MemoryArgs, TreeArgs};
-use crate::output::{Destination, Progress};
+use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
 use olbvh::blocks::Meshes;
@@ -56,7 +56,7 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let output = Destination::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b], common)?;
+    let output = ResultOutput::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b], common)?;
     let format = output.format;
     if args.pairs && format != OutputFormat::Json {
         return Err(Failure::Usage(format!("{}: --pairs needs a .json file; a .vtu file holds no pairs", args.output.display())));

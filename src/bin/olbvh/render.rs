@@ -4,7 +4,7 @@ use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Drawn};
 use crate::input::{self, MemoryArgs, TreeArgs};
-use crate::output::{Destination, Progress};
+use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds};
 use olbvh::blocks::View;
 use olbvh::error::Result;
@@ -108,7 +108,7 @@ struct Iso(Vec<f32>);
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let output = Destination::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
+    let output = ResultOutput::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
     let mut options = args.tree.suited(Fineness::Pictures)?;
     let mut settings = args.settings()?;
     settings.check()?;
