@@ -179,7 +179,8 @@ fn devices_are_listed() {
     // The other tests of a row need its driver.
     assert!(!devices.is_empty() || std::env::var_os("OLBVH_TEST_DRIVER").is_none(), "no device");
     for device in devices {
-        has_keys(device, &["name", "driver", "api", "subgroup", "qualifies", "missing"]);
+        has_keys(device, &["name", "driver", "api", "subgroup", "qualifies", "missing", "fault"]);
+        assert_eq!(device["qualifies"].as_bool().unwrap(), device["fault"].is_null(), "{device}");
     }
 }
 
