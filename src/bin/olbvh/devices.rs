@@ -5,7 +5,7 @@ use crate::engine::{Origin, Shapes};
 use crate::{output, text};
 use olbvh::error::Error;
 use olbvh::gpu::{DeviceReport, Gpu, GpuOptions, RayTracing, list_devices};
-use serde_json::json;
+use serde_json::{Value, json};
 use std::fmt::Write as _;
 
 /// List all Vulkan devices: whether each can be used and, if not, what it lacks. Each that lacks nothing is opened and
@@ -30,45 +30,60 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
         }
         Err(error) => return Err(Failure::from(error)),
     };
-    let mut lines = String::new();
-    // Once per device, because a profile that is ignored causes a remark.
-    let targets: Vec<Option<Shapes>> = devices.iter().map(|d| Shapes::of(common, d).ok()).collect();
-    let faults: Vec<Option<String>> = devices.iter().enumerate().map(|(i, d)| fault_of(i, d)).collect();
-    for (i, ((d, target), fault)) in devices.iter().zip(&targets).zip(&faults).enumerate() {
-        let verdict = fault.as_ref().map_or("qualifies".to_owned(), |fault| format!("cannot be used; {fault}"));
+    let listed: Vec<Listed> = devices.iter().enumerate().map(|(i, device)| Listed::new(common, i, device)).collect();
+    let mut lines: String = listed.iter().map(|one| one.text(common.verbose)).collect();
+    lines.push_str("cpu  the reference implementation on the processor, always available\n");
+    let json = json!({ "devices": listed.iter().map(Listed::json).collect::<Vec<_>>() });
+    output::result(common, &json, &lines)
+}
+
+/// A device of the list.
+struct Listed<'a> {
+    index: usize,
+    device: &'a DeviceReport,
+    /// Why it cannot be used.
+    fault: Option<String>,
+    target: Option<Shapes>,
+}
+
+impl<'a> Listed<'a> {
+    fn new(common: &Common, index: usize, device: &'a DeviceReport) -> Self {
+        Self { index, device, fault: fault_of(index, device), target: Shapes::of(common, device).ok() }
+    }
+
+    fn text(&self, verbose: bool) -> String {
+        let d = self.device;
         let rays = match d.requirements.ray_tracing {
             RayTracing { queries: true, .. } => "; ray queries",
             RayTracing { pipelines: true, .. } => "; ray-tracing pipelines",
             RayTracing { .. } => "",
         };
-        let _ = writeln!(
-            lines,
-            "{i:>3}  {}\n     {}; Vulkan {}; subgroups of {}; {} of memory; {}{rays}\n     {verdict}",
-            d.name,
-            d.driver,
-            d.api,
-            d.subgroup,
-            text::bytes(d.memory),
-            d.kind
-        );
-        if let Some(shapes) = target.as_ref().filter(|_| common.verbose) {
+        let memory = text::bytes(d.memory);
+        let mut lines = format!("{:>3}  {}\n", self.index, d.name);
+        let _ = writeln!(lines, "     {}; Vulkan {}; subgroups of {}; {memory} of memory; {}{rays}", d.driver, d.api, d.subgroup, d.kind);
+        let _ = match &self.fault {
+            None => writeln!(lines, "     qualifies"),
+            Some(fault) => writeln!(lines, "     cannot be used; {fault}"),
+        };
+        if let Some(shapes) = self.target.as_ref().filter(|_| verbose) {
             let _ = writeln!(lines, "     kernels {shapes}");
         }
+        lines
     }
-    lines.push_str("cpu  the reference implementation on the processor, always available\n");
-    let entry = |(i, ((d, target), fault)): (usize, ((&DeviceReport, &Option<Shapes>), &Option<String>))| {
+
+    fn json(&self) -> Value {
+        let d = self.device;
+        let target = self.target.as_ref().map(|shapes| {
+            let profile =
+                if let Origin::Profile(path) | Origin::File(path) = &shapes.origin { Some(path.display().to_string()) } else { None };
+            json!({ "name": shapes.target.name, "profile": profile })
+        });
         json!({
-            "index": i, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind, "memory_bytes": d.memory,
-            "qualifies": fault.is_none(), "missing": d.requirements.missing, "fault": fault,
-            "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines,
-            "target": target.as_ref().map(|shapes| json!({
-                "name": shapes.target.name,
-                "profile": if let Origin::Profile(path) | Origin::File(path) = &shapes.origin { Some(path.display().to_string()) } else { None },
-            })),
+            "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind,
+            "memory_bytes": d.memory, "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
+            "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines, "target": target,
         })
-    };
-    let json = json!({ "devices": devices.iter().zip(&targets).zip(&faults).enumerate().map(entry).collect::<Vec<_>>() });
-    output::result(common, &json, &lines)
+    }
 }
 
 /// Why device number `index` cannot be used: what it lacks, or how it fails to open or to pass the self-test.
