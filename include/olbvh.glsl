@@ -269,7 +269,7 @@ OLBVH_BUFFER(9, 16, uvec4, olbvh_neighbours)
 OLBVH_BUFFER(10, 4, float, olbvh_field)
 uint olbvh_LISTS;
 
-// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs; the operations and their order are the same.
+// Quantization and Morton codes (SPEC 2.1). Twin of src/grid.rs; the operations and their order are the same.
 
 const uint olbvh_MAX_LEVEL = 10u;
 
@@ -341,7 +341,7 @@ uint olbvh_gather(uint v) {
 uint olbvh_morton(uvec3 q) { return olbvh_spread(q.x) << 2 | olbvh_spread(q.y) << 1 | olbvh_spread(q.z); }
 uvec3 olbvh_unmorton(uint code) { return uvec3(olbvh_gather(code >> 2), olbvh_gather(code >> 1), olbvh_gather(code)); }
 
-// Deterministic reciprocal: see src/reference/grid.rs.
+// Deterministic reciprocal: see src/grid.rs.
 float olbvh_reciprocal(float x) {
     float a = abs(x);
     precise float r = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(a));

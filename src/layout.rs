@@ -7,4 +7,9 @@ pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {
     low as u64 | (high as u64) << 32
 }
 
+/// Bit `i` of packed words; false beyond their end.
+pub fn bit(words: &[u32], i: u32) -> bool {
+    words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
+}
+
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));

@@ -66,9 +66,10 @@
 //!   everything and start again with a new device.
 //!
 //! # Layers
-//! Dependencies point one way: [`gpu`] ← [`kernels`] ← [`primitives`] ← [`build`] ← [`query`] ← [`blocks`],
-//! [`baseline`] ← conformance, `bench`, `formats` ← `tune` ← program. [`mesh`], [`tree`], [`options`], [`layout`],
-//! [`render`] and [`mod@reference`] do not depend on Vulkan.
+//! Dependencies point one way. Without Vulkan: [`layout`], [`grid`], [`mesh`], [`options`] ← [`tree`], [`render`],
+//! [`slicing`] ← [`mod@reference`]. With it: [`gpu`], [`kernels`] and [`primitives`], one layer, because no device is
+//! opened without a self-test ← [`build`] ← [`query`] ← [`blocks`], [`baseline`], [`conformance`], the C interface ←
+//! `bench` ← `tune` ← program. `tests/rules.rs` has the whole order and holds the code to it.
 //!
 //! - **Recording functions**, named `cmd_*`, append to a [`gpu::Recorder`]: the command buffer and the memory are the
 //!   caller's, and nothing is submitted, waited for or allocated. Counts stay on the device.
@@ -81,10 +82,9 @@
 //! # Numerics
 //! Grid cells decide membership, not floating-point boxes: a point is quantized by subtraction, multiplication and
 //! floor, which are correctly rounded and monotone, so a descent never loses a point. Geometry is evaluated in
-//! normalised coordinates `x̂ = floor((x − lo)·2^-e·2^82)·2^-42`, with the largest extent in [2^40, 2^41). That is a
-//! power of two away from the [1, 2) of the definition, so that products of three differences neither overflow nor
-//! become denormal, which devices may flush. Quotients that affect a result are computed with
-//! [`reference::grid::reciprocal`], which uses no division.
+//! normalised coordinates `x̂ = floor((x − lo)·2^-e·2^82)·2^-42` (SPEC 2.1). The largest extent lies in [2^40, 2^41), so
+//! products of three differences neither overflow nor become denormal, which devices may flush. Quotients that affect a result are computed with
+//! [`grid::reciprocal`], which uses no division.
 
 // The tests of the C interface use the same host code as those of `tests/`.
 #[cfg(test)]
@@ -103,6 +103,7 @@ pub mod error;
 pub mod formats;
 pub mod glsl;
 pub mod gpu;
+pub mod grid;
 pub mod kernels;
 pub mod layout;
 pub mod mesh;

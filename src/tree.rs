@@ -1,13 +1,12 @@
 //! The arrays of a tree in host memory (SPEC 2.5, the paper's §3.1), equal byte for byte to those on a device.
 
 mod stats;
-mod validate;
 pub use stats::{TreeBytes, TreeStats};
 
+use crate::grid::Box6;
+use crate::grid::{Grid, MAX_LEVEL, morton};
+use crate::layout::bit;
 use crate::options::{Assign, Lists};
-use crate::reference::boundary::bit;
-use crate::reference::grid::{Grid, MAX_LEVEL, morton};
-use crate::reference::leaves::Box6;
 use std::ops::Range;
 
 /// An OLBVH. Nodes are in breadth-first order: node 0 is the root on level 0, and the leaves are on level l =

@@ -2,11 +2,11 @@
 
 #![allow(clippy::unwrap_used)]
 
+use olbvh::grid::CellRange;
 use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
-use olbvh::reference::vertices::CellRange;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
 use olbvh::render::{Background, Bounds, RenderSettings, TransferFunction};
 

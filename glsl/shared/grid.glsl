@@ -1,4 +1,4 @@
-// Quantization and Morton codes (SPEC 2.1). Twin of src/reference/grid.rs; the operations and their order are the same.
+// Quantization and Morton codes (SPEC 2.1). Twin of src/grid.rs; the operations and their order are the same.
 
 const uint MAX_LEVEL = 10u;
 
@@ -70,7 +70,7 @@ uint gather(uint v) {
 uint morton(uvec3 q) { return spread(q.x) << 2 | spread(q.y) << 1 | spread(q.z); }
 uvec3 unmorton(uint code) { return uvec3(gather(code >> 2), gather(code >> 1), gather(code)); }
 
-// Deterministic reciprocal: see src/reference/grid.rs.
+// Deterministic reciprocal: see src/grid.rs.
 float reciprocal(float x) {
     float a = abs(x);
     precise float r = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(a));

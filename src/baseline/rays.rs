@@ -9,10 +9,10 @@
 use crate::build::{DeviceMesh, KeptMesh, MeshInput};
 use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
+use crate::grid::two_to;
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput};
-use crate::reference::grid::two_to;
 
 /// Factor from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
 const SCALE: f32 = two_to(-40);

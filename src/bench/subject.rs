@@ -6,10 +6,10 @@ use super::suite::Settings;
 use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::grid::morton;
 use crate::mesh::{Field, Mesh, On};
 use crate::query::{self, Drawn, Sliced};
 use crate::reference::boundary::fault_of;
-use crate::reference::grid::morton;
 use crate::render::{Bounds, Plan, RenderSettings};
 use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
 

@@ -3,10 +3,10 @@
 use super::mesh::check_tets;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu};
+use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
-use crate::reference::grid::MAX_LEVEL;
 
 /// Most entries of a tree: an index is a signed word to shaders.
 pub(crate) const MAX_ENTRIES: u32 = i32::MAX.cast_unsigned();

@@ -6,11 +6,11 @@ use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemo
 use super::stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_levels, cmd_splits, entries};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
+use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid, wide};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
 use crate::reference::depth::{finer, too_large};
-use crate::reference::grid::MAX_LEVEL;
 use crate::reference::quarters::split_entries;
 use crate::tree::{TreeArrays, TreeBytes};
 

@@ -8,8 +8,8 @@ use super::cells::{CellType, Shape, split};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, printable};
 use crate::error::{Error, Result};
+use crate::grid::COORDINATE_LIMIT;
 use crate::mesh::{Field, Mesh, On};
-use crate::reference::grid::COORDINATE_LIMIT;
 
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
 /// [`finish`](Assembly::finish).

@@ -5,11 +5,11 @@ use super::{Scene, list_parts, upload_field};
 use crate::build::{DeviceMesh, Tree, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
+use crate::grid::MAX_LEVEL;
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
 use crate::options::{POINT_RUN, TOLERANCE};
 use crate::primitives::Arena;
-use crate::reference::grid::MAX_LEVEL;
 use crate::reference::locate::CHUNK;
 
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.

@@ -16,6 +16,7 @@ pub use stack::{Sliced, slice};
 use super::{Rounds, Structure, StructureView, dispatch};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::grid::CellRange;
 use crate::kernels::{
     LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceCollect, SliceCollectSpec, SliceLocate, SliceLocateSpec,
     SlicePlan as PlanKernel, SlicePlanSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec,
@@ -24,7 +25,6 @@ use crate::layout::{RunState, SlicePlan, SliceStatus, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
 use crate::primitives::{Arena, Count};
-use crate::reference::vertices::CellRange;
 use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 

@@ -16,6 +16,7 @@ use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_byt
 use crate::build::Capacity;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::grid::CellRange;
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
     VolumePlan, VolumePlanSpec,
@@ -23,7 +24,6 @@ use crate::kernels::{
 use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::reference::vertices::CellRange;
 use crate::render::TABLE_SIZE;
 use std::mem::offset_of;
 

@@ -22,8 +22,8 @@
 //! point may lie outside an edge's shadow by 3ε/|V| of the shadow's width. The limits of edges therefore get
 //! `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
 
-use super::grid::{Grid, reciprocal, two_to};
 use super::tet::{EDGES, FACES, Tet, Vec3, abs, cross, cross_bound, dot, sub};
+use crate::grid::{Grid, reciprocal, two_to};
 use crate::options::Assign;
 
 /// A face plane. A box is outside if `dot(normal, centre − at) > limit`.

@@ -2,9 +2,10 @@
 //! `glsl/build/0*`.
 
 use super::corners::{MOST_THIN, thin_corners_at};
-use super::grid::{COORDINATE_LIMIT, Grid, canonical};
 use super::tet::Tet;
 use crate::error::{Error, Result};
+use crate::grid::{COORDINATE_LIMIT, Grid, canonical};
+use crate::layout::bit;
 use crate::mesh::Mesh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -66,11 +67,6 @@ pub struct Topology {
     pub counts: Counts,
     /// The bad tetrahedra in ascending order, each with the first fault found.
     pub bad: Vec<(u32, Fault)>,
-}
-
-/// Bit `i` of packed words; false beyond their end.
-pub fn bit(words: &[u32], i: u32) -> bool {
-    words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
 }
 
 /// Indices of the set bits of packed words, ascending.

@@ -2,11 +2,11 @@
 
 use super::boundary::Topology;
 use super::codes::Stage;
-use super::grid::{Grid, MAX_LEVEL};
 use super::marks::Marks;
 use super::vertices::Vertices;
 use super::{depth, leaves, levels, quarters};
 use crate::error::{Error, Result};
+use crate::grid::{Grid, MAX_LEVEL};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
 use crate::tree::TreeArrays;

@@ -3,12 +3,12 @@
 
 use super::assign::{Filter, cell_centre, half_cell};
 use super::boundary::Topology;
-use super::grid::{Grid, morton};
 use super::marks::{Marks, owns_centre};
 use super::sort::sort_pairs;
 use super::vertices::Vertices;
 use super::walk::Walker;
 use crate::error::{Error, Result};
+use crate::grid::{Grid, morton};
 use crate::mesh::Mesh;
 use crate::options::Assign;
 use rayon::prelude::*;

@@ -12,9 +12,9 @@
 //! 2^-20. So lengths are never too small, and their products are never denormal, since one of the edges of a corner is at
 //! least half as long as the longest.
 
-use super::boundary::bit;
-use super::grid::{canonical, two_to};
 use super::tet::{Bounds, Tet, Vec3, dot};
+use crate::grid::{canonical, two_to};
+use crate::layout::bit;
 use crate::mesh::Mesh;
 
 /// Most thin corners at a vertex that is not crowded.

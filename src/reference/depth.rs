@@ -2,9 +2,9 @@
 //! `glsl/build/1*`.
 
 use super::boundary::Topology;
-use super::grid::{Grid, MAX_LEVEL, canonical};
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
+use crate::grid::{Grid, MAX_LEVEL, canonical};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, usual_capacity};
 use crate::tree::TreeBytes;

@@ -1,9 +1,9 @@
 //! Visits the leaves of a tree in Morton order, below the nodes that a predicate accepts. The kernels' version can be
 //! interrupted and resumed at any Morton code. Twin of `glsl/shared/leaf_walk.glsl`.
 
-use super::grid::{Grid, MAX_LEVEL, canonical, unmorton};
 use super::traverse::Node;
-use super::vertices::CellRange;
+use crate::grid::CellRange;
+use crate::grid::{Grid, MAX_LEVEL, canonical, unmorton};
 use crate::tree::TreeArrays;
 
 /// Calls `leaf` for every leaf that `enters` accepts, in Morton order, until `leaf` returns true. `enters` decides for

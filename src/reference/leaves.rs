@@ -2,20 +2,19 @@
 //! `glsl/build/40_flag_leaves` and `41_finish_leaves`.
 
 use super::assign::{cell_centre, half_cell};
-use super::boundary::{Topology, bit};
-use super::grid::{Grid, canonical, two_to, unmorton};
+use super::boundary::Topology;
 use super::quarters::{ALL_OCTANTS, octants_near};
 use super::separate::box_touches;
 use super::splits::Splits;
 use super::tet::sub;
 use super::vertices::Vertices;
+use crate::grid::Box6;
+use crate::grid::{Grid, canonical, two_to, unmorton};
+use crate::layout::bit;
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
 use std::ops::Range;
-
-/// A box as `[lo, hi]`, with x, y and z of each corner.
-pub type Box6 = [f32; 6];
 
 /// The box of the cell with Morton code `code` at `level`, in the units of the mesh. On each axis it reaches from
 /// `lo + extent·(k·2^-l)` to `lo + extent·((k+1)·2^-l)`, without denormals, where `extent = hi − lo`. The upper side of

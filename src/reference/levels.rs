@@ -1,8 +1,8 @@
 //! Stage 4, second part: internal nodes from their children, level by level from the leaves to the root (the paper's
 //! Alg. 2). Twin of `glsl/build/50_merge_level`.
 
-use super::leaves::Box6;
 use super::splits::Splits;
+use crate::grid::Box6;
 use rayon::prelude::*;
 
 /// Boundary flag of every node, from those of the leaves: the OR of the children's flags. (The paper sets that of the

@@ -3,12 +3,12 @@
 use super::assign::{cell_centre, half_cell};
 use super::boundary::{NONE, Topology};
 use super::candidates::Best;
-use super::grid::{Grid, MAX_LEVEL, canonical, morton};
 use super::quarters::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
 use super::walk::{HINTED, LeafCell, STRIDE, Walked, Walker, weighed};
+use crate::grid::{Grid, MAX_LEVEL, canonical, morton};
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Lists, POINT_RUN, TOLERANCE};
 use crate::tree::TreeArrays;

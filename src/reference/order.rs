@@ -1,8 +1,8 @@
 //! Reordering of a mesh in memory along the Morton curve.
 
 use super::boundary::{fault_of, is_usable, valid_grid};
-use super::grid::morton;
 use crate::error::{Error, Result};
+use crate::grid::morton;
 use crate::mesh::{Mesh, On};
 use rayon::prelude::*;
 

@@ -24,14 +24,15 @@
 //! Pairs cannot be inferred. All pairs of tetrahedra whose boxes meet are tested; they are found through the cells of
 //! B. The sets then consist of the tetrahedra that occur in pairs.
 
-use super::boundary::{Topology, bit};
-use super::grid::{Grid, MAX_LEVEL, canonical, two_to, unmorton};
+use super::boundary::Topology;
 use super::leaf_walk::{meets, walk_leaves};
 use super::separate::{box_touches, tets_touch};
 use super::tet::{Tet, Vec3, sub};
 use super::traverse::Node;
-use super::vertices::CellRange;
+use crate::grid::CellRange;
+use crate::grid::{Grid, MAX_LEVEL, canonical, two_to, unmorton};
 use crate::layout::NodeFrame;
+use crate::layout::bit;
 use crate::mesh::Mesh;
 use crate::options::Assign;
 use crate::tree::TreeArrays;

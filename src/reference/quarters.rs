@@ -14,8 +14,9 @@
 //! as at the border of a leaf. On an axis so much shorter than the longest one that normalised coordinates cannot tell
 //! its finest cells apart, everything is near.
 
-use super::grid::{Grid, MAX_LEVEL, two_to, unmorton};
-use super::vertices::{CellRange, Vertices};
+use super::vertices::Vertices;
+use crate::grid::CellRange;
+use crate::grid::{Grid, MAX_LEVEL, two_to, unmorton};
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;

@@ -10,8 +10,8 @@
 //! children's.
 
 use super::boundary::Topology;
-use super::grid::{canonical, morton, two_to};
 use super::vertices::Vertices;
+use crate::grid::{canonical, morton, two_to};
 use crate::mesh::{Field, Mesh, On};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;

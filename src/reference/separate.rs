@@ -13,8 +13,8 @@
 //! are tried as axes, with no allowance, and touching counts as intersection. The answer for (a, b) equals that for
 //! (b, a) bit for bit, because every difference and cross product changes only its sign.
 
-use super::grid::{canonical, reciprocal, two_to};
 use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
+use crate::grid::{canonical, reciprocal, two_to};
 
 /// The smallest and the largest of four values.
 fn range4(x: [f32; 4]) -> (f32, f32) {

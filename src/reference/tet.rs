@@ -4,7 +4,7 @@
 //! The vertices of a tetrahedron are taken in ascending global index, so that two neighbours get bit-identical results
 //! for their common face.
 
-use super::grid::{reciprocal, two_to};
+use crate::grid::{reciprocal, two_to};
 
 /// A point in normalised coordinates.
 pub type Vec3 = [f32; 3];

@@ -18,8 +18,8 @@
 
 use super::boundary::NONE;
 use super::candidates::Best;
-use super::grid::{reciprocal, two_to};
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
+use crate::grid::{reciprocal, two_to};
 use crate::mesh::{Field, Mesh, On};
 
 /// Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see [`super::corners`].

@@ -3,8 +3,8 @@
 mod spec;
 
 use crate::error::{Error, Result};
+use crate::grid::MIN_EXTENT;
 use crate::layout::Grid;
-use crate::reference::grid::MIN_EXTENT;
 use glam::DVec3;
 
 pub use spec::{CameraSpec, HELP};

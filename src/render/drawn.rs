@@ -1,7 +1,7 @@
 //! The values that a transfer function shows.
 
 use super::TABLE_SIZE;
-use crate::reference::grid::canonical;
+use crate::grid::canonical;
 
 /// Ranges of values, ascending and disjoint, outside of which every value has opacity 0 in `table`, however its place
 /// is rounded. Place 0 is at `value_lo`, and there are `value_scale` places per unit of value.

@@ -5,9 +5,9 @@ use super::drawn::drawn_values;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, gradient_normals, shading_normals};
 use crate::error::{Error, Result};
+use crate::grid::{canonical, two_to};
 use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
-use crate::reference::grid::{canonical, two_to};
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.

@@ -19,9 +19,9 @@ pub mod settings;
 pub use settings::{Plane, SliceSettings};
 
 use crate::error::{Error, Result};
+use crate::grid::CellRange;
+use crate::grid::{canonical, two_to};
 use crate::layout::{Grid, SlicePlan};
-use crate::reference::grid::{canonical, two_to};
-use crate::reference::vertices::CellRange;
 use glam::DVec3;
 use std::ops::Range;
 

@@ -97,7 +97,7 @@ impl TreeArrays {
     }
 
     /// Gathers the statistics of a valid tree.
-    pub(super) fn stats(&self) -> TreeStats {
+    pub(crate) fn stats(&self) -> TreeStats {
         let leaves = u64::from(self.nodes() - self.internal_nodes());
         let lengths = || self.leaves().map(|j| (j, self.entries(j).len() as u64));
         let boundary = || lengths().filter(|&(j, _)| self.is_boundary(j));

@@ -1,12 +1,12 @@
 //! The assignments `Planes` and `Exact`: no cell that a tetrahedron touches is dropped, and few others are kept.
 
 use super::{Random, prepared};
+use olbvh::grid::{Grid, MAX_LEVEL};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::Assign;
 use olbvh::reference::assign::{Filter, cell_centre, half_cell};
 use olbvh::reference::boundary::Topology;
-use olbvh::reference::grid::{Grid, MAX_LEVEL};
 use olbvh::reference::vertices::Vertices;
 
 /// Whether a tetrahedron and a box touch, in double precision without any allowance but `margin` (relative to the

@@ -1,12 +1,12 @@
 //! Meshes in the order of a Z curve, and answers over them.
 
 use super::{Random, options, prepared};
+use olbvh::grid::morton;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{Topology, fault_of};
 use olbvh::reference::build::build;
-use olbvh::reference::grid::morton;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{OverlapSide, overlap};
 use olbvh::tree::TreeArrays;

@@ -1,10 +1,10 @@
 //! Traversal with a short stack visits the leaves that a recursion visits.
 
 use super::{prepared, tree};
+use olbvh::grid::unmorton;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::kuhn_jittered;
 use olbvh::options::Assign;
-use olbvh::reference::grid::unmorton;
 use olbvh::reference::leaves::cell_box;
 use olbvh::reference::traverse::{Node, full_stack, traverse, traverse_leaves};
 use olbvh::tree::TreeArrays;

@@ -6,9 +6,9 @@ use crate::input::TreeArgs;
 use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
+use olbvh::grid::MAX_LEVEL;
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::{Fineness, Lists};
-use olbvh::reference::grid::MAX_LEVEL;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 

@@ -6,10 +6,10 @@ use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{ALIGNMENT, Gpu};
+use crate::grid::MAX_LEVEL;
 use crate::options::{BuildOptions, Lists};
 use crate::primitives::Arena;
 use crate::query::Scene;
-use crate::reference::grid::MAX_LEVEL;
 
 /// Entries per tetrahedron for which there is room by default, if all leaves have full lists.
 const ENTRIES: u32 = 24;

@@ -5,11 +5,11 @@ use super::{SliceInput, SliceMemory, cmd_slice};
 use crate::build::DeviceMesh;
 use crate::error::Result;
 use crate::gpu::{Buffer, Gpu};
+use crate::grid::CellRange;
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Built, Rounds, StructureView, upload_field};
-use crate::reference::vertices::CellRange;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
 /// Voxels of one band, unless a single row has more.

@@ -5,11 +5,11 @@ use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Shown, cmd_render};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu};
+use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Built, Rounds, Structure, StructureView, upload_field};
-use crate::reference::vertices::CellRange;
 use crate::render::{Plan, TABLE_SIZE};
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long.

@@ -1,9 +1,10 @@
 //! The part of a ray that can meet the mesh, from the boundary nodes of the tree.
 
 use super::skip::inverse_of;
-use crate::reference::boundary::bit;
-use crate::reference::leaves::{Box6, cell_box};
-use crate::reference::vertices::CellRange;
+use crate::grid::Box6;
+use crate::grid::CellRange;
+use crate::layout::bit;
+use crate::reference::leaves::cell_box;
 use crate::render::{MAX_SAMPLES, Plan, interval_slack};
 use crate::tree::TreeArrays;
 

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::skip::{Skips, inverse_of};
-use crate::reference::grid::{canonical, reciprocal};
+use crate::grid::{canonical, reciprocal};
 use crate::reference::walk::{Stand, weighed};
 use crate::render::{Lighting, Plan};
 

@@ -1,7 +1,7 @@
 //! Stretches of a ray in which nothing is visible. Twin of `glsl/shared/skip.glsl`.
 
-use crate::reference::boundary::bit;
-use crate::reference::grid::{MAX_LEVEL, morton, reciprocal};
+use crate::grid::{MAX_LEVEL, morton, reciprocal};
+use crate::layout::bit;
 use crate::reference::leaves::cell_side;
 use crate::render::Plan;
 use crate::tree::TreeArrays;

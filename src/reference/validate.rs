@@ -1,17 +1,17 @@
 //! Checks the rules that every tree must satisfy (SPEC 2.5).
 
-use super::{TreeArrays, TreeStats};
+use super::boundary::Topology;
+use super::codes::Stage;
+use super::leaves::{cell_box, flag, octants};
+use super::levels::union;
+use super::marks::Marks;
+use super::quarters::{id_mask, quarters_near};
+use super::vertices::Vertices;
 use crate::error::{Error, Result};
+use crate::grid::{MAX_LEVEL, unmorton};
 use crate::mesh::Mesh;
 use crate::options::Lists;
-use crate::reference::boundary::Topology;
-use crate::reference::codes::Stage;
-use crate::reference::grid::{MAX_LEVEL, unmorton};
-use crate::reference::leaves::{cell_box, flag, octants};
-use crate::reference::levels::union;
-use crate::reference::marks::Marks;
-use crate::reference::quarters::{id_mask, quarters_near};
-use crate::reference::vertices::Vertices;
+use crate::tree::{TreeArrays, TreeStats};
 use rayon::prelude::*;
 
 /// Outcome of a rule; the text says what is wrong, with indices.
