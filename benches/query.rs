@@ -10,7 +10,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, TOLERANCE};
-use olbvh::query::{self, LocateOptions, LocateOutput, Path, PointInput, Scene};
+use olbvh::query::{self, LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene};
 use olbvh::reference::boundary::topology;
 use olbvh::render::{Bounds, Prepared, RenderSettings};
 use std::time::Duration;
@@ -45,8 +45,8 @@ fn location(c: &mut Criterion) {
     for assign in Assign::EVERY {
         let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).expect("a tree");
         let scene = Scene::new(&on_device, &tree).expect("its mesh");
-        for (name, path) in [("descent", Path::Descent), ("traversal", Path::Traversal(8))] {
-            let options = LocateOptions { path, ..LocateOptions::default() };
+        for (name, method) in [("descent", LocateMethod::Descent), ("traversal", LocateMethod::Traversal(8))] {
+            let options = LocateOptions { method, ..LocateOptions::default() };
             let run = |iterations: u64| -> Duration {
                 let record = |_| {
                     let ((), time) =
@@ -72,8 +72,8 @@ fn location(c: &mut Criterion) {
     group.bench_function(BenchmarkId::new("lbvh", "Apetrei 2014"), |b| b.iter_custom(run));
 }
 
-/// A figure taken from a drawn picture.
-type Part = fn(&query::Drawn) -> f64;
+/// A figure taken from a finished picture.
+type Part = fn(&query::Rendered) -> f64;
 
 fn rendering(c: &mut Criterion) {
     let (gpu, mesh) = setting();
@@ -85,14 +85,13 @@ fn rendering(c: &mut Criterion) {
     let field = &mesh.fields[0];
     let prepared = Prepared::new(&settings, &mesh, &bounds, &topology.neighbours, |_| true, field).expect("a plan");
     let draw = || {
-        query::render(&on_device, &tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), &|_, _| {})
-            .expect("a picture")
+        query::render(&on_device, &tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), SILENT).expect("a picture")
     };
     let first = draw();
-    assert!(first.found_samples > 0 && first.colors == draw().colors, "two pictures differ");
+    assert!(first.stats.found_samples > 0 && first.colors == draw().colors, "two pictures differ");
     let mut group = c.benchmark_group("render");
-    group.sample_size(10).throughput(Throughput::Elements(first.samples));
-    for (name, part) in [("intervals", (|d| d.interval_ms) as Part), ("march", |d| d.march_ms)] {
+    group.sample_size(10).throughput(Throughput::Elements(first.stats.samples));
+    for (name, part) in [("intervals", (|d| d.stats.interval_ms) as Part), ("march", |d| d.stats.march_ms)] {
         let run = |iterations: u64| -> Duration { (0..iterations).map(|_| Duration::from_secs_f64(part(&draw()) * 1e-3)).sum() };
         group.bench_function(BenchmarkId::new(name, "256x256"), |b| b.iter_custom(run));
     }

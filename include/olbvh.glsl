@@ -60,18 +60,18 @@ struct olbvh_Grid {
 struct olbvh_MeshStatus {
     uint lo[3];     // Lower corner of the bounds as ordered keys, complemented, so that 0 means: no vertex yet.
     uint hi[3];     // Upper corner of the bounds as ordered keys.
-    uint bad;       // Bad tetrahedra: index out of range, repeated vertex, or coordinate not finite.
+    uint bad;       // Bad tetrahedra: index out of range, repeated vertex, or coordinate not finite or beyond 2^125.
     uint boundary;  // Boundary tetrahedra.
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
-    uint overflow;  // Not 0: the table of faces was too small. Never happens with the planned size.
+    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
 struct olbvh_BuildStatus {
     uint level;            // Level of the leaves, l.
-    uint heuristic_level;  // Level that the heuristic chose; larger than `level` where a capacity lowered it.
+    uint wanted_level;     // Level by alpha (Eq. 12), or as requested; `level` is smaller where a limit lowered it.
     uint candidates;       // Cells in the quantized boxes of all tetrahedra, which are the entries with `Aabb`.
     uint entries;          // Number of entries, n_m.
     uint nodes;            // Number of nodes, n_n.
@@ -308,6 +308,9 @@ uvec3 olbvh_quantize(olbvh_Grid g, vec3 x) {
     precise vec3 q = olbvh_from_corner(g, x) * g.inv.xyz;
     return olbvh_cell_at(q);
 }
+
+// Words of one bit for each cell of a level.
+uint olbvh_cell_words(uint level) { return ((1u << 3u * level) + 31u) / 32u; }
 
 // Packs a cell of the finest grid into one word, and unpacks it.
 uint olbvh_pack_cell(uvec3 q) { return q.x | q.y << 10 | q.z << 20; }
@@ -1200,7 +1203,12 @@ bool olbvh_traverse(uint level) {
         if (n > 0u) {
             uint shift = 3u * node.level;
             if (node.level >= resume) trail |= (n - 1u) << shift;
-            uint left = min(trail >> shift & 7u, n - 1u);
+            uint digit_left = trail >> shift & 7u, left = min(digit_left, n - 1u);
+            if (left < digit_left) {
+                // F_N has become stricter, so the path may lead elsewhere, and the trail below it is another node's.
+                trail = (trail & ((1u << shift) - 1u)) | left << shift;
+                resume = node.level;
+            }
             // Pushes the siblings after the next node, the last first; then takes the next node itself.
             olbvh_Node parent = node;
             for (uint k = 0u; k <= left; ++k) {

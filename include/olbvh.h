@@ -163,7 +163,8 @@ typedef struct olbvh_tree_info_data {
    */
   float hi[3];
   /*
-   Number of tetrahedra left out because a vertex does not exist, occurs twice or is not finite.
+   Number of tetrahedra left out because a vertex does not exist, occurs twice, or has a coordinate that is not
+   finite or beyond 2^125.
    */
   uint32_t bad_cells;
   /*
@@ -492,7 +493,8 @@ typedef struct olbvh_scene_arrays_data {
    */
   struct olbvh_buffer bindings[10];
   /*
-   What was built, in words: level of the leaves, level that was requested, candidates, entries, nodes, internal
+   What was built, in words: level of the leaves, level before the limits (by alpha or as requested; larger than
+   the level of the leaves where a capacity lowered it), candidates, entries, nodes, internal
    nodes, leaves, …
    */
   struct olbvh_buffer status;
@@ -749,7 +751,7 @@ typedef struct olbvh_slicing {
  */
 typedef struct olbvh_slicing_parts_data {
   /*
-   Size of the memory in bytes: 29 per voxel, and 32 per run of 64 voxels in the same column of a layer.
+   Size of the memory in bytes: 28 per voxel, and 32 per run of 64 voxels in the same column of a layer.
    */
   uint64_t bytes;
   /*
@@ -962,8 +964,9 @@ void olbvh_recording_free(struct olbvh_recording *recording);
  `VkCommandBuffer` in the recording state, outside of a render pass. If it is 0, the recording is a rehearsal:
  commands compile the pipelines that they need, and the end reserves room for their descriptor sets, so that
  recording the same commands later creates nothing. `queries` is a reset `VkQueryPool` of `query_count` timestamp
- queries, or 0; stages are timed as long as queries are left. The recording binds a compute pipeline, push constants,
- and descriptor set 0 where the device has no buffer addresses.
+ queries, or 0; stages are timed as long as queries are left, and not at all if the queue family has no timestamps
+ (`timestampValidBits` 0). The recording binds a compute pipeline, push constants, and descriptor set 0 where the
+ device has no buffer addresses.
  */
 enum olbvh_status olbvh_recording_begin(struct olbvh_recording *recording,
                                         uint64_t commands,
@@ -1022,7 +1025,7 @@ enum olbvh_status olbvh_scene_place(const struct olbvh_gpu *gpu,
 void olbvh_scene_free(struct olbvh_scene *scene);
 
 /*
- Reports where the arrays of a scene are. `field`, a float per point, may be null.
+ Reports where the arrays of a scene are. `field`, a float per point, may be null or of size 0: none.
  */
 enum olbvh_status olbvh_scene_arrays(const struct olbvh_scene *scene,
                                      const struct olbvh_buffer *field,

@@ -52,7 +52,7 @@ pub enum Error {
     #[error("invalid argument: {0}")]
     Invalid(String),
     /// The mesh has bad cells and the caller chose to reject them.
-    #[error("{count} bad cells (index out of range, repeated vertex, or coordinate not finite); the first: {first}")]
+    #[error("{count} bad cells (index out of range, repeated vertex, or coordinate not finite or beyond 2^125); the first: {first}")]
     BadCells {
         /// Number of bad cells.
         count: u64,
@@ -88,6 +88,8 @@ pub enum Error {
 impl Error {
     /// Whether the error is a lack of memory or capacity, so that a smaller request may succeed.
     pub(crate) fn is_lack_of_room(&self) -> bool {
-        matches!(self, Self::Memory { .. } | Self::TooLarge(_))
+        // Any Vulkan call may run out of memory, not only an allocation.
+        let full = matches!(self, Self::Vulkan { result: ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, .. });
+        full || matches!(self, Self::Memory { .. } | Self::TooLarge(_))
     }
 }

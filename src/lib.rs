@@ -14,12 +14,12 @@
 //! let gpu = Gpu::new(&GpuOptions::default())?;
 //! let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip)?;
 //! let tree = Tree::build(&gpu, &on_device, &BuildOptions::default())?;
-//! let found = query::locate(&on_device, &tree, &[[0.5, 1.5, 2.5]], None, &query::LocateOptions::default(), &|_, _| {})?;
+//! let found = query::locate(&on_device, &tree, &[[0.5, 1.5, 2.5]], None, &query::LocateOptions::default(), query::SILENT)?;
 //! println!("the point lies in tetrahedron {}", found.owners[0]);
 //! # Ok(()) }
 //! ```
 //!
-//! For thin bodies and for rendering, see [`options::Fineness`]; for many points, [`query::Path`]; for repeated calls,
+//! For thin bodies and for rendering, see [`options::Fineness`]; for many points, [`query::LocateMethod`]; for repeated calls,
 //! [`gpu::Gpu::with_pool`].
 //!
 //! # In your own renderer

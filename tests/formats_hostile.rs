@@ -125,11 +125,13 @@ fn made_files(broken: &mut Vec<String>) {
     let first = (50_000, String::new(), String::new());
     let pieces: Vec<_> = std::iter::once(first).chain((0..500).map(|i| (1, array(i, 9), String::new()))).collect();
     let arrays: String = (0..100_000).map(|i| array(i, 1)).collect();
+    let empty = (0, "<DataArray type=\"Int8\" format=\"binary\"/>\n".repeat(200_000), String::new());
     let view = |i: usize| format!("v{i:06}");
     let many = 100_000;
     let files = [
         ("pieces.vtu", vtu(&pieces), None),
         ("arrays.vtu", vtu(&[(4, String::new(), arrays)]), Some(many)),
+        ("empty_arrays.vtu", vtu(&[empty, (4, String::new(), String::new())]), Some(0)),
         ("empty_views.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, ""))), Some(0)),
         ("views_of_one.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, "1 1 2 3 4 5 6 7 8 9"))), None),
         ("views.msh", msh(4, (0..many).map(|i| (view(i), 1, "1 1"))), Some(many)),

@@ -6,7 +6,7 @@ mod formats_small;
 
 use formats_small::{POINTS, TETS, all, replace, shared};
 use olbvh::Error;
-use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load, load_bytes};
 use olbvh::mesh::{On, kuhn};
 
 fn open(path: impl AsRef<std::path::Path>) -> Loaded {
@@ -134,7 +134,7 @@ fn pieces_are_joined_or_not() {
     let Some(folder) = shared("formats") else { return };
     let path = folder.join("bracket_5k_twopieces.vtu");
     assert_eq!(open(&path).mesh.points.len(), 1659);
-    let apart = LoadOptions { merge_pieces: false, ..LoadOptions::default() };
+    let apart = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
     assert_eq!(load(&path, &apart).unwrap().mesh.points.len(), 1786);
 }
 
@@ -243,6 +243,69 @@ fn ghost_cells_are_left_out() {
 }
 
 #[test]
+fn hidden_cells_are_left_out() {
+    let marks = "Name=\"vtkGhostType\" NumberOfComponents=\"1\" format=\"ascii\">0 32 0 0 8 40<";
+    let old = "Name=\"c\" NumberOfComponents=\"1\" format=\"ascii\">0 1 2 3 4 5<";
+    let Loaded { mesh, report } = open_bytes("hidden.vtu", replace("ascii.vtu", old.as_bytes(), marks.as_bytes()));
+    assert_eq!(mesh.cell_ids.unwrap(), [0, 2, 3, 4]);
+    assert!(report.to_string().contains("2 ghost or hidden cell: left out"), "{report}");
+}
+
+/// Every cell has its own copies of its points.
+fn unshared() -> Vec<u8> {
+    let points: String = TETS.as_flattened().iter().map(|&v| POINTS[v as usize].map(|x| x.to_string()).join(" ") + "\n").collect();
+    let cells: String = (0..6).map(|i| format!("4 {} {} {} {}\n", 4 * i, 4 * i + 1, 4 * i + 2, 4 * i + 3)).collect();
+    let values: String = TETS.as_flattened().iter().map(|v| format!("{v}\n")).collect();
+    let head = "# vtk DataFile Version 3.0\nunshared\nASCII\nDATASET UNSTRUCTURED_GRID\n";
+    let data = format!("POINT_DATA 24\nFIELD F 1\ns 1 24 float\n{values}");
+    format!("{head}POINTS 24 double\n{points}CELLS 6 30\n{cells}CELL_TYPES 6\n{}{data}", "10\n".repeat(6)).into_bytes()
+}
+
+#[test]
+fn cells_that_share_no_points() {
+    let apart = open_bytes("apart.vtk", unshared());
+    assert!(apart.mesh.points.len() == 24 && apart.report.warnings[0].starts_with("each cell has points of its own, so every face"));
+    let all = LoadOptions { merge: Merge::All, ..LoadOptions::default() };
+    let Loaded { mesh, report } = load_bytes("merged.vtk", unshared(), &all).unwrap();
+    assert_eq!((mesh.points.len(), report.warnings), (8, vec!["16 points that coincide with others are merged".to_owned()]));
+    let place = |v: u32| (mesh.points[v as usize], mesh.field("s").unwrap().values[v as usize]);
+    for (found, wanted) in mesh.tets.as_flattened().iter().zip(TETS.as_flattened()) {
+        assert_eq!(place(*found), (POINTS[*wanted as usize].map(|x| x as f32), *wanted as f32));
+    }
+}
+
+#[test]
+fn numbers_as_windows_writes_them() {
+    let odd = ">1.#QNAN -1.#IND00 1.#INF -1.#inf 1.#SNAN -nan(ind) nan(0x8000000000000) 7<";
+    let Loaded { mesh, report } = open_bytes("odd.vtu", replace("ascii.vtu", b">0 1 2 3 4 5 6 7<", odd.as_bytes()));
+    assert_eq!(report.warnings, ["array `s`: 7 of 8 values are not finite in single precision"]);
+    let values = &mesh.field("s").unwrap().values;
+    assert!(values[..7].iter().all(|v| v.is_nan()) && values[7] == 7.0);
+}
+
+#[test]
+fn entities_of_xml_matter_in_arrays_only() {
+    let key = "<InformationKey name=\"UNITS\">N&amp;m</InformationKey>";
+    assert!(
+        open_bytes("key.vtu", replace("ascii.vtu", b"</DataArray>", format!("{key}</DataArray>").as_bytes())).report.warnings.is_empty()
+    );
+    let error = load_bytes("in.vtu", replace("ascii.vtu", b"</DataArray>", b"&amp;</DataArray>"), &LoadOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("line 5: an entity reference in the data"), "{error}");
+}
+
+#[test]
+fn arrays_of_bits_are_named_as_such() {
+    let report = open_bytes("bits.vtu", replace("ascii.vtu", b"type=\"Float32\"", b"type=\"Bit\"")).report;
+    assert_eq!(report.warnings, ["array `s` holds text or bits and is left out"]);
+}
+
+#[test]
+fn empty_lines_before_the_coding_of_legacy_files() {
+    assert_eq!(open_bytes("lines.vtk", replace("ascii.vtk", b"ASCII", b"\n\nASCII")).mesh.tets.len(), 6);
+    assert_eq!(open_bytes("lines.vtk", replace("binary.vtk", b"BINARY", b"\nBINARY ")).mesh.tets.len(), 6);
+}
+
+#[test]
 fn parametric_volumes_are_missed() {
     let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10", b"CELL_TYPES 6\n55")).report;
     assert_eq!((report.count(Fate::Unsupported), report.count(Fate::Boundary)), (1, 0), "{report}");
@@ -272,7 +335,7 @@ fn arrays_of_some_pieces() {
         piece([values("a", [8, 9, 8, 9]), values("a", [7, 6, 7, 6])]),
     ];
     let file = format!("<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>", pieces.concat());
-    let apart = LoadOptions { merge_pieces: false, ..LoadOptions::default() };
+    let apart = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
     let mesh = load_bytes("three.vtu", file.into_bytes(), &apart).unwrap().mesh;
     let found: Vec<_> =
         mesh.fields.iter().map(|f| (f.name.as_str(), f.values.iter().map(|&v| v as i32 - i32::from(v.is_nan())).collect())).collect();
@@ -310,6 +373,69 @@ fn gmsh_physical_groups_of_4_0() {
     let Some(folder) = shared("formats") else { return };
     let mesh = open(folder.join("bracket_5k_40_ascii.msh")).mesh;
     assert!(mesh.field("gmsh:physical").unwrap().values.iter().all(|&v| v == 11.0));
+}
+
+/// The elements belong to the entity 0, which has no group of its own but is part of volume 7.
+#[test]
+fn gmsh_physical_groups_of_partitioned_meshes() {
+    let (int, long) = (|v: i32| v.to_le_bytes().to_vec(), |v: u64| v.to_le_bytes().to_vec());
+    let bounds = [0.0, 0.0, 0.0, 1.0, 1.0, 1.0].map(|x: f64| x.to_le_bytes()).concat();
+    let counts = |points: u64| [long(points), long(0), long(0), long(1)].concat();
+    let entities = [counts(0), int(7), bounds.clone(), long(1), int(11), long(0)].concat();
+    let ghosts = [long(2), long(1), int(9), int(2)].concat();
+    let point = [int(1), int(0), int(4), long(2), int(1), int(2), bounds[..24].to_vec(), long(0)].concat();
+    let volume = [int(0), int(3), int(7), long(1), int(1), bounds, long(0), long(1), int(-5)].concat();
+    let parts = [ghosts, counts(1), point, volume].concat();
+    let sections =
+        [b"$Entities\n", &entities[..], b"\n$EndEntities\n$PartitionedEntities\n", &parts, b"\n$EndPartitionedEntities\n$Nodes"].concat();
+    let text = "$Entities\n0 0 0 1\n7 0 0 0 1 1 1 1 11 0\n$EndEntities\n$PartitionedEntities\n2\n1\n9 2\n1 0 0 1\n1 0 4 2 1 2 0 0 0 0\n\
+                0 3 7 1 1 0 0 0 1 1 1 0 1 -5\n$EndPartitionedEntities\n$Nodes";
+    for (name, sections) in [("v41b.msh", sections.as_slice()), ("v41.msh", text.as_bytes())] {
+        let Loaded { mesh, report } = open_bytes(name, replace(name, b"$Nodes", sections));
+        assert_eq!(mesh.field("gmsh:physical").unwrap().values, [11.0; 6], "{name}");
+        assert!(report.warnings.is_empty(), "{report}");
+    }
+    let own = text.replace("1 1 1 0 1 -5", "1 1 1 1 12 1 -5");
+    assert_eq!(open_bytes("own.msh", replace("v41.msh", b"$Nodes", own.as_bytes())).mesh.field("gmsh:physical").unwrap().values, [12.0; 6]);
+}
+
+#[test]
+fn gmsh_counts_cells_of_several_physical_groups() {
+    let again = replace("v22.msh", b"$Elements\n6\n", b"$Elements\n7\n70 4 2 5 0 80 40 20 10\n");
+    let warnings = open_bytes("again.msh", again).report.warnings;
+    // The repeated cell has no value in the file.
+    let found = warnings.iter().filter(|w| w.starts_with("1 repeated cells: their volume")).count();
+    assert_eq!((found, warnings.len()), (1, 2), "{warnings:?}");
+}
+
+#[test]
+fn errors_have_the_numbers_of_the_file() {
+    let error = |name: &str, old: &str, new: &str| {
+        load_bytes(name, replace(name, old.as_bytes(), new.as_bytes()), &LoadOptions::default()).unwrap_err().to_string()
+    };
+    assert!(error("v22.msh", "20 1 0 0", "20 nan 0 0").contains("point 20 (of cell 0)"));
+    assert!(error("text.mesh", "1 0 0 0", "inf 0 0 0").contains("point 2 (of cell 0)"));
+    assert!(error("v22.msh", "10 4 2 0 0 10 20 40 80", "10 4 2 0").contains("the line ends where a tag of an element should be"));
+    assert!(error("v22.msh", "10 4 2 0 0 10 20 40 80", "10 4 99").contains("more than the rest of the line can hold"));
+    let folder = tempfile::tempdir().unwrap();
+    let last = i64::MAX;
+    write(&folder, "odd.node", format!("4 3 0 0\n{last} 0 0 0\n5 nan 0 0\n70 0 1 0\n6 0 0 1\n").as_bytes());
+    let error = load(write(&folder, "odd.ele", format!("1 4 0\n0 {last} 5 70 6\n").as_bytes()), &LoadOptions::default()).unwrap_err();
+    assert!(error.to_string().contains("point 5 (of cell 0)"), "{error}");
+}
+
+#[test]
+fn keywords_of_binary_medit() {
+    for (keyword, nodes, fate) in [(88, 16, Fate::Boundary), (90, 10, Fate::Boundary), (96, 20, Fate::Straightened), (98, 64, Fate::Split)]
+    {
+        let mut bytes = all().into_iter().find(|f| f.0 == "binary.meshb").unwrap().1;
+        bytes.truncate(bytes.len() - 8);
+        let past = bytes.len() as i32 + 12 + 4 * (nodes + 1);
+        let cell = [[keyword, past, 1].to_vec(), (0..nodes).map(|i| [1, 2, 4, 3, 5, 6, 8, 7][i as usize % 8]).collect(), vec![0, 54, 0]];
+        bytes.extend(cell.concat().into_iter().flat_map(i32::to_le_bytes));
+        let report = open_bytes("high.meshb", bytes).report;
+        assert_eq!((report.count(fate), report.warnings.len()), (1, 0), "{keyword}: {report}");
+    }
 }
 
 #[test]

@@ -8,7 +8,7 @@ mod formats_small;
 use std::collections::HashMap;
 
 use formats_small::shared;
-use olbvh::formats::{LoadOptions, load};
+use olbvh::formats::{LoadOptions, load, load_bytes};
 use olbvh::mesh::Mesh;
 
 fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
@@ -152,6 +152,24 @@ fn collapsed_cells_lose_their_empty_pieces() {
         assert_eq!(mesh.tets.len(), 3);
         check(&mesh, 0.5, 8);
     }
+}
+
+/// The second hexahedron starts at the end of the seam where the first one does not, so that its own numbers would cut
+/// the shared face along the other diagonal.
+#[test]
+fn pieces_fit_at_the_seam() {
+    let piece = |points: &str| {
+        format!(
+            "<Piece NumberOfPoints='8' NumberOfCells='1'><Points><DataArray type='Float64' NumberOfComponents='3'>{points}</DataArray>\
+             </Points><Cells><DataArray type='Int32' Name='connectivity'>0 1 2 3 4 5 6 7</DataArray>\
+             <DataArray type='Int32' Name='offsets'>8</DataArray><DataArray type='UInt8' Name='types'>12</DataArray></Cells></Piece>"
+        )
+    };
+    let pieces = [piece("0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1"), piece("1 1 0 1 0 0 2 0 0 2 1 0 1 1 1 1 0 1 2 0 1 2 1 1")];
+    let file = format!("<VTKFile type='UnstructuredGrid'><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>", pieces.concat());
+    let mesh = load_bytes("two.vtu", file.into_bytes(), &LoadOptions::default()).unwrap().mesh;
+    assert_eq!(mesh.points.len(), 12);
+    check(&mesh, 2.0, 20);
 }
 
 /// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted

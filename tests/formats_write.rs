@@ -116,6 +116,14 @@ fn tables_of_points() {
         "id,\"Z\",\"X\",\"Y\"\n7,-3,1,2.5\n8,6e3,4,5\n",
         "Points:0,Points:1,Points:2,v\n1,2.5,-3,0\n4,5,6e3,0\n",
         "v,Points_0,Points_1,Points_2\n0,1,2.5,-3\n0,4,5,6e3\n",
+        "\"1\",\"2.5\",\"-3\"\n\"4\",\"5\",\"6e3\"\n",
+        "\"part, id\",x,y,z\n\"a, b\",1,2.5,-3\nc d,4,5,6e3\n",
+        "Point ID\tx\ty\tz\n0\t1\t2,5\t-3\n1\t4\t5\t6e3\n",
+        "1,0\t2,5\t-3,0\n4,0\t5,0\t6e3\n",
+        "1,0 2,5 -3\n4 5 6e3\n",
+        "1.0,\t2.5,\t-3\n4,\t5,\t6e3\n",
+        "x,y,z\n1,2.5,-3\n4,5,6e3\n,,\n , ,\n",
+        "x;y;z\n1;2.5;-3\n4;5;6e3\n;;\n",
     ] {
         std::fs::write(&path, text).unwrap();
         assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
@@ -133,6 +141,8 @@ fn tables_of_points() {
         ("1,2,3,4\n", "line 1"),
         ("1.o,2,3\n4,4,4\n", "line 1: `1.o` is not a number"),
         ("a,b,c,d\n1,2,3,4\n", "line 1"),
+        ("x,y,z\n1, ,3\n", "line 2: `` is not a number"),
+        ("\"1\",\"2\",\"three\"\n", "line 1: `three` is not a number"),
         ("1,2\0,3", "byte 3"),
     ] {
         std::fs::write(&path, text).unwrap();

@@ -7,7 +7,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
-use olbvh::query::{self, Built, Drawn, LocateOptions, OverlapInput};
+use olbvh::query::{self, Built, LocateOptions, OverlapInput, Rendered, SILENT};
 use olbvh::reference::boundary::NONE;
 use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
@@ -111,7 +111,7 @@ fn check_owners(name: &str, b: &HostAndDevice) {
     if name == "identical-9000" {
         points = points.into_iter().step_by(97).collect(); // every point tests all tetrahedra
     }
-    let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
+    let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
     let found = b.lbvh.locate(&b.device, &points, TOLERANCE).unwrap();
     for (i, p) in points.iter().enumerate() {
         let of = |l: &query::Located| (l.owners[i], l.barycentrics[i]);
@@ -135,17 +135,20 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
 }
 
 /// The picture, which both structures must draw alike; `None` if nothing is visible.
-fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Drawn> {
+fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Rendered> {
     let bounds = Bounds::from(b.device.grid());
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
     let prepared = Prepared::new(settings, &b.mesh, &bounds, &neighbours, valid, field).ok()?;
     let normals = settings.shading.then_some(&prepared.normals[..]);
-    let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, &|_, _| {}).unwrap();
+    let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, SILENT).unwrap();
     let (expected, drawn) = (draw(&b.tree), draw(&b.lbvh));
     let camera = &settings.camera;
     // With a surface, the octree skips what does not show it. With a function that shows every value, it skips nothing.
-    assert!(expected.skipped_samples > 0 || expected.found_samples == drawn.found_samples, "{name}, {camera:?}: samples in the mesh");
+    assert!(
+        expected.stats.skipped_samples > 0 || expected.stats.found_samples == drawn.stats.found_samples,
+        "{name}, {camera:?}: samples in the mesh"
+    );
     assert!(expected.colors == drawn.colors, "{name}, {camera:?}: colours");
     Some(drawn)
 }
@@ -157,7 +160,7 @@ fn check_picture(name: &str, b: &HostAndDevice) -> u64 {
     {
         let field = Field { name: "number".into(), on, values: (0..n).map(|i| (i % 17) as f32).collect() };
         let settings = RenderSettings { size: size(name, [28, 20]), camera: camera.parse().unwrap(), ..RenderSettings::default() };
-        found += same_picture(name, b, &settings, &field).map_or(0, |drawn| drawn.found_samples);
+        found += same_picture(name, b, &settings, &field).map_or(0, |drawn| drawn.stats.found_samples);
     }
     found
 }
@@ -177,7 +180,7 @@ fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
                 owners.extend(band.owners);
                 Ok(())
             };
-            let sliced = query::slice(&b.device, built, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut sink).unwrap();
+            let sliced = query::slice(&b.device, built, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
             touched += sliced.tally.touched;
             (kinds, owners)
         };
@@ -190,8 +193,8 @@ fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
 
 fn check_overlap<'a>(name: &str, a: &'a HostAndDevice, b: &'a HostAndDevice) -> usize {
     let input = |b: &'a HostAndDevice| OverlapInput { mesh: &b.device, tree: &b.tree };
-    let expected = query::overlap(input(a), input(b), false, &|_, _| {}).unwrap();
-    let found = a.lbvh.overlap(&a.device, &b.lbvh, &b.device, &|_, _| {}).unwrap();
+    let expected = query::overlap(input(a), input(b), false, SILENT).unwrap();
+    let found = a.lbvh.overlap(&a.device, &b.lbvh, &b.device, SILENT).unwrap();
     assert_eq!(expected.overlap.a, found.overlap.a, "{name}: a");
     assert_eq!(expected.overlap.b, found.overlap.b, "{name}: b");
     if name == "identical-9000" {

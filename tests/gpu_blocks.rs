@@ -8,15 +8,13 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
-use olbvh::query::{self, LocateOptions, OverlapInput, Path};
+use olbvh::query::{self, LocateMethod, LocateOptions, OverlapInput, SILENT};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume;
 use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
 use std::cell::RefCell;
-
-const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
 /// Vertices, midpoints of edges, centres of faces and tetrahedra, and points just outside and far outside.
 fn points(mesh: &Mesh, every: usize) -> Vec<[f32; 3]> {
@@ -35,17 +33,17 @@ fn bits(values: &[f32]) -> Vec<u32> {
     values.iter().map(|v| v.to_bits()).collect()
 }
 
-fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance, path, on): (f32, Path, On)) -> u32 {
+fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance, method, on): (f32, LocateMethod, On)) -> u32 {
     let points = points(mesh, 3);
-    let how = LocateOptions { tolerance, path };
+    let how = LocateOptions { tolerance, method };
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, options).unwrap();
     let asked = Points { mesh, options: *options, points: &points, how };
     let mut most = 0;
     for field in mesh.fields.iter().filter(|f| f.on == on) {
         let field = (&field.values[..], field.on);
-        let whole = query::locate(&device, &tree, &points, Some(field), &how, QUIET).unwrap();
-        let found = locate(gpu, memory, &asked, Some(field), QUIET).unwrap();
+        let whole = query::locate(&device, &tree, &points, Some(field), &how, SILENT).unwrap();
+        let found = locate(gpu, memory, &asked, Some(field), SILENT).unwrap();
         let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
         let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
         assert_eq!(first, None, "{options:?}");
@@ -55,8 +53,8 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
         most = most.max(found.trees);
     }
-    let whole = query::locate_all(&device, &tree, &points, how.tolerance, QUIET).unwrap();
-    assert_eq!(locate_all(gpu, memory, &asked, QUIET).unwrap().answer, whole);
+    let whole = query::locate_all(&device, &tree, &points, how.tolerance, SILENT).unwrap();
+    assert_eq!(locate_all(gpu, memory, &asked, SILENT).unwrap().answer, whole);
     most
 }
 
@@ -90,8 +88,8 @@ fn answers_are_those_of_the_whole() {
 
 fn located(gpu: &Gpu, mesh: &Mesh) {
     for (alpha, assign, lists, how) in [
-        (0.0, Assign::Aabb, Lists::Boundary, (1e-5, Path::Sorted, On::Points)),
-        (1.0, Assign::Aabb, Lists::All, (0.01, Path::Runs, On::Cells)),
+        (0.0, Assign::Aabb, Lists::Boundary, (1e-5, LocateMethod::Sorted, On::Points)),
+        (1.0, Assign::Aabb, Lists::All, (0.01, LocateMethod::Runs, On::Cells)),
     ] {
         let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
         let trees = check(gpu, mesh, &options, 768 << 10, how);
@@ -104,14 +102,14 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
     let asked = Points { mesh, options, points: &points, how: LocateOptions::default() };
-    assert_eq!(locate(gpu, 64 << 20, &asked, None, QUIET).unwrap().trees, 1);
-    let refused = locate(gpu, 1 << 14, &asked, None, QUIET).unwrap_err();
+    assert_eq!(locate(gpu, 64 << 20, &asked, None, SILENT).unwrap().trees, 1);
+    let refused = locate(gpu, 1 << 14, &asked, None, SILENT).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
     // Blocks as small as these are not cut, so they are asked for few points at a time.
     let small = kuhn_jittered([3; 3], 0.1, 1).unwrap();
     let points: Vec<[f32; 3]> = (0..20_000).map(|i| [i as f32 * 1.5e-4, 1.5, 1.5]).collect();
     let asked = Points { mesh: &small, options, points: &points, how: LocateOptions::default() };
-    let found = locate(gpu, 200 << 10, &asked, None, QUIET).unwrap();
+    let found = locate(gpu, 200 << 10, &asked, None, SILENT).unwrap();
     assert!(found.trees == 1 && !found.answer.owners.contains(&u32::MAX), "{} trees", found.trees);
 }
 
@@ -123,13 +121,13 @@ fn remedied(gpu: &Gpu) {
     let settings = RenderSettings { size: [300, 20], ..RenderSettings::default() };
     let voxels = &SliceSettings { size: [500, 0], ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
     let queries: [&dyn Fn(u64) -> olbvh::Result<u32>; 4] = [
-        &|memory| Ok(locate(gpu, memory, &Points { mesh, options, points: &points, how: LocateOptions::default() }, None, QUIET)?.trees),
-        &|memory| Ok(render(gpu, memory, &View { mesh, options, field, settings: &settings }, QUIET)?.trees),
+        &|memory| Ok(locate(gpu, memory, &Points { mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)?.trees),
+        &|memory| Ok(render(gpu, memory, &View { mesh, options, field, settings: &settings }, SILENT)?.trees),
         &|memory| {
             let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
-            Ok(slice(gpu, memory, &asked, QUIET, &mut |_| Ok(()))?.trees)
+            Ok(slice(gpu, memory, &asked, SILENT, &mut |_| Ok(()))?.trees)
         },
-        &|memory| Ok(overlap(gpu, memory, &Meshes { meshes: [mesh, mesh], options, pairs: false }, QUIET)?.trees),
+        &|memory| Ok(overlap(gpu, memory, &Meshes { meshes: [mesh, mesh], options, pairs: false }, SILENT)?.trees),
     ];
     for (i, query) in queries.into_iter().enumerate() {
         for memory in [20_000, 100_000, 300_000] {
@@ -150,7 +148,7 @@ fn flat(gpu: &Gpu) {
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
     let ask = |fineness| {
         let options = BuildOptions { fineness, ..BuildOptions::default() };
-        locate(gpu, 768 << 10, &Points { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, QUIET)
+        locate(gpu, 768 << 10, &Points { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)
     };
     assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
     let found = ask(Fineness::Points).unwrap();
@@ -165,9 +163,9 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let devices = [a, &b].map(|mesh| DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
         let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
         let [x, y] = [0, 1].map(|i| OverlapInput { mesh: &devices[i], tree: &trees[i] });
-        let whole = query::overlap(x, y, pairs, QUIET).unwrap().overlap;
+        let whole = query::overlap(x, y, pairs, SILENT).unwrap().overlap;
         let memory = 3 << 19;
-        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, QUIET).unwrap();
+        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, SILENT).unwrap();
         println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
         assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
         assert_eq!(found.answer.overlap.a, whole.a);
@@ -204,14 +202,14 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
             gather(&mut all[0], band);
             Ok(())
         };
-        query::slice(&device, &tree, values, voxels, extrapolate, QUIET, &mut sink).unwrap();
+        query::slice(&device, &tree, values, voxels, extrapolate, SILENT, &mut sink).unwrap();
         let memory = 640 << 10;
         let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate };
         let mut sink = |band: Band| {
             gather(&mut all[1], band);
             Ok(())
         };
-        let found = slice(gpu, memory, &asked, QUIET, &mut sink).unwrap();
+        let found = slice(gpu, memory, &asked, SILENT, &mut sink).unwrap();
         println!("{settings:?}: {whole:?}, {} trees, peak {}", found.trees, found.peak);
         let first = (0..all[0].len()).find(|&i| all[0].get(i) != all[1].get(i));
         assert_eq!(first.map(|i| (i, all[0][i], all[1].get(i).copied())), None, "{settings:?}");
@@ -242,14 +240,14 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         };
         let options = BuildOptions::default();
         let asked = View { mesh, options, field: wave, settings: &settings };
-        let (whole, took) = render(gpu, 64 << 20, &asked, QUIET).unwrap().into_parts();
+        let (whole, took) = render(gpu, 64 << 20, &asked, SILENT).unwrap().into_parts();
         assert_eq!(took.trees, 1);
         let memory = 448 << 10;
-        let (found, took) = render(gpu, memory, &asked, QUIET).unwrap().into_parts();
-        println!("{camera}: {} samples, {} trees, peak {}", found.drawn.found_samples, took.trees, took.peak);
-        let first = (0..whole.drawn.colors.len()).find(|&i| bits(&whole.drawn.colors[i]) != bits(&found.drawn.colors[i]));
-        assert_eq!(first.map(|i| (i % 41, i / 41, whole.drawn.colors[i], found.drawn.colors[i])), None, "{camera}");
-        assert!(whole.drawn.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
+        let (found, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
+        println!("{camera}: {} samples, {} trees, peak {}", found.rendered.stats.found_samples, took.trees, took.peak);
+        let first = (0..whole.rendered.colors.len()).find(|&i| bits(&whole.rendered.colors[i]) != bits(&found.rendered.colors[i]));
+        assert_eq!(first.map(|i| (i % 41, i / 41, whole.rendered.colors[i], found.rendered.colors[i])), None, "{camera}");
+        assert!(whole.rendered.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
         assert!(took.trees > 4 && took.peak <= memory, "{} trees, {} bytes", took.trees, took.peak);
     }
 }
@@ -262,8 +260,8 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
         let transfer = TransferFunction::default().with_opacity(opacity).unwrap();
         let settings = RenderSettings { size: [41, 33], transfer, ..RenderSettings::default() };
         let asked = View { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
-        let (picture, took) = render(gpu, memory, &asked, QUIET).unwrap().into_parts();
-        (picture.drawn.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
+        let (picture, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
+        (picture.rendered.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
     };
     let end = vec![(0.0, 0.0), (0.8, 0.0), (1.0, 0.5)];
     let (whole, one) = trees(end.clone(), 64 << 20);
@@ -284,15 +282,16 @@ fn large_pictures_are_drawn_in_strips() {
     let (topology, options) = (topology(&mesh).unwrap(), BuildOptions::default());
     let host = build(&mesh, &topology, &options).unwrap();
     let scene = volume::Scene::new(&mesh, &topology, &host, &field, &settings).unwrap();
-    let expected = volume::render(&scene, &|_, _| {});
+    let expected = volume::render(&scene, SILENT);
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &options).unwrap();
     let told = RefCell::new(Vec::new());
     let report = |done, all| told.borrow_mut().push((done, all));
     let drawn = query::render(&device, &tree, scene.plan(), (&field.values, field.on), None, &report).unwrap();
-    assert_eq!((drawn.samples, drawn.found_samples), (expected.samples, expected.found_samples));
+    let [samples, expected_samples] = [drawn.stats, expected.stats].map(|stats| [stats.samples, stats.found_samples]);
+    assert_eq!(samples, expected_samples);
     let pixels = scene.plan().pixels(&drawn.colors);
-    assert!(drawn.found_samples > 100_000 && pixels == expected.pixels);
+    assert!(drawn.stats.found_samples > 100_000 && pixels == expected.pixels);
     let (told, all) = (told.into_inner(), 4096 * 270);
     assert!(told.iter().any(|&(done, _)| done == 4096 * 256) && told.last() == Some(&(all, all)), "{told:?}");
 }

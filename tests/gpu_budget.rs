@@ -11,7 +11,9 @@ use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
-use olbvh::query::{LocateOptions, LocateOutput, OverlapMemory, Path, PointInput, Rounds, Scene, cmd_locate, cmd_overlap, locate};
+use olbvh::query::{
+    LocateMethod, LocateOptions, LocateOutput, OverlapMemory, PointInput, Rounds, SILENT, Scene, cmd_locate, cmd_overlap, locate,
+};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
@@ -43,7 +45,7 @@ fn usual(gpu: &Gpu) {
     let topology = topology(&mesh).unwrap();
     let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
-    assert_eq!((tree.status().heuristic_level, tree.status().level), (9, 4), "33·8^5 entries are more than 2^20");
+    assert_eq!((tree.status().wanted_level, tree.status().level), (9, 4), "33·8^5 entries are more than 2^20");
     assert_eq!(tree.download().unwrap(), build(&mesh, &topology, &BuildOptions::default()).unwrap());
     // Levels that are asked for, coarser and finer than the heuristic would choose. Capacities still hold.
     for (level, capacity, built) in [(2, None, 2), (10, None, 4), (10, Some(100_000), 3)] {
@@ -87,7 +89,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
     // Every point is found in a tree of a small budget, with the lowest tetrahedron that contains it.
     let of = |budget: Option<u64>| {
         let tree = Tree::build(gpu, &device, &BuildOptions { budget, ..BuildOptions::default() }).unwrap();
-        let found = locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), &|_, _| {}).unwrap();
+        let found = locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
         (tree.status().level, found.owners)
     };
     let ((coarse, found), (fine, expected)) = (of(Some(TreeBytes::most(&sizes.entries, 1, false).total())), of(None));
@@ -281,7 +283,7 @@ fn what_does_not_fit_answers_as_empty() {
         let points = PointInput { points: device.input().positions, stride: 3, count, hints: None, order: None };
         submit(&gpu, "olbvh.test.empty", |r| {
             cmd_build(r, &view, &scene.tree, &options, &scratch)?;
-            cmd_locate(r, &scene, &points, &output, &LocateOptions { path: Path::Traversal(8), ..LocateOptions::default() })?;
+            cmd_locate(r, &scene, &points, &output, &LocateOptions { method: LocateMethod::Traversal(8), ..LocateOptions::default() })?;
             r.barrier("locate → overlap");
             cmd_overlap(r, &whole, &scene, &overlap, Rounds::begin(4))
         })

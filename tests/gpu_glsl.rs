@@ -12,7 +12,7 @@ use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::mesh::kuhn_jittered;
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{LocateOptions, locate, locate_all};
+use olbvh::query::{LocateOptions, SILENT, locate, locate_all};
 use submit::submit;
 
 /// A host's kernel, which writes five words per point.
@@ -152,8 +152,8 @@ fn check(binding: Binding) {
         let view = device.view();
         let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
         let options = LocateOptions::default();
-        let expected = locate(&device, &tree, &points, None, &options, &|_, _| {}).unwrap();
-        let all = locate_all(&device, &tree, &points, options.tolerance, &|_, _| {}).unwrap();
+        let expected = locate(&device, &tree, &points, None, &options, SILENT).unwrap();
+        let all = locate_all(&device, &tree, &points, options.tolerance, SILENT).unwrap();
         for (i, [owner, owners, value, slope, met]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");

@@ -19,7 +19,7 @@ use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOpti
 use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateOptions, locate};
+use olbvh::query::{LocateOptions, SILENT, locate};
 use std::ffi::c_char;
 use std::sync::{Arc, Barrier, Mutex, OnceLock};
 use submit::submit;
@@ -27,7 +27,7 @@ use submit::submit;
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
-    locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners
+    locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap().owners
 }
 
 #[test]
@@ -157,6 +157,47 @@ fn subgroup_size_control_is_found_and_missed() {
         drop(unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), enabled, ..host.lend() }, &GpuOptions::default()) }.unwrap());
         assert_eq!(warned(), if listed.subgroup_size_control { warnings } else { 0 });
     }
+}
+
+static FAMILIES: OnceLock<vk::PFN_vkGetPhysicalDeviceQueueFamilyProperties> = OnceLock::new();
+
+/// The driver's queue families, without timestamps.
+unsafe extern "system" fn hide_timestamps(physical: vk::PhysicalDevice, count: *mut u32, families: *mut vk::QueueFamilyProperties) {
+    // SAFETY: the caller's valid arguments are passed on; `families` is null or has `count` elements.
+    unsafe {
+        FAMILIES.get().unwrap()(physical, count, families);
+        for i in 0..if families.is_null() { 0 } else { *count as usize } {
+            (*families.add(i)).timestamp_valid_bits = 0;
+        }
+    }
+}
+
+#[test]
+fn a_family_without_timestamps_gets_none() {
+    let host = Host::new();
+    let mut zero = host.instance.fp_v1_0().clone();
+    FAMILIES.get_or_init(|| zero.get_physical_device_queue_family_properties);
+    zero.get_physical_device_queue_family_properties = hide_timestamps;
+    let (one, three) = (host.instance.fp_v1_1().clone(), host.instance.fp_v1_3().clone());
+    let untimed = ash::Instance::from_parts_1_3(host.instance.handle(), zero, one, three);
+    let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(2);
+    // SAFETY: the create info is complete, and the queries are destroyed below.
+    let queries = unsafe { host.device.create_query_pool(&info, None) }.unwrap();
+    for (instance, stages) in [(&host.instance, 1), (&untimed, 0)] {
+        // SAFETY: as above.
+        let gpu = unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), ..host.lend() }, &GpuOptions::default()) }.unwrap();
+        let record = |r: &mut Recorder<'_>| {
+            // SAFETY: these are the commands of `r`, which records nothing meanwhile; no command uses the queries.
+            unsafe { gpu.device().cmd_reset_query_pool(r.commands(), queries, 0, 2) };
+            // SAFETY: as above.
+            let mut recorder = unsafe { Recorder::new(&gpu, r.commands(), Some((queries, 2))) };
+            recorder.stage("test", |_| Ok(()))?;
+            Ok(recorder.timed_stages().len())
+        };
+        assert_eq!(submit(&gpu, "olbvh.test.stages", record).unwrap().0, stages);
+    }
+    // SAFETY: the commands with the queries have been executed.
+    unsafe { host.device.destroy_query_pool(queries, None) };
 }
 
 #[test]

@@ -12,7 +12,8 @@ use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use olbvh::query::{
-    LocateOptions, LocateOutput, OverlapInput, Path, PointInput, Scene, cmd_locate, locate, locate_all, overlap, render, slice,
+    LocateMethod, LocateOptions, LocateOutput, OverlapInput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render,
+    slice,
 };
 use olbvh::reference::boundary::{NONE, Topology, topology};
 use olbvh::reference::build::build;
@@ -23,8 +24,6 @@ use olbvh::render::RenderSettings;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 use olbvh::tree::TreeArrays;
 use submit::submit;
-
-const QUIET: &dyn Fn(u64, u64) = &|_, _| {};
 
 fn options(alpha: f32, assign: Assign, lists: Lists) -> BuildOptions {
     BuildOptions { alpha, assign, lists, ..BuildOptions::default() }
@@ -85,13 +84,13 @@ impl Subject {
         let (locator, points) = (Locator::new(&self.mesh, &self.topology, &host), self.points(n));
         let expected = locator.locate_all(&points);
         let what = |i: usize| format!("{} {options:?} point {i} {:?}", self.name, points[i]);
-        for path in [Path::Descent, Path::Traversal(3)] {
-            let found = locate(&self.device, &tree, &points, None, &LocateOptions { path, ..LocateOptions::default() }, QUIET).unwrap();
+        for method in [LocateMethod::Descent, LocateMethod::Traversal(3)] {
+            let found = locate(&self.device, &tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
             for (i, e) in expected.iter().enumerate() {
-                assert_eq!((e.owner, e.barycentric), (found.owners[i], found.barycentrics[i]), "{path:?} {}", what(i));
+                assert_eq!((e.owner, e.barycentric), (found.owners[i], found.barycentrics[i]), "{method:?} {}", what(i));
             }
         }
-        let lists = locate_all(&self.device, &tree, &points, TOLERANCE, QUIET).unwrap();
+        let lists = locate_all(&self.device, &tree, &points, TOLERANCE, SILENT).unwrap();
         for (i, list) in lists.iter().enumerate() {
             assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
         }
@@ -126,7 +125,7 @@ impl Subject {
             bands.push((band.kinds, band.owners));
             Ok(())
         };
-        slice(&self.device, &tree, None, &voxels, Extrapolate::Nearest, QUIET, &mut take).unwrap();
+        slice(&self.device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut take).unwrap();
         bands
     }
 
@@ -136,8 +135,8 @@ impl Subject {
         let field = Field { name: "x".into(), on: On::Points, values: self.mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect() };
         let settings = RenderSettings { size: [60, 45], ..RenderSettings::default() };
         let scene = volume::Scene::new(&self.mesh, &self.topology, &host, &field, &settings).unwrap();
-        let drawn = render(&self.device, &tree, scene.plan(), (&field.values, field.on), None, QUIET).unwrap();
-        (drawn.colors.into_iter().map(|c| c.map(f32::to_bits)).collect(), drawn.found_samples)
+        let drawn = render(&self.device, &tree, scene.plan(), (&field.values, field.on), None, SILENT).unwrap();
+        (drawn.colors.into_iter().map(|c| c.map(f32::to_bits)).collect(), drawn.stats.found_samples)
     }
 }
 
@@ -217,9 +216,9 @@ fn overlaps() {
         let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
         let inputs = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| OverlapInput { mesh: &s.device, tree });
         if lists == Lists::Boundary {
-            assert!(overlap(inputs[0], inputs[1], true, QUIET).is_err_and(|e| e.to_string().contains("Lists::All")));
+            assert!(overlap(inputs[0], inputs[1], true, SILENT).is_err_and(|e| e.to_string().contains("Lists::All")));
         }
-        let found = overlap(inputs[0], inputs[1], false, QUIET).unwrap().overlap;
+        let found = overlap(inputs[0], inputs[1], false, SILENT).unwrap().overlap;
         (found.a, found.b)
     });
     assert!(sets[0].0.len() > 100 && sets[0].1.len() > 100);

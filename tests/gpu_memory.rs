@@ -26,6 +26,19 @@ fn jets_fits_in_two_gibibytes() {
     assert!(total < 2 << 30, "{total} bytes");
 }
 
+/// Parts lie within the part that they are taken of, whatever the numbers.
+#[test]
+fn parts_are_cut_off() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let buffer = gpu.buffer("olbvh.test.parts", 64).unwrap();
+    let part = buffer.all().part(16, 32);
+    for (offset, size, expected) in [(8, 8, (24, 8)), (24, 9, (40, 8)), (33, 1, (48, 0)), (u64::MAX, u64::MAX, (48, 0))] {
+        let cut = part.part(offset, size);
+        assert_eq!((cut.offset(), cut.size()), expected, "{offset}+{size}");
+    }
+    assert_eq!(part.word(u64::MAX).size(), 0);
+}
+
 /// After a build only the tree is left, and the peak is the one planned.
 #[test]
 fn a_build_allocates_what_it_needs() {
@@ -68,8 +81,11 @@ fn a_pool_keeps_what_is_dropped() {
     for other in [MIB / 2, 2 * MIB] {
         assert_ne!(handle_of(buffer(other)), handle, "{other} bytes took the place of {MIB}");
     }
+    let old = buffer(MIB).all();
     let again = buffer(MIB - MIB / 16);
-    assert_eq!((again.size(), handle_of(again)), (MIB - MIB / 16, handle));
+    assert_eq!((again.size(), again.all().buffer()), (MIB - MIB / 16, handle));
+    assert!(pooled.download::<u32>(&again, old).is_err(), "a part of a dropped buffer with the same handle, but larger");
+    drop(again);
     // The buffer still has its full size.
     let words: Vec<u32> = (0..1 << 18).collect();
     let written = pooled.upload("olbvh.test.kept", &words).unwrap();

@@ -11,7 +11,7 @@ use olbvh::layout::Grid;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
 use olbvh::primitives::Arena;
-use olbvh::query::{LocateOptions, OverlapInput, Path, locate, locate_all, overlap, render, slice};
+use olbvh::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
 use olbvh::render::{Bounds, Plan, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;
@@ -31,27 +31,27 @@ fn another_mesh_is_refused() {
     let [mine, other] = [&small, &large].map(|mesh| DeviceMesh::upload(&gpu, mesh, BadCells::Skip).unwrap());
     let tree = Tree::build(&gpu, &other, &BuildOptions::default()).unwrap();
     let lbvh = Lbvh::build(&gpu, &other).unwrap();
-    let (none, quiet) = (LocateOptions::default(), |_, _| {});
+    let none = LocateOptions::default();
     let words = "over another mesh";
-    refused("locate", words, locate(&mine, &tree, &small.points, None, &none, &quiet));
-    refused("locate_all", words, locate_all(&mine, &tree, &small.points, 0.0, &quiet));
+    refused("locate", words, locate(&mine, &tree, &small.points, None, &none, SILENT));
+    refused("locate_all", words, locate_all(&mine, &tree, &small.points, 0.0, SILENT));
     refused("lbvh.locate", words, lbvh.locate(&mine, &small.points, 0.0));
     let [a, b] = [OverlapInput { mesh: &other, tree: &tree }, OverlapInput { mesh: &mine, tree: &tree }];
-    refused("overlap", words, overlap(a, b, false, &quiet));
-    refused("overlap", words, overlap(b, a, true, &quiet));
-    refused("lbvh.overlap", words, lbvh.overlap(&mine, &lbvh, &other, &quiet));
-    refused("lbvh.overlap", words, lbvh.overlap(&other, &lbvh, &mine, &quiet));
+    refused("overlap", words, overlap(a, b, false, SILENT));
+    refused("overlap", words, overlap(b, a, true, SILENT));
+    refused("lbvh.overlap", words, lbvh.overlap(&mine, &lbvh, &other, SILENT));
+    refused("lbvh.overlap", words, lbvh.overlap(&other, &lbvh, &mine, SILENT));
     let values = vec![0.0; small.points.len()];
     refused("ranges", words, FieldRanges::new(&mine, &tree, (&values, On::Points)));
     let settings = RenderSettings { size: [16, 16], ..RenderSettings::default() };
     let plan = Plan::new(&settings, &Bounds::from(mine.grid()), small.origin, Some([0.0, 1.0])).unwrap();
-    refused("render", words, render(&mine, &tree, &plan, (&values, On::Points), None, &quiet));
-    refused("render", words, render(&mine, &lbvh, &plan, (&values, On::Points), None, &quiet));
+    refused("render", words, render(&mine, &tree, &plan, (&values, On::Points), None, SILENT));
+    refused("render", words, render(&mine, &lbvh, &plan, (&values, On::Points), None, SILENT));
     let Grid { lo: [x, y, z, _], hi: [x1, y1, z1, _], .. } = *mine.grid();
     let voxels = SliceSettings::default().voxels([x, y, z], [x1, y1, z1], small.origin).unwrap();
     let mut sink = |_| Ok(());
-    refused("slice", words, slice(&mine, &tree, None, &voxels, Extrapolate::Nearest, &quiet, &mut sink));
-    refused("slice", words, slice(&mine, &lbvh, None, &voxels, Extrapolate::Nearest, &quiet, &mut sink));
+    refused("slice", words, slice(&mine, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink));
+    refused("slice", words, slice(&mine, &lbvh, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink));
     if let Some(rays) = Rays::build(&gpu, &other, RayMethod::Query).unwrap() {
         refused("rays", words, rays.locate(&mine, &small.points));
     }
@@ -68,12 +68,12 @@ fn another_device_is_refused() {
     refused("lbvh", "on another device", Lbvh::build(&gpu, &there).map(|_| ()));
     let [a, b] = [(&gpu, &here), (&elsewhere, &there)].map(|(gpu, mesh)| Tree::build(gpu, mesh, &options).unwrap());
     let [a, b] = [OverlapInput { mesh: &here, tree: &a }, OverlapInput { mesh: &there, tree: &b }];
-    refused("overlap", "on another device", overlap(a, b, false, &|_, _| {}));
+    refused("overlap", "on another device", overlap(a, b, false, SILENT));
     let values = vec![0.0; mesh.points.len()];
     let mut ranges = FieldRanges::new(&here, a.tree, (&values, On::Points)).unwrap();
     refused("ranges", "on another device", ranges.update(&there, b.tree, (&values, On::Points)));
     let buffer = elsewhere.buffer("olbvh.test.elsewhere", 64).unwrap();
-    refused("download", "buffer or device", gpu.download::<u32>(&buffer, buffer.all()));
+    refused("download", "on another device", gpu.download::<u32>(&buffer, buffer.all()));
     let mut pools = DescriptorPools::new(&elsewhere);
     refused("pools", "another device", Recorder::rehearse(&gpu).with_pools(&mut pools).map(|_| ()));
     let same = gpu.with_memory(1 << 20).with_target(gpu.target().clone()).unwrap();
@@ -90,7 +90,7 @@ fn wrong_sizes_are_refused() {
     let (values, settings) = (vec![0.0; mesh.points.len()], RenderSettings { size: [16, 16], ..RenderSettings::default() });
     let mut plan = Plan::new(&settings, &Bounds::from(device.grid()), mesh.origin, Some([0.0, 1.0])).unwrap();
     plan.table.truncate(2);
-    refused("render", "2 colours", render(&device, &tree, &plan, (&values, On::Points), None, &|_, _| {}));
+    refused("render", "2 colours", render(&device, &tree, &plan, (&values, On::Points), None, SILENT));
     let deep = Capacity { level: 13, ..Capacity::for_entries(1000, 22) };
     refused("level", "level 13", Arena::measure(|a| TreeMemory::carve(a, &deep, &BuildOptions::default())));
     let [small, large] = [64, 128].map(|bytes| gpu.buffer("olbvh.test.copied", bytes).unwrap());
@@ -99,8 +99,8 @@ fn wrong_sizes_are_refused() {
     refused("copy", "copy of 128 bytes", recorder.finish());
     // A stack of any size gives the same owners.
     let located = |stack| {
-        let options = LocateOptions { path: Path::Traversal(stack), ..LocateOptions::default() };
-        locate(&device, &tree, &mesh.points, None, &options, &|_, _| {}).unwrap().owners
+        let options = LocateOptions { method: LocateMethod::Traversal(stack), ..LocateOptions::default() };
+        locate(&device, &tree, &mesh.points, None, &options, SILENT).unwrap().owners
     };
     assert_eq!(located(u32::MAX), located(8));
 }

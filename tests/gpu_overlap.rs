@@ -6,7 +6,7 @@ use olbvh::conformance::{HostAndDevice, check_overlap};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::overlap;
+use olbvh::query::{SILENT, overlap};
 
 fn moved(mut mesh: Mesh, at: [f32; 3], scale: f32) -> Mesh {
     mesh.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| at[c] + scale * p[c]));
@@ -63,6 +63,6 @@ fn long_lists_take_several_submissions() {
     let apart = HostAndDevice::new(&gpu, apart, &options).unwrap();
     check_overlap(&apart, &many).unwrap();
     check_overlap(&many, &apart).unwrap();
-    let found = overlap(apart.input(), many.input(), true, &|_, _| {}).unwrap();
+    let found = overlap(apart.input(), many.input(), true, SILENT).unwrap();
     assert!(found.submissions > 10, "{}", found.submissions);
 }

@@ -12,7 +12,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::{LocateOptions, locate};
+use olbvh::query::{LocateOptions, SILENT, locate};
 use std::env;
 
 const FULL: usize = 10_000_000;
@@ -99,7 +99,7 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     for (k, assign) in Assign::EVERY.into_iter().enumerate() {
         let from = begin + k * third;
         let points: Vec<_> = (from..(from + third).min(begin + count)).map(|i| point(&mesh, side as f32, i)).collect();
-        let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), &|_, _| {}).unwrap().owners;
+        let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), SILENT).unwrap().owners;
         let expected = find(&first);
         for lists in Lists::EVERY {
             let found = find(&build(alpha, assign, lists));

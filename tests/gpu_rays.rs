@@ -10,7 +10,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateOptions, locate};
+use olbvh::query::{LocateOptions, SILENT, locate};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::locate::Locator;
 
@@ -61,7 +61,7 @@ fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
         points.extend([[f32::NAN; 3], [f32::INFINITY; 3], [-1e38; 3]]);
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
         let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-        let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, &|_, _| {}).unwrap();
+        let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, SILENT).unwrap();
         let (rays, owners, weights) = by_rays(&gpu, &device, method, &points);
         let host = tree.download().unwrap();
         let topology = topology(&mesh).unwrap();

@@ -17,7 +17,7 @@ use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    OverlapInput, PairMemory, RenderInput, RenderMemory, Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_pairs,
+    OverlapInput, PairMemory, RenderInput, RenderMemory, Rounds, SILENT, Scene, SliceInput, SliceMemory, StructureView, cmd_count_pairs,
     cmd_list_pairs, cmd_render, cmd_slice, overlap, render, slice,
 };
 use olbvh::reference::boundary::topology;
@@ -68,7 +68,7 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
         owned.owners.extend(band.owners);
         Ok(())
     };
-    slice(device, tree, Some((values, On::Points)), &queries.voxels, Extrapolate::Nearest, &|_, _| {}, &mut keep).unwrap();
+    slice(device, tree, Some((values, On::Points)), &queries.voxels, Extrapolate::Nearest, SILENT, &mut keep).unwrap();
     assert_eq!(owned.owners, expected.owners);
     let to_bits = |values: &[f32]| values.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect::<Vec<_>>();
     assert_eq!(to_bits(&owned.values), to_bits(&found), "values of the recorded and the owning form");
@@ -83,12 +83,12 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
 /// found, and skipped.
 fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], device: &DeviceMesh, tree: &Tree, grid: &Grid) -> [u64; 2] {
     let (plan, picture) = (&queries.plan, &queries.picture);
-    let owned = render(device, tree, plan, (values, On::Points), Some(&queries.normals), &|_, _| {}).unwrap();
+    let owned = render(device, tree, plan, (values, On::Points), Some(&queries.normals), SILENT).unwrap();
     let found: Vec<[f32; 4]> = read(gpu, queries, picture.colors, owned.colors.len());
     assert!(found == owned.colors, "colours of the recorded and the owning form");
     let status: RenderStatus = read(gpu, queries, picture.status, 1)[0];
     let low = [status.samples, status.found, status.skipped].map(|[low, high]| u64::from(low) | u64::from(high) << 32);
-    assert_eq!((low, status.unfinished), ([owned.samples, owned.found_samples, owned.skipped_samples], 0));
+    assert_eq!((low, status.unfinished), ([owned.stats.samples, owned.stats.found_samples, owned.stats.skipped_samples], 0));
     let at = size_of::<RenderView>() as u64;
     let made: RenderPlan = read(gpu, queries, picture.frame.part(at, size_of::<RenderPlan>() as u64), 1)[0];
     let [x, y, z] = interval_slack(grid);
@@ -155,7 +155,7 @@ fn frames(binding: Binding) {
         assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
         let (device, other) =
             (OverlapInput { mesh: &device, tree: &tree }, OverlapInput { mesh: &queries.other, tree: &queries.other_tree });
-        assert_eq!(overlap(device, other, false, &|_, _| {}).unwrap().overlap, sets, "frame {i}");
+        assert_eq!(overlap(device, other, false, SILENT).unwrap().overlap, sets, "frame {i}");
         let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(&gpu, &queries, part, 1)[0]);
         assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
 
@@ -249,7 +249,7 @@ fn rounds_go_on_where_they_ended() {
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
     let few_scene = Scene::new(&few, &few_tree).unwrap();
     let expected =
-        overlap(OverlapInput { mesh: &few, tree: &few_tree }, OverlapInput { mesh: &device, tree: &tree }, true, &|_, _| {}).unwrap();
+        overlap(OverlapInput { mesh: &few, tree: &few_tree }, OverlapInput { mesh: &device, tree: &tree }, true, SILENT).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
     let (buffer, (memory, found)) = Arena::reserve(&gpu, "olbvh.test.pairs", carve).unwrap();
@@ -281,7 +281,7 @@ fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso
     let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     let field = (field.all(), On::Points);
-    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, shown: None, part: None };
+    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, visibility: None, part: None };
     let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();

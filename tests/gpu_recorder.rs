@@ -25,7 +25,7 @@ use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
 use olbvh::query::{
-    LocateOptions, LocateOutput, Path, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible,
+    LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible,
     visible_bytes,
 };
 use submit::submit;
@@ -156,7 +156,7 @@ fn location() {
     let barriers = every_barrier_counts(&gpu, "location", |r| {
         cmd_sort_points(r, frame.tree.grid, &points, &order)?;
         r.barrier("sort_points → locate");
-        cmd_locate(r, &scene, &points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })?;
+        cmd_locate(r, &scene, &points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })?;
         r.barrier("locate → interpolate");
         cmd_interpolate(r, &scene, field.all(), On::Points, &frame.output, values.all(), frame.points.count)?;
         r.barrier("interpolate → caller");
@@ -165,7 +165,7 @@ fn location() {
     });
     assert!(barriers >= 4 + 5, "{barriers}");
     let unordered = submit(&gpu, "olbvh.test.unordered", |r| {
-        cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { path: Path::Sorted, ..LocateOptions::default() })
+        cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })
     });
     assert!(matches!(unordered, Err(Error::Invalid(_))));
 }

@@ -9,7 +9,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
-use olbvh::query::slice;
+use olbvh::query::{SILENT, slice};
 use olbvh::reference::build::build;
 use olbvh::reference::slice::Slicer;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, VoxelGrid};
@@ -52,7 +52,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh, trees: &[(f32, Assign)], settings: 
             };
             let values = field.map(|f| (&f.values[..], f.on));
             let sliced =
-                slice(&device, &tree, values, &voxels, extrapolate, &|_, _| {}, &mut compare).unwrap_or_else(|e| panic!("{what}: {e}"));
+                slice(&device, &tree, values, &voxels, extrapolate, SILENT, &mut compare).unwrap_or_else(|e| panic!("{what}: {e}"));
             touched += sliced.tally.touched;
             assert_eq!(sliced.tally.inside + sliced.tally.touched + sliced.tally.empty, voxels.voxels(), "{what}");
         }
@@ -107,7 +107,7 @@ fn an_error_of_the_sink_ends_the_stack() {
         layers: 3,
     };
     let mut stop = |_: Band| Err(olbvh::Error::Invalid("full".into()));
-    let result = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut stop);
+    let result = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut stop);
     assert!(result.is_err_and(|e| e.to_string().contains("full")));
 }
 
@@ -131,7 +131,7 @@ fn memory_makes_no_difference_where_cells_overlap() {
             bands += 1;
             Ok(())
         };
-        slice(&device, &tree, None, &voxels, Extrapolate::Nearest, &|_, _| {}, &mut sink).unwrap();
+        slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
         (owners, bands)
     };
     let (all, bands) = owners();

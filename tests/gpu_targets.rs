@@ -9,7 +9,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::kernels::{Row, Target};
 use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{self, LocateOptions, OverlapInput};
+use olbvh::query::{self, LocateOptions, OverlapInput, SILENT};
 use olbvh::render::{Bounds, Prepared, RenderSettings};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
@@ -34,8 +34,7 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let [lo, hi] = [grid.lo, grid.hi].map(|c| [c[0], c[1], c[2]]);
     let at = |i: u32, step: u32, c: usize| lo[c] + (hi[c] - lo[c]) * (i * step % 1009) as f32 / 1009.0;
     let points: Vec<[f32; 3]> = (0..3000).map(|i| [at(i, 1, 0), at(i, 313, 1), at(i, 71, 2)]).collect();
-    let silent = &|_, _| {};
-    let locate = |tree| query::locate(&device, tree, &points, None, &LocateOptions::default(), silent).unwrap();
+    let locate = |tree| query::locate(&device, tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
     let (found, walked) = (locate(&all), locate(&boundary));
     let lbvh = Lbvh::build(gpu, &device).unwrap().locate(&device, &points, olbvh::options::TOLERANCE).unwrap();
     assert!(lbvh.owners == found.owners, "{}: the LBVH finds other owners", gpu.target().name);
@@ -44,18 +43,18 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let neighbours = device.neighbours().unwrap();
     let prepared = Prepared::new(&settings, mesh, &Bounds { lo, hi }, &neighbours, |_| true, field).unwrap();
     let values = (field.values.as_slice(), On::Points);
-    let drawn = query::render(&device, &boundary, &prepared.plan, values, Some(&prepared.normals), silent).unwrap();
-    assert!(drawn.found_samples > 0);
+    let drawn = query::render(&device, &boundary, &prepared.plan, values, Some(&prepared.normals), SILENT).unwrap();
+    assert!(drawn.stats.found_samples > 0);
     let voxels = SliceSettings { size: [60, 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3]).unwrap();
     let (mut kinds, mut owners) = (Vec::new(), Vec::new());
-    query::slice(&device, &all, None, &voxels, Extrapolate::Nearest, silent, &mut |band| {
+    query::slice(&device, &all, None, &voxels, Extrapolate::Nearest, SILENT, &mut |band| {
         kinds.extend(band.kinds);
         owners.extend(band.owners);
         Ok(())
     })
     .unwrap();
     let party = OverlapInput { mesh: &device, tree: &all };
-    let overlap = query::overlap(party, OverlapInput { mesh: &device, tree: &boundary }, false, silent).unwrap().overlap;
+    let overlap = query::overlap(party, OverlapInput { mesh: &device, tree: &boundary }, false, SILENT).unwrap().overlap;
     Answers {
         trees: [all.download().unwrap(), boundary.download().unwrap()],
         neighbours,

@@ -5,6 +5,7 @@
 use olbvh::grid::CellRange;
 use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
+use olbvh::query::SILENT;
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
@@ -26,7 +27,7 @@ fn settings(camera: &str) -> RenderSettings {
 fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &RenderSettings) -> Picture {
     let tree = build(mesh, topology, options).unwrap();
     let scene = Scene::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap();
-    render(&scene, &|_, _| ())
+    render(&scene, SILENT)
 }
 
 /// The largest difference between two pictures.
@@ -46,7 +47,7 @@ fn parts_share_the_samples() {
         let settings = RenderSettings { size: [24, 20], termination: 1.0, ..settings(camera) };
         let samples = |part| {
             let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-            render(&scene.within(part), &|_, _| ()).found_samples
+            render(&scene.within(part), SILENT).stats.found_samples
         };
         let all = samples(CellRange::WHOLE);
         for axis in 0..3 {
@@ -67,13 +68,18 @@ fn the_picture_does_not_depend_on_the_tree() {
     for camera in ["iso", "top,ortho", "eye=-0.5,14,4,target=0,15,4,fov=100"] {
         let settings = settings(camera);
         let first = draw(&mesh, &topology, &BuildOptions::default(), &settings);
-        assert!(first.found_samples > 5_000 && first.samples >= first.found_samples, "{camera}: {} {}", first.samples, first.found_samples);
+        assert!(
+            first.stats.found_samples > 5_000 && first.stats.samples >= first.stats.found_samples,
+            "{camera}: {} {}",
+            first.stats.samples,
+            first.stats.found_samples
+        );
         for assign in Assign::EVERY {
             for alpha in [0.0, 1.0, 2.0] {
                 let other = draw(&mesh, &topology, &BuildOptions { alpha, assign, ..BuildOptions::default() }, &settings);
                 let d = distance(&first.pixels, &other.pixels);
                 assert!(d <= 1, "{camera}, alpha {alpha}, {assign}: pixels differ by {d}");
-                assert_eq!(first.found_samples, other.found_samples, "{camera}, alpha {alpha}, {assign}");
+                assert_eq!(first.stats.found_samples, other.stats.found_samples, "{camera}, alpha {alpha}, {assign}");
             }
         }
     }
@@ -85,10 +91,10 @@ fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
     let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
     let scene = Scene::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
     let expected = brute_force(&scene, settings, &Bounds::from(&tree.grid));
-    let picture = render(&scene, &|_, _| ());
+    let picture = render(&scene, SILENT);
     let off = picture.pixels.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
     assert!(off * 1000 <= expected.len() / 4, "{what}: {off} of {} pixels differ", expected.len() / 4);
-    assert!(picture.found_samples > 1000, "{what}: an empty picture proves nothing");
+    assert!(picture.stats.found_samples > 1000, "{what}: an empty picture proves nothing");
 }
 
 #[test]
@@ -120,11 +126,11 @@ fn skipped_samples_have_nothing_to_add() {
             let settings = RenderSettings { range: (on == On::Cells).then_some([0.0, 7.7]), ..peak(camera) };
             let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
             let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-            let picture = render(&scene, &|_, _| ());
-            let every = render(&scene.without_skipping(), &|_, _| ());
+            let picture = render(&scene, SILENT);
+            let every = render(&scene.without_skipping(), SILENT);
             assert_eq!(picture.pixels, every.pixels, "{camera} {on:?}");
-            assert!(picture.skipped_samples > 0 && every.skipped_samples == 0, "{camera} {on:?}");
-            assert!(picture.samples < every.samples, "{camera} {on:?}: {} of {}", picture.samples, every.samples);
+            assert!(picture.stats.skipped_samples > 0 && every.stats.skipped_samples == 0, "{camera} {on:?}");
+            assert!(picture.stats.samples < every.stats.samples, "{camera} {on:?}: {} of {}", picture.stats.samples, every.stats.samples);
             assert!(picture.pixels.iter().any(|&p| p != 255), "{camera} {on:?}: an empty picture proves nothing");
         }
     }
@@ -171,8 +177,8 @@ fn surfaces_of_a_linear_field_are_planes() {
         };
         let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
         let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-        let picture = render(&scene, &|_, _| ());
-        assert!(picture.skipped_samples > 1000, "{}", picture.skipped_samples);
+        let picture = render(&scene, SILENT);
+        assert!(picture.stats.skipped_samples > 1000, "{}", picture.stats.skipped_samples);
         for options in [
             BuildOptions { alpha: 1.0, assign: Assign::Exact, ..BuildOptions::default() },
             BuildOptions { alpha: 4.0, ..BuildOptions::default() },

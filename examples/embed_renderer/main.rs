@@ -54,15 +54,51 @@ fn main() -> Result<()> {
     };
     // SAFETY: the handles belong together, and `gpu` is dropped before `host`, while the device is idle.
     let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }?;
-    let body = Body::load(&host, &gpu, SLOTS)?;
+    let mut body = Body::load(&host, &gpu, SLOTS)?;
     let pictures = Pictures::new(&host, SIZE, SLOTS, body.set_layout())?;
-    let result = animate(&host, &gpu, body, &pictures, frames, out);
+    let mut flight = Flight::new(&host)?;
+    let result = animate(&host, &gpu, &mut body, &pictures, &mut flight, frames, out);
     // SAFETY: this waits for what is still in flight, also after an error.
-    unsafe { host.device.device_wait_idle() }?;
+    let idle = unsafe { host.device.device_wait_idle() };
+    flight.free(&host);
     pictures.free(&host);
+    body.free(&host);
     result?;
+    idle?;
     drop(gpu);
     host.check()
+}
+
+/// What the frames in flight are recorded with. It is freed once the device is idle.
+struct Flight<'a> {
+    pool: vk::CommandPool,
+    commands: Vec<vk::CommandBuffer>,
+    fences: Vec<vk::Fence>,
+    /// The recorders of frames that are being executed, which own the descriptor sets, if there are any.
+    recorders: Vec<Option<Recorder<'a>>>,
+}
+
+impl Flight<'_> {
+    fn new(host: &Host) -> Result<Self> {
+        let device = &host.device;
+        // SAFETY: objects are created as Vulkan asks for; `free` destroys each of them once.
+        unsafe {
+            let info = vk::CommandPoolCreateInfo::default().queue_family_index(host.family);
+            let pool = device.create_command_pool(&info.flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER), None)?;
+            let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(SLOTS as u32);
+            let commands = device.allocate_command_buffers(&info)?;
+            let fences = (0..SLOTS).map(|_| device.create_fence(&vk::FenceCreateInfo::default(), None)).collect::<Result<_, _>>()?;
+            Ok(Self { pool, commands, fences, recorders: (0..SLOTS).map(|_| None).collect() })
+        }
+    }
+
+    fn free(self, host: &Host) {
+        // SAFETY: the device is idle.
+        unsafe {
+            self.fences.into_iter().for_each(|f| host.device.destroy_fence(f, None));
+            host.device.destroy_command_pool(self.pool, None);
+        }
+    }
 }
 
 /// The camera, the plane of the cut, and the square that is drawn in it.
@@ -83,8 +119,17 @@ fn view(body: &Body, tree: [u32; 2]) -> Push {
     }
 }
 
-fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: u32, out: &str) -> Result<()> {
+fn animate<'a>(
+    host: &Host,
+    gpu: &'a Gpu,
+    body: &mut Body,
+    pictures: &Pictures,
+    flight: &mut Flight<'a>,
+    frames: u32,
+    out: &str,
+) -> Result<()> {
     let device = &host.device;
+    let Flight { commands, fences, recorders, .. } = flight;
     let file = BufWriter::new(std::fs::File::create(out).with_context(|| out.to_owned())?);
     let mut encoder = png::Encoder::new(file, SIZE[0], SIZE[1]);
     encoder.set_color(png::ColorType::Rgba);
@@ -97,15 +142,9 @@ fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: 
     body.record(&mut rehearsal, 0)?;
     rehearsal.finish()?;
 
-    // SAFETY: pool, buffers and fences are made here and destroyed below or with the device; a slot is used again only
-    // after its fence is signalled.
+    // SAFETY: what a slot uses is kept until the device is idle, and used again only after the slot's fence is
+    // signalled.
     unsafe {
-        let info = vk::CommandPoolCreateInfo::default().queue_family_index(host.family);
-        let pool = device.create_command_pool(&info.flags(vk::CommandPoolCreateFlags::RESET_COMMAND_BUFFER), None)?;
-        let info = vk::CommandBufferAllocateInfo::default().command_pool(pool).command_buffer_count(SLOTS as u32);
-        let commands = device.allocate_command_buffers(&info)?;
-        let fences = (0..SLOTS).map(|_| device.create_fence(&vk::FenceCreateInfo::default(), None)).collect::<Result<Vec<_>, _>>()?;
-        let mut recorders: Vec<Option<Recorder<'_>>> = (0..SLOTS).map(|_| None).collect();
         let start = Instant::now();
         for frame in 0..frames + SLOTS as u32 {
             let slot = frame as usize % SLOTS;
@@ -124,7 +163,6 @@ fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: 
             let mut recorder = Recorder::new(gpu, commands[slot], None);
             body.record(&mut recorder, slot)?;
             recorder.finish()?;
-            // The recorder owns descriptor sets, if there are any, until the fence is signalled.
             recorders[slot] = Some(recorder);
             let built = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
@@ -134,16 +172,13 @@ fn animate(host: &Host, gpu: &Gpu, mut body: Body, pictures: &Pictures, frames: 
             device.cmd_pipeline_barrier(commands[slot], from, to, vk::DependencyFlags::empty(), &built, &[], &[]);
             let Deformed { positions, tree, set, .. } = &body.slots[slot];
             let (values, triangles, indices) = (&body.values, &body.triangles, body.indices);
-            let push = view(&body, [tree.address as u32, (tree.address >> 32) as u32]);
+            let push = view(body, [tree.address as u32, (tree.address >> 32) as u32]);
             pictures.record(host, commands[slot], slot, &Drawing { positions, values, triangles, indices, tree_set: *set, push });
             device.end_command_buffer(commands[slot])?;
             let submit = [vk::SubmitInfo::default().command_buffers(std::slice::from_ref(&commands[slot]))];
             device.queue_submit(*host.queue.lock().unwrap(), &submit, fences[slot])?;
         }
         println!("{frames} frames of {} tetrahedra in {:.1} s, tree rebuilt in each: {out}", body.tets, start.elapsed().as_secs_f64());
-        fences.into_iter().for_each(|f| device.destroy_fence(f, None));
-        device.destroy_command_pool(pool, None);
     }
-    body.free(host);
     Ok(writer.finish()?)
 }

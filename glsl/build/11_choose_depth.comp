@@ -7,6 +7,7 @@
 ARGUMENTS(4)
     uint tets;
     uint alpha;    // in units of 1/65536
+    uint requested; // level in place of the one by alpha; NONE: there is none
     uint capacity; // most candidates
     uint per_tet;  // most candidates per valid tetrahedron,
     uint ample;    // except that this many are always allowed
@@ -63,7 +64,8 @@ void main() {
         umulExtended(valid, uint(threshold), bound.y, bound.x);
         if (less_equal(scaled, bound)) level = k;
     }
-    status.at[0].heuristic_level = level;
+    if (requested != NONE && valid > 0u) level = min(requested, MAX_LEVEL);
+    status.at[0].wanted_level = level;
     level = min(level, deepest);
     uvec2 most;
     umulExtended(valid, per_tet, most.y, most.x);

@@ -20,10 +20,10 @@ BUFFER(5, writeonly, uint, marks)  // one bit per cell of the level
 
 void main() {
     uint t = item_index();
-    if (t > tets) return;
     Grid g = grid.at[0];
-    uint words = CLEAR == 0u ? 0u : ((1u << 3u * g.level) + 31u) / 32u;
-    for (uint i = t; i < words; i += tets + 1u) marks.at[i] = 0u;
+    uint words = CLEAR == 0u ? 0u : cell_words(g.level), all = gl_NumWorkGroups.x * gl_NumWorkGroups.y * WORKGROUP;
+    for (uint i = t; i < words; i += all) marks.at[i] = 0u;
+    if (t > tets) return;
     uint n = 0u;
     if (t < tets) {
         uvec3 size = coarser(finest_box(t), g.level).size;

@@ -31,9 +31,10 @@ void main() {
     uvec3 at = candidate(box, first - offsets.at[t]);
     for (uint i = first; i < end; ++i) {
         if (i >= next) {
-            // A while loop: SwiftShader loses what lanes that leave a do-while loop early have computed in their last
-            // pass.
-            while (next <= i && t + 1u < tets) next = offsets.at[++t + 1u];
+            // Most tetrahedra have candidates. A long stretch of bad ones, which have none, must not become a long loop.
+            t = min(t + 1u, tets - 1u);
+            if (offsets.at[t + 1u] <= i) t = owner_of(i, tets);
+            next = offsets.at[t + 1u];
             box = coarser(finest_box(t), g.level);
             at = box.lo;
         }

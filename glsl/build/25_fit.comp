@@ -3,6 +3,7 @@
 // Such an attempt lies between every two dispatches of this kernel; its dispatches are empty once the entries fit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/grid.glsl"
 #include "shared/groups.glsl"
 layout(constant_id = 2) const uint EACH = 64; // items per workgroup of those dispatches
 ARGUMENTS(8)
@@ -17,8 +18,8 @@ BUFFER(3, READ_WRITE, uint, entries) // number of entries at that level
 BUFFER(4, readonly, uint, tried_shares) // number of shares of the attempt
 BUFFER(5, readonly, uint, tried_entries) // number of entries of the attempt
 BUFFER(6, READ_WRITE, uint, live)   // tets + 1 if there is an attempt, else 0
-// Workgroups (x, y, z) of three dispatches: over tets + 1 items, over words of one bit per tetrahedron, over
-// tetrahedra.
+// Workgroups (x, y, z) of three dispatches: over tets + 1 items and over words of marks, over words of one bit per
+// tetrahedron, over tetrahedra.
 BUFFER(7, writeonly, uint, groups)
 
 void plan(uint slot, uint items) {
@@ -43,7 +44,8 @@ void main() {
     }
     uint n = again ? tets : 0u;
     live.at[0] = again ? tets + 1u : 0u;
-    plan(0u, again ? tets + 1u : 0u);
+    // Marks are cleared by the same dispatch, a word per invocation.
+    plan(0u, again ? max(tets + 1u, cell_words(level)) : 0u);
     plan(1u, (n + 31u) / 32u);
     plan(2u, n);
 }

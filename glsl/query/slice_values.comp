@@ -30,7 +30,7 @@ float touched_value(uint owner, vec3 x) {
     Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
     vec4 at_vertices = vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
     Weights w = weights(tet, x);
-    if (LINEAR != 0u && w.sum > 0.0) return weighed(barycentric(w, tet.rank), at_vertices);
+    if (LINEAR != 0u && w.sum > 0.0 && volume(tet) != 0.0) return weighed(barycentric(w, tet.rank), at_vertices);
     vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
     vec4 c;
     closest(v, c);

@@ -16,18 +16,18 @@ struct Grid {
 struct MeshStatus {
     uint lo[3];     // Lower corner of the bounds as ordered keys, complemented, so that 0 means: no vertex yet.
     uint hi[3];     // Upper corner of the bounds as ordered keys.
-    uint bad;       // Bad tetrahedra: index out of range, repeated vertex, or coordinate not finite.
+    uint bad;       // Bad tetrahedra: index out of range, repeated vertex, or coordinate not finite or beyond 2^125.
     uint boundary;  // Boundary tetrahedra.
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
-    uint overflow;  // Not 0: the table of faces was too small. Never happens with the planned size.
+    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
 struct BuildStatus {
     uint level;            // Level of the leaves, l.
-    uint heuristic_level;  // Level that the heuristic chose; larger than `level` where a capacity lowered it.
+    uint wanted_level;     // Level by alpha (Eq. 12), or as requested; `level` is smaller where a limit lowered it.
     uint candidates;       // Cells in the quantized boxes of all tetrahedra, which are the entries with `Aabb`.
     uint entries;          // Number of entries, n_m.
     uint nodes;            // Number of nodes, n_n.

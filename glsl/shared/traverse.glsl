@@ -47,7 +47,12 @@ bool traverse(uint level) {
         if (n > 0u) {
             uint shift = 3u * node.level;
             if (node.level >= resume) trail |= (n - 1u) << shift;
-            uint left = min(trail >> shift & 7u, n - 1u);
+            uint digit_left = trail >> shift & 7u, left = min(digit_left, n - 1u);
+            if (left < digit_left) {
+                // F_N has become stricter, so the path may lead elsewhere, and the trail below it is another node's.
+                trail = (trail & ((1u << shift) - 1u)) | left << shift;
+                resume = node.level;
+            }
             // Pushes the siblings after the next node, the last first; then takes the next node itself.
             Node parent = node;
             for (uint k = 0u; k <= left; ++k) {

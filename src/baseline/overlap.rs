@@ -8,7 +8,7 @@ use crate::gpu::{Buffer, BufferRef, Groups, Recorder};
 use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
 use crate::layout::{NodeFrame, OverlapStatus, wide};
 use crate::primitives::Arena;
-use crate::query::Overlapped;
+use crate::query::{Overlapped, Progress};
 use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{joint_grid, node_frame};
 use std::mem::offset_of;
@@ -60,7 +60,7 @@ impl Lbvh {
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
-    pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+    pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: Progress<'_>) -> Result<Overlapped> {
         mesh.check(&self.mesh.view)?;
         other_mesh.check(&other.mesh.view)?;
         other_mesh.check_device(mesh.gpu())?;

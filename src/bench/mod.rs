@@ -136,8 +136,11 @@ fn measure(
         }
     }
     if let Some((found, _)) = &answers.picture {
-        let drawn =
-            || Ok(subject.render(structure)?.map_or(Vec::new(), |d| vec![time("intervals", d.interval_ms), time("march", d.march_ms)]));
+        let drawn = || {
+            Ok(subject
+                .render(structure)?
+                .map_or(Vec::new(), |d| vec![time("intervals", d.stats.interval_ms), time("march", d.stats.march_ms)]))
+        };
         let runs = repeat(budget, drawn)?;
         add(Quantity::Intervals, Some(runs.clone()), Some("intervals"), None);
         add(Quantity::March, Some(runs), Some("march"), Some(*found));

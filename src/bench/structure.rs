@@ -6,7 +6,7 @@ use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateOptions, Located, OverlapInput, Overlapped, Path};
+use crate::query::{self, LocateMethod, LocateOptions, Located, OverlapInput, Overlapped, SILENT};
 
 /// A kind of structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -105,18 +105,18 @@ impl Structure {
     }
 
     /// Locates points in the way that suits those of `quantity`: samples of rays each independently, as the paper does;
-    /// others, where leaves within the mesh have no lists, as [`Path::suited`] chooses.
+    /// others, where leaves within the mesh have no lists, as [`LocateMethod::suited`] chooses.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
-                let suited = |in_order| Path::suited(points.len(), mesh.input().tets as usize, in_order);
-                let path = match (quantity, tree.memory().lists) {
-                    (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => Path::Traversal(8),
+                let suited = |in_order| LocateMethod::suited(points.len(), mesh.input().tets as usize, in_order);
+                let method = match (quantity, tree.memory().lists) {
+                    (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => LocateMethod::Traversal(8),
                     (Quantity::LocateRandom, Lists::Boundary) => suited(false),
                     (Quantity::LocateCoherent, Lists::Boundary) => suited(true),
-                    _ => Path::Descent,
+                    _ => LocateMethod::Descent,
                 };
-                query::locate(mesh, tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, &|_, _| {})
+                query::locate(mesh, tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)
             }
             Self::Lbvh(lbvh) => lbvh.locate(mesh, points, TOLERANCE),
             Self::Rays(rays) => rays.locate(mesh, points),
@@ -126,13 +126,12 @@ impl Structure {
 
 /// The tetrahedra of two meshes that intersect the other mesh; `None` if the structures cannot find them.
 pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> {
-    let silent = &|_, _| {};
     match (a.structure, b.structure) {
         (Structure::Octree(tree), Structure::Octree(other)) => {
             let [a, b] = [OverlapInput { mesh: a.mesh, tree }, OverlapInput { mesh: b.mesh, tree: other }];
-            query::overlap(a, b, false, silent).map(Some)
+            query::overlap(a, b, false, SILENT).map(Some)
         }
-        (Structure::Lbvh(tree), Structure::Lbvh(other)) => tree.overlap(a.mesh, other, b.mesh, silent).map(Some),
+        (Structure::Lbvh(tree), Structure::Lbvh(other)) => tree.overlap(a.mesh, other, b.mesh, SILENT).map(Some),
         _ => Ok(None),
     }
 }

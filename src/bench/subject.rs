@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::grid::morton;
 use crate::mesh::{Field, Mesh, On};
-use crate::query::{self, Drawn, Sliced};
+use crate::query::{self, Rendered, SILENT, Sliced};
 use crate::reference::boundary::fault_of;
 use crate::render::{Bounds, Plan, RenderSettings};
 use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
@@ -72,16 +72,16 @@ impl<'a> Subject<'a> {
     }
 
     /// Draws the field; `None` if the structure cannot.
-    pub(super) fn render(&self, structure: &Structure) -> Result<Option<Drawn>> {
+    pub(super) fn render(&self, structure: &Structure) -> Result<Option<Rendered>> {
         let (Some(built), Some(plan)) = (structure.built(), &self.plan) else { return Ok(None) };
-        query::render(&self.device, built, plan, (&self.field.values, On::Points), None, &|_, _| {}).map(Some)
+        query::render(&self.device, built, plan, (&self.field.values, On::Points), None, SILENT).map(Some)
     }
 
     /// Slices the mesh through its middle; `None` if the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
         let (Some(built), Some(voxels)) = (structure.built(), &self.voxels) else { return Ok(None) };
         let field = Some((self.field.values.as_slice(), On::Points));
-        query::slice(&self.device, built, field, voxels, Extrapolate::Nearest, &|_, _| {}, sink).map(Some)
+        query::slice(&self.device, built, field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some)
     }
 }
 

@@ -32,7 +32,7 @@ impl Answers {
     pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: Option<&Structure>) -> Result<Self> {
         let owners = subject.points.iter().map(|(of, points)| structure.locate(&subject.device, points, *of).map(|found| found.owners));
         let owners = owners.collect::<Result<_>>()?;
-        let picture = subject.render(structure)?.map(|drawn| (drawn.found_samples, drawn.colors));
+        let picture = subject.render(structure)?.map(|rendered| (rendered.stats.found_samples, rendered.colors));
         let (mut kinds, mut cells) = (Vec::new(), Vec::new());
         let sliced = subject.slice(structure, &mut |band| {
             kinds.extend(band.kinds);

@@ -2,12 +2,12 @@
 
 use super::cut::{Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, LEAST, Refused, check_field, pieces, smaller};
+use super::{ANYWHERE, InBlocks, LEAST, Refused, check_field, pieces, smaller, unless_too_large};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::BuildOptions;
-use crate::query::{self, LocateOptions, Located};
+use crate::query::{self, LocateOptions, Located, Progress, SILENT};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{CHUNK, place};
 use std::slice::from_ref;
@@ -36,13 +36,7 @@ pub struct Points<'a> {
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
 /// too small for the smallest blocks.
-pub fn locate(
-    gpu: &Gpu,
-    memory: u64,
-    asked: &Points<'_>,
-    field: Option<(&[f32], On)>,
-    report: &dyn Fn(u64, u64),
-) -> Result<InBlocks<Located>> {
+pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32], On)>, report: Progress<'_>) -> Result<InBlocks<Located>> {
     let (mesh, n) = (asked.mesh, asked.points.len());
     check_field(mesh, field)?;
     let nan = f32::from_bits(0x7fc0_0000);
@@ -51,7 +45,7 @@ pub fn locate(
     let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
         let here = field.map(|(values, on)| (placed.values(values, on), on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let found = query::locate(&placed.mesh, &placed.tree, points, here, &asked.how, &|_, _| {})?;
+        let found = query::locate(&placed.mesh, &placed.tree, points, here, &asked.how, SILENT)?;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
             if field.is_some() {
@@ -69,10 +63,10 @@ pub fn locate(
 ///
 /// # Errors
 /// Those of [`locate`].
-pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Vec<Vec<u32>>>> {
+pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
     let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
-        let found = query::locate_all(&placed.mesh, &placed.tree, points, asked.how.tolerance, &|_, _| {})?;
+        let found = query::locate_all(&placed.mesh, &placed.tree, points, asked.how.tolerance, SILENT)?;
         for (&i, owners) in ids.iter().zip(found) {
             all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
         }
@@ -86,16 +80,15 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u6
 type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
 
 /// Queries the whole mesh, if it fits, or one block after another.
-fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: &dyn Fn(u64, u64), ask: Ask<'_>) -> Result<InBlocks> {
+fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
     let Points { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
     let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };
     let all: Vec<u32> = (0..points.len() as u32).collect();
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.build(|| Placed::whole(gpu, mesh, options));
-        match whole.and_then(|placed| job.ask(&placed, &all)) {
-            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
-            other => return other.map(|()| job.end()),
+        if unless_too_large(whole.and_then(|placed| job.ask(&placed, &all)))?.is_some() {
+            return Ok(job.end());
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
@@ -135,7 +128,7 @@ struct Job<'a> {
     done: usize,
     took: InBlocks,
     ask: Ask<'a>,
-    report: &'a dyn Fn(u64, u64),
+    report: Progress<'a>,
 }
 
 impl Job<'_> {

@@ -84,6 +84,17 @@ impl InBlocks {
     }
 }
 
+/// An answer for the whole mesh; `None`, with the reason in the log, if there is too little memory for it.
+fn unless_too_large<T>(answer: Result<T>) -> Result<Option<T>> {
+    match answer {
+        Err(e) if e.is_lack_of_room() => {
+            log::info!("in blocks, since the whole does not fit: {e}");
+            Ok(None)
+        }
+        answer => answer.map(Some),
+    }
+}
+
 /// A block of this many tetrahedra or fewer is not cut again.
 const LEAST: usize = 1024;
 
@@ -136,7 +147,8 @@ impl Refused<'_, '_> {
         let block = if self.sources.len() == 1 { "a block" } else { "a pair of blocks" };
         let takes = if bytes == u64::MAX { "more than 32-bit indices reach".into() } else { format!("about {bytes} bytes") };
         Error::TooLarge(format!(
-            "{limit} bytes of device memory are too few: {block} of {tets} tetrahedra, which is not cut any further, takes {takes}{why}{finer}"
+            "{limit} bytes of device memory are too few: {block} of {tets} tetrahedra, which is not cut any further, \
+             takes {takes}{why}{finer}"
         ))
     }
 

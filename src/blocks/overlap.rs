@@ -4,12 +4,12 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, smaller};
+use super::{ANYWHERE, InBlocks, Refused, smaller, unless_too_large};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::options::BuildOptions;
-use crate::query::{self, OverlapInput, Overlapped};
+use crate::query::{self, OverlapInput, Overlapped, Progress, SILENT};
 use std::cell::OnceCell;
 use std::rc::Rc;
 
@@ -59,7 +59,7 @@ pub struct Meshes<'a> {
 /// # Errors
 /// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
 /// memory is too small for the smallest blocks.
-pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Overlapped>> {
+pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
     let Meshes { meshes, ref options, pairs } = *asked;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
@@ -69,9 +69,8 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: &dyn Fn(u64, 
             let b = took.build(|| whole(meshes[1]))?;
             query::overlap(input_of(&a), input_of(&b), pairs, report)
         });
-        match found {
-            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
-            other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
+        if let Some(found) = unless_too_large(found)? {
+            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(found));
         }
     }
     let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(gpu, memory / 2));
@@ -157,7 +156,7 @@ fn visit(
         }
     }
     let [Some((_, a)), Some((_, b))] = placed else { return Ok(Overlapped::default()) };
-    let mut found = query::overlap(input_of(a), input_of(b), pairs, &|_, _| {})?;
+    let mut found = query::overlap(input_of(a), input_of(b), pairs, SILENT)?;
     log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
     found.overlap.a.iter_mut().for_each(|t| *t = a.tet(*t));
     found.overlap.b.iter_mut().for_each(|t| *t = b.tet(*t));

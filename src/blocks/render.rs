@@ -4,15 +4,15 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{InBlocks, Refused, check_field, pieces, smaller};
+use super::{InBlocks, Refused, check_field, pieces, smaller, unless_too_large};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
-use crate::query::{self, Canvas, Drawn, Rays};
+use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Plan, Prepared, RenderSettings};
+use crate::render::{Plan, Prepared, RenderSettings, RenderStats};
 use rayon::prelude::*;
 use std::slice::from_ref;
 
@@ -37,8 +37,8 @@ pub struct View<'a> {
 /// A picture, and how it was made.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// The colours.
-    pub drawn: Drawn,
+    /// The colours, and what they cost.
+    pub rendered: Rendered,
     /// The plan that it was rendered with.
     pub plan: Plan,
     /// The field's values at the ends of the transfer function.
@@ -51,16 +51,15 @@ pub struct Picture {
 /// # Errors
 /// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
 /// sizes if the memory is too small for the smallest blocks.
-pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64)) -> Result<InBlocks<Picture>> {
+pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
     let View { mesh, ref options, field, settings } = *asked;
     check_field(mesh, Some((&field.values, field.on)))?;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     if least_bytes(gpu, mesh, options)? <= memory {
         let placed = took.build(|| Placed::whole(gpu, mesh, options));
-        match placed.and_then(|placed| render_whole(&placed, asked, report)) {
-            Err(e) if e.is_lack_of_room() => log::info!("in blocks, since the whole does not fit: {e}"),
-            other => return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(other?)),
+        if let Some(picture) = unless_too_large(placed.and_then(|placed| render_whole(&placed, asked, report)))? {
+            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(picture));
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
@@ -69,7 +68,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
     let prepared = Prepared::new(settings, mesh, &(&source.grid).into(), &neighbours, |t| source.is_valid(t as u32), field)?;
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
-    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, drawn: Drawn::default(), took };
+    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, stats: RenderStats::default(), took };
     let mut waiting = vec![(source.whole(), 1.0)];
     let mut done = 0.0;
     while let Some((block, share)) = waiting.pop() {
@@ -81,13 +80,13 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: &dyn Fn(u64, u64
             Some([near, far]) => waiting.extend([(far, share / 2.0), (near, share / 2.0)]),
         }
     }
-    let Job { drawn, took, .. } = job;
-    let drawn = Drawn { colors: rays.colors, ..drawn };
+    let Job { stats, took, .. } = job;
+    let rendered = Rendered { colors: rays.colors, stats };
     let Prepared { plan, range, .. } = prepared;
-    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { drawn, plan, range }))
+    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, plan, range }))
 }
 
-fn render_whole(placed: &Placed, asked: &View<'_>, report: &dyn Fn(u64, u64)) -> Result<Picture> {
+fn render_whole(placed: &Placed, asked: &View<'_>, report: Progress<'_>) -> Result<Picture> {
     let (Placed { mesh, tree, .. }, View { field, settings, .. }) = (placed, asked);
     let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
     let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
@@ -95,8 +94,8 @@ fn render_whole(placed: &Placed, asked: &View<'_>, report: &dyn Fn(u64, u64)) ->
     let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &tree.grid().into(), &neighbours, valid, field)?;
     drop(neighbours);
     let normals = (!normals.is_empty()).then_some(normals.as_slice());
-    let drawn = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;
-    Ok(Picture { drawn, plan, range })
+    let rendered = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;
+    Ok(Picture { rendered, plan, range })
 }
 
 /// The state of rendering a picture in blocks.
@@ -106,7 +105,7 @@ struct Job<'a> {
     source: &'a Source<'a>,
     field: &'a Field,
     prepared: &'a Prepared,
-    drawn: Drawn,
+    stats: RenderStats,
     took: InBlocks,
 }
 
@@ -145,22 +144,15 @@ impl Job<'_> {
         let (values, normals) = (placed.values(values, *on), (!normals.is_empty()).then(|| placed.values(normals, On::Points)));
         let canvas = Canvas::new(&placed.mesh, &placed.tree, plan, (&values, *on), normals.as_deref(), true)?;
         let part = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;
-        let all = &mut self.drawn;
-        all.samples += part.samples;
-        all.skipped_samples += part.skipped_samples;
-        all.found_samples += part.found_samples;
-        all.ranges_ms += part.ranges_ms;
-        all.interval_ms += part.interval_ms;
-        all.march_ms += part.march_ms;
-        all.submissions += part.submissions;
+        self.stats += part;
         log::debug!("a block of {} tetrahedra, {} samples", block.tets.len(), part.samples);
         Ok(())
     }
 
-    /// Whether a block contains values that are drawn. An iso-surface may lie between the samples of two blocks, so
+    /// Whether a block contains values that are visible. An iso-surface may lie between the samples of two blocks, so
     /// with iso-surfaces no block can be left out.
     fn shows(&self, block: &Block) -> bool {
-        let Plan { iso, drawn, .. } = &self.prepared.plan;
+        let Plan { iso, visible_values, .. } = &self.prepared.plan;
         let Field { values, on, .. } = self.field;
         let range = |&t: &u32| {
             let ids = self.source.mesh.tets[t as usize];
@@ -168,7 +160,7 @@ impl Job<'_> {
             let finite = values.iter().all(|v| v.is_finite());
             if finite { values.map(|v| [v; 2]).into_iter().fold(NO_RANGE, union) } else { NO_RANGE }
         };
-        !iso.is_empty() || visible(&[block.tets.par_iter().map(range).reduce(|| NO_RANGE, union)], drawn) != [0]
+        !iso.is_empty() || visible(&[block.tets.par_iter().map(range).reduce(|| NO_RANGE, union)], visible_values) != [0]
     }
 
     /// For each row of the picture, whether it has rays that may meet the block and are not yet opaque.

@@ -5,12 +5,12 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, check_field, pieces, smaller};
-use crate::error::{Error, Result};
+use super::{ANYWHERE, InBlocks, Refused, check_field, pieces, smaller, unless_too_large};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
 use crate::options::BuildOptions;
-use crate::query::{self, Slicing};
+use crate::query::{self, Progress, Slicing};
 use crate::reference::separate::closest;
 use crate::reference::tet::sub;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
@@ -44,13 +44,13 @@ pub struct Stack<'a> {
 /// band, in order. `report` receives the number of voxels done, and of all.
 ///
 /// # Errors
-/// Those of [`query::slice`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is too
-/// small for the smallest blocks.
+/// Those of [`query::slice`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the memory
+/// is too small for the smallest blocks.
 pub fn slice(
     gpu: &Gpu,
     memory: u64,
     asked: &Stack<'_>,
-    report: &dyn Fn(u64, u64),
+    report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<InBlocks<Tally>> {
     let Stack { mesh, ref options, field, voxels, extrapolate } = *asked;
@@ -67,13 +67,11 @@ pub fn slice(
     };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = took.build(|| Placed::whole(gpu, mesh, options));
-        let sliced = whole
-            .and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink).map(|_| ()));
-        match sliced {
-            Err(e) if e.is_lack_of_room() && tally.get() == Tally::default() => {
-                log::info!("in blocks, since the whole does not fit: {e}");
-            }
-            other => return other.map(|()| InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get())),
+        let sliced = whole.and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink));
+        // Once the sink has voxels, it is too late to begin again.
+        let sliced = if tally.get() == Tally::default() { unless_too_large(sliced)? } else { Some(sliced?) };
+        if sliced.is_some() {
+            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get()));
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
@@ -98,7 +96,7 @@ struct Job<'a> {
     took: InBlocks,
     /// Voxels done, counted in part while only some of the blocks have been queried.
     done: f64,
-    report: &'a dyn Fn(u64, u64),
+    report: Progress<'a>,
 }
 
 impl Job<'_> {
@@ -118,36 +116,32 @@ impl Job<'_> {
         while let Some((block, share)) = waiting.pop() {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
             let need = if met { block.bytes(self.gpu, &self.source.options)? } else { 0 };
-            let tried = if !met {
-                Ok(())
-            } else if need <= self.memory {
-                self.visit(&block, &mut all)
-            } else {
-                Err(None)
-            };
-            match tried {
-                Err(Some(e)) if !e.is_lack_of_room() => return Err(e),
-                Err(why) => {
-                    let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
-                        let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
-                        let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };
-                        return Err(refused.error(block.tets.len(), need, why));
-                    };
-                    waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
-                }
-                Ok(()) => {
-                    self.done += share;
-                    (self.report)(self.done as u64, voxels.voxels());
-                    self.blocks.push(block);
+            let mut why = None;
+            if need <= self.memory {
+                match if met { self.visit(&block, &mut all) } else { Ok(()) } {
+                    Err(e) if e.is_lack_of_room() => why = Some(e),
+                    Err(e) => return Err(e),
+                    Ok(()) => {
+                        self.done += share;
+                        (self.report)(self.done as u64, voxels.voxels());
+                        self.blocks.push(block);
+                        continue;
+                    }
                 }
             }
+            let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
+                let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
+                let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };
+                return Err(refused.error(block.tets.len(), need, why));
+            };
+            waiting.extend([(high, share / 2.0), (low, share / 2.0)]);
         }
         self.done = end;
         Ok(all)
     }
 
     /// Queries a block.
-    fn visit(&mut self, block: &Block, all: &mut Band) -> Result<(), Option<Error>> {
+    fn visit(&mut self, block: &Block, all: &mut Band) -> Result<()> {
         let Stack { field, voxels, extrapolate, .. } = *self.asked;
         let (grid, level) = (&self.source.grid, self.source.level);
         self.placed.take_if(|(tets, _)| !Rc::ptr_eq(tets, &block.tets));

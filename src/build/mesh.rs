@@ -15,8 +15,12 @@ use std::sync::Arc;
 
 /// Most tetrahedra of one mesh: a face number must fit 31 bits.
 pub const MAX_TETS: u32 = (1 << 29) - 2;
-/// Most workgroups of a kernel that ends with a sum over all tetrahedra.
+/// Most workgroups of a kernel that ends with a sum over all tetrahedra, as long as none of its invocations takes more
+/// than [`SUMMING_ROWS`].
 const SUMMING_GROUPS: u32 = 1024;
+/// Most tetrahedra of one invocation, whose loops must stay short: some drivers end them after 65,535 passes, inner
+/// loops included.
+const SUMMING_ROWS: u32 = 512;
 
 /// A mesh in device memory, owned by the caller or by this crate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -106,7 +110,7 @@ impl MeshScratch {
 /// How many consecutive tetrahedra one workgroup of a kernel that sums over all tetrahedra takes; at least one
 /// workgroup's worth.
 pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
-    tets.div_ceil(SUMMING_GROUPS).max(1).next_multiple_of(workgroup)
+    tets.div_ceil(SUMMING_GROUPS).clamp(1, SUMMING_ROWS * workgroup).next_multiple_of(workgroup)
 }
 
 /// Rejects more tetrahedra than one mesh may have.
@@ -265,7 +269,9 @@ impl DeviceMesh {
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
-            return Err(Error::TooLarge("the table of faces ran over; the mesh has more faces than its tetrahedra can have".into()));
+            return Err(Error::TooLarge(format!(
+                "the table of faces is full: too few of the {tets} tetrahedra share faces; they can be taken in blocks, see `blocks`"
+            )));
         }
         let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
         let kept = KeptMesh { view: MeshView { input, arrays }, memory };

@@ -85,7 +85,10 @@ impl BuildScratch {
 /// [`crate::Error::Invalid`] for α outside 0…10.
 pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, options: &BuildOptions, scratch: &BuildScratch) -> Result<()> {
     let BuildScratch { counts, filter, sorted } = scratch;
-    cmd_depth(r, mesh, tree.status, tree.grid, options, (tree.capacity.candidates, tree.capacity.level), counts)?;
+    let Capacity { candidates, entries: room, level, .. } = tree.capacity;
+    // Without a filter, every candidate is an entry.
+    let most = if filter.is_some() { candidates } else { candidates.min(room) };
+    cmd_depth(r, mesh, tree.status, tree.grid, options, (most, level), counts)?;
     cmd_count(r, mesh, tree.grid, options, counts)?;
     if let Some(filter) = filter {
         cmd_filter(r, mesh, tree.grid, options, counts, filter)?;

@@ -82,7 +82,7 @@ impl FieldRanges {
     }
 
     /// Recomputes the ranges for new values, in the same memory. The tree must be the one that the ranges were made
-    /// for.
+    /// for. Work submitted to the queue before may still read the old ranges; work on other queues must have ended.
     ///
     /// # Errors
     /// Those of [`FieldRanges::new`].
@@ -95,7 +95,11 @@ impl FieldRanges {
         }
         let field = self.gpu.upload("olbvh.ranges.field", values)?;
         let ranges = self.memory();
-        self.stages = self.gpu.submit("olbvh.ranges", |r| cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges))?.1.stages;
+        let record = |r: &mut Recorder<'_>| {
+            r.barrier("ranges.used → ranges.clear");
+            cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges)
+        };
+        self.stages = self.gpu.submit("olbvh.ranges", record)?.1.stages;
         Ok(())
     }
 

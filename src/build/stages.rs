@@ -13,10 +13,8 @@ use crate::kernels::{
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
+use crate::reference::boundary::NONE;
 use crate::reference::quarters::id_mask;
-
-/// An α with which tetrahedra of any size lead to level 10, in units of 1/65536.
-const FINEST: i32 = -(11 << 16);
 
 /// Stage 1: chooses the level of the leaves (§3.2; SPEC 2.4) and writes it to `grid` and `status`.
 pub(crate) fn cmd_depth(
@@ -30,9 +28,7 @@ pub(crate) fn cmd_depth(
 ) -> Result<()> {
     let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
     let workgroup = r.gpu().target().each;
-    let fixed = options.alpha_fixed()?;
-    // A requested level replaces the deepest one, and an α below 0 chooses the deepest level whatever the tetrahedra.
-    let (alpha, deepest) = options.level.map_or((fixed, deepest), |level| (FINEST.cast_unsigned(), deepest.min(level)));
+    let (alpha, requested) = (options.alpha_fixed()?, options.level.unwrap_or(NONE));
     let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
     let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
     let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
@@ -54,6 +50,7 @@ pub(crate) fn cmd_depth(
             candidates,
             tets,
             alpha,
+            requested,
             capacity,
             per_tet,
             ample,

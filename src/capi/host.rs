@@ -6,7 +6,7 @@ use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice, HostQueue, Requirements};
 use ash::vk::{self, Handle};
 use std::ffi::{c_char, c_void};
 use std::ptr::null;
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::{Arc, Mutex};
 
 /// What a host should enable when it creates a device for olbvh.
 #[repr(C)]
@@ -118,26 +118,25 @@ pub struct OlbvhHostDevice {
     pub debug_utils: u32,
 }
 
-/// The host's queue and its lock.
-struct LentQueue {
-    queue: vk::Queue,
-    lock: Option<[unsafe extern "C" fn(*mut c_void); 2]>,
-    argument: *mut c_void,
-    /// Makes the threads that use this handle wait for each other, even if the host gives no lock.
-    own: Mutex<()>,
+/// The host's queue with its functions that lock and unlock it. There is no second lock: a thread that holds the host's
+/// lock, if that is recursive, would wait for the second one while another thread holds that and waits for the host's.
+pub(super) struct LentQueue {
+    pub queue: vk::Queue,
+    pub lock: [unsafe extern "C" fn(*mut c_void); 2],
+    pub argument: *mut c_void,
 }
 
-// SAFETY: the queue is used only while `own` is held; the host vouches that its functions may be called from any thread
-// with `argument`, see `OlbvhHostDevice`.
+// SAFETY: the queue is used only while the host's lock is held; the host vouches that its functions may be called from
+// any thread with `argument`, see `OlbvhHostDevice`.
 unsafe impl Send for LentQueue {}
-// SAFETY: the queue is used only while `own` is held, so shared references cause no concurrent use; for the host's
-// functions see `OlbvhHostDevice`.
+// SAFETY: the queue is used only while the host's lock is held, so shared references cause no concurrent use; for the
+// host's functions see `OlbvhHostDevice`.
 unsafe impl Sync for LentQueue {}
 
 impl HostQueue for LentQueue {
     fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
-        let _own = self.own.lock().unwrap_or_else(PoisonError::into_inner);
-        let _host = self.lock.map(|[lock, unlock]| HostLock::take(lock, unlock, self.argument));
+        let [lock, unlock] = self.lock;
+        let _held = HostLock::take(lock, unlock, self.argument);
         submit(self.queue);
     }
 }
@@ -171,12 +170,13 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
         let Some(get) = host.get_instance_proc_addr.filter(|_| !null) else {
             return Err(missing("a handle of the host's device"));
         };
-        let lock = match (host.lock_queue, host.unlock_queue) {
-            (Some(lock), Some(unlock)) => Some([lock, unlock]),
-            (None, None) => None,
-            _ => return Err(missing("one of lock_queue and unlock_queue")),
+        let queue = vk::Queue::from_raw(host.queue);
+        let queue: Option<Arc<dyn HostQueue>> = match (host.lock_queue, host.unlock_queue) {
+            (Some(_), None) | (None, Some(_)) => return Err(missing("one of lock_queue and unlock_queue")),
+            _ if host.queue == 0 => None,
+            (Some(lock), Some(unlock)) => Some(Arc::new(LentQueue { queue, lock: [lock, unlock], argument: host.queue_lock })),
+            (None, None) => Some(Arc::new(Mutex::new(queue))),
         };
-        let queue = LentQueue { queue: vk::Queue::from_raw(host.queue), lock, argument: host.queue_lock, own: Mutex::new(()) };
         // SAFETY: the host passes the loader's function and handles of one device that has not been destroyed.
         let gpu = unsafe {
             let instance = load(get, host.instance);
@@ -185,7 +185,7 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
                 physical: vk::PhysicalDevice::from_raw(host.physical_device),
                 device,
                 family: host.queue_family,
-                queue: if host.queue == 0 { None } else { Some(Arc::new(queue)) },
+                queue,
                 allocator: None,
                 pipeline_cache: (host.pipeline_cache != 0).then(|| vk::PipelineCache::from_raw(host.pipeline_cache)),
                 enabled: Enabled {

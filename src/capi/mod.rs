@@ -25,6 +25,7 @@ use crate::render::Bounds;
 use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char};
 use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr::null_mut;
 use std::sync::Arc;
 
 /// Result of a call.
@@ -152,7 +153,8 @@ pub struct OlbvhTreeInfo {
     pub lo: [f32; 3],
     /// Upper corner of the mesh.
     pub hi: [f32; 3],
-    /// Number of tetrahedra left out because a vertex does not exist, occurs twice or is not finite.
+    /// Number of tetrahedra left out because a vertex does not exist, occurs twice, or has a coordinate that is not
+    /// finite or beyond 2^125.
     pub bad_cells: u32,
     /// Device time of the construction in milliseconds.
     pub build_ms: f64,
@@ -170,7 +172,7 @@ fn status_of(error: &Error) -> OlbvhStatus {
     match error {
         Error::Invalid(_) | Error::BadCells { .. } => OlbvhStatus::Invalid,
         Error::NoVulkan(_) | Error::NoDevice(_) | Error::SelfTest { .. } => OlbvhStatus::Device,
-        Error::Memory { .. } => OlbvhStatus::Memory,
+        Error::Memory { .. } | Error::Vulkan { result: ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, .. } => OlbvhStatus::Memory,
         Error::TooLarge(_) => OlbvhStatus::TooLarge,
         Error::Vulkan { result: ash::vk::Result::ERROR_DEVICE_LOST, .. } => OlbvhStatus::Lost,
         Error::Vulkan { .. } => OlbvhStatus::Vulkan,
@@ -216,9 +218,13 @@ fn handle_mut<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut T> {
     unsafe { pointer.as_mut() }.ok_or_else(|| missing(what))
 }
 
-/// Writes a result to the caller's memory.
+/// Writes a result to the caller's memory, which need not be initialised.
 fn put<T>(out: *mut T, value: T) -> Result<()> {
-    *handle_mut(out, "the place for the result")? = value;
+    if out.is_null() {
+        return Err(missing("the place for the result"));
+    }
+    // SAFETY: not null, so it is the caller's memory for a result (see each function).
+    unsafe { out.write(value) };
     Ok(())
 }
 
@@ -234,8 +240,9 @@ fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> 
 
 /// Moves a value to the heap and passes ownership to the caller as a handle.
 fn give<T>(out: *mut *mut T, value: T) -> Result<()> {
-    *handle_mut(out, "the place for the result")? = Box::into_raw(Box::new(value));
-    Ok(())
+    // Null first: if there is no place, the value is dropped here and not lost as a pointer.
+    put(out, null_mut())?;
+    put(out, Box::into_raw(Box::new(value)))
 }
 
 /// Frees what [`give`] passed out; does nothing for null.

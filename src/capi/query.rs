@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh};
-use crate::query::{LocateOptions, OverlapInput, Path, locate, overlap, render, slice};
+use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Prepared, RenderSettings, TransferFunction};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -152,9 +152,9 @@ pub extern "C" fn olbvh_locate(
         let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
         let points = array(points.cast::<[f32; 3]>(), count, "points")?;
         let owners = array_mut(owners, count, "owners")?;
-        let path = Path::suited(count, mesh.device.input().tets as usize, false);
-        let options = LocateOptions { tolerance: self::tolerance(tolerance), path };
-        let found = locate(&mesh.device, tree, points, None, &options, &|_, _| {})?;
+        let method = LocateMethod::suited(count, mesh.device.input().tets as usize, false);
+        let options = LocateOptions { tolerance: self::tolerance(tolerance), method };
+        let found = locate(&mesh.device, tree, points, None, &options, SILENT)?;
         owners.iter_mut().zip(found.owners).for_each(|(to, owner)| *to = mesh.cell(owner));
         if !barycentrics.is_null() {
             array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.copy_from_slice(&found.barycentrics);
@@ -211,7 +211,7 @@ pub extern "C" fn olbvh_render(
         let valid = |tet: usize| bad.binary_search(&(tet as u32)).is_err();
         let prepared = Prepared::new(&settings, &mesh.download()?, &tree.grid().into(), &neighbours, valid, &field)?;
         let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
-        pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, &|_, _| {})?.colors);
+        pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())
     })
 }
@@ -249,7 +249,7 @@ pub extern "C" fn olbvh_slice(
             Ok(())
         };
         let field = field.as_ref().map(|(values, on)| (&values[..], *on));
-        slice(&mesh.device, tree, field, &voxels, extrapolate, &|_, _| {}, &mut sink)?;
+        slice(&mesh.device, tree, field, &voxels, extrapolate, SILENT, &mut sink)?;
         Ok(())
     })
 }
@@ -264,7 +264,7 @@ pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
         let hits = [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?];
         let [one, other] = [a, b].map(|t| OverlapInput { mesh: &t.mesh.device, tree: &t.tree });
-        let found = overlap(one, other, false, &|_, _| {})?.overlap;
+        let found = overlap(one, other, false, SILENT)?.overlap;
         for ((bits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
             bits.fill(0);
             for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {

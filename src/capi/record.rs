@@ -13,7 +13,7 @@ pub(super) use {locate::*, overlap::*, render::*, scene::*, slice::*};
 
 use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
 use crate::error::{Error, Result};
-use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, Gpu, Recorder};
+use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, DescriptorRoom, Gpu, Recorder};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Rounds, Scene};
@@ -125,6 +125,8 @@ pub struct OlbvhRecording {
     recorder: Option<Recorder<'static>>,
     gpu: *mut Gpu,
     pools: *mut DescriptorPools,
+    /// Room of the largest of the pools reserved by rehearsals, which is the first.
+    reserved: DescriptorRoom,
     /// Timed stages of the recording that has ended: name, first and last query.
     stages: Vec<(String, u32, u32)>,
 }
@@ -155,7 +157,8 @@ pub extern "C" fn olbvh_recording_new(gpu: *const OlbvhGpu, out: *mut *mut Olbvh
     border(|| {
         let gpu = handle(gpu, "gpu")?.0.clone();
         let pools = Box::into_raw(Box::new(DescriptorPools::new(&gpu)));
-        give(out, OlbvhRecording { recorder: None, gpu: Box::into_raw(Box::new(gpu)), pools, stages: Vec::new() })
+        let (gpu, reserved) = (Box::into_raw(Box::new(gpu)), DescriptorRoom::default());
+        give(out, OlbvhRecording { recorder: None, gpu, pools, reserved, stages: Vec::new() })
     })
 }
 
@@ -169,8 +172,9 @@ pub extern "C" fn olbvh_recording_free(recording: *mut OlbvhRecording) {
 /// `VkCommandBuffer` in the recording state, outside of a render pass. If it is 0, the recording is a rehearsal:
 /// commands compile the pipelines that they need, and the end reserves room for their descriptor sets, so that
 /// recording the same commands later creates nothing. `queries` is a reset `VkQueryPool` of `query_count` timestamp
-/// queries, or 0; stages are timed as long as queries are left. The recording binds a compute pipeline, push constants,
-/// and descriptor set 0 where the device has no buffer addresses.
+/// queries, or 0; stages are timed as long as queries are left, and not at all if the queue family has no timestamps
+/// (`timestampValidBits` 0). The recording binds a compute pipeline, push constants, and descriptor set 0 where the
+/// device has no buffer addresses.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_recording_begin(recording: *mut OlbvhRecording, commands: u64, queries: u64, query_count: u32) -> OlbvhStatus {
     border(|| {
@@ -196,11 +200,14 @@ pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhSt
         let recording = handle_mut(recording, "recording")?;
         let mut recorder = recording.recorder.take().ok_or_else(not_begun)?;
         let (rehearsed, room, ended) = (recorder.commands() == vk::CommandBuffer::null(), recorder.descriptor_room(), recorder.finish());
-        recording.stages = std::mem::take(&mut recorder.stages);
+        recording.stages = recorder.timed_stages().to_vec();
         drop(recorder);
-        if rehearsed {
+        let had = recording.reserved;
+        let needed = DescriptorRoom { sets: room.sets.max(had.sets), buffers: room.buffers.max(had.buffers) };
+        if rehearsed && needed != had {
             // SAFETY: the recorder, which alone referred to the pools, has been dropped.
-            unsafe { &mut *recording.pools }.reserve(room)?;
+            unsafe { &mut *recording.pools }.reserve(needed)?;
+            recording.reserved = needed;
         }
         ended
     })

@@ -4,10 +4,10 @@
 mod host;
 mod queries;
 
-use super::host::{OlbvhHostDevice, OlbvhHostRequirements, olbvh_gpu_from_host, olbvh_host_check};
+use super::host::{LentQueue, OlbvhHostDevice, OlbvhHostRequirements, olbvh_gpu_from_host, olbvh_host_check};
 use super::record::*;
 use super::*;
-use crate::gpu::{Binding, BufferRef, HostDevice, Recorder, Requirements, USAGE};
+use crate::gpu::{Binding, BufferRef, HostDevice, HostQueue, Recorder, Requirements, USAGE, failed};
 use crate::mesh::kuhn_jittered;
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
@@ -16,7 +16,7 @@ use ash::vk::{self, Handle};
 use host::Host;
 use host::counted::{ARMED, CALLS, counting};
 use std::ffi::c_void;
-use std::ptr::{null, null_mut};
+use std::ptr::null;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering::Relaxed};
 
 /// Number of timestamp queries: too few for all stages of a frame.
@@ -118,6 +118,10 @@ fn frames(gpu: *mut OlbvhGpu) {
     // SAFETY: the create info is complete, and the query pool is destroyed below.
     let queries = unsafe { device.device().create_query_pool(&info, None) }.unwrap();
     let before = CALLS.get();
+    ARMED.set(true);
+    ok(record(0, vk::QueryPool::null(), true));
+    ARMED.set(false);
+    assert_eq!(CALLS.get(), before, "calls made by another rehearsal");
     for _ in 0..3 {
         let frame = |r: &mut Recorder<'_>| {
             // SAFETY: the command buffer is in the recording state, and no pending command uses the queries.
@@ -160,6 +164,13 @@ fn frames(gpu: *mut OlbvhGpu) {
     let status: Vec<u32> = device.download(&memory, memory.all().part(arrays.status.offset, 16)).unwrap();
     assert_eq!((status[0], status[3]), (host.grid.level, host.p.len() as u32));
     assert!(arrays.bindings.iter().take(6).all(|b| b.buffer == memory.all().buffer.as_raw()));
+    // A field of size 0 is none, and one that is too small is refused.
+    let mut field = OlbvhBuffer { size: 0, ..weights };
+    let same: OlbvhSceneArrays = made(|out| olbvh_scene_arrays(scene, &raw const field, out));
+    assert_eq!(same.addresses, arrays.addresses);
+    field.size = 4 * u64::from(points) - 1;
+    let mut none = std::mem::MaybeUninit::uninit();
+    assert_eq!(olbvh_scene_arrays(scene, &raw const field, none.as_mut_ptr()), OlbvhStatus::Invalid);
     olbvh_recording_free(recording);
     olbvh_scene_free(scene);
 }
@@ -181,6 +192,24 @@ unsafe extern "C" fn lock(held: *mut c_void) {
 unsafe extern "C" fn unlock(held: *mut c_void) {
     // SAFETY: the pointer is the one that the test passed, to a `Held` that outlives the `Gpu`.
     assert!(unsafe { &*held.cast::<Held>() }.now.swap(false, Relaxed));
+}
+
+unsafe extern "C" fn nothing(_: *mut c_void) {}
+
+/// A thread that holds its host's lock, which it may take several times, need not wait for anything else.
+#[test]
+fn a_lent_queue_has_no_lock_but_the_hosts() {
+    let queue = LentQueue { queue: vk::Queue::null(), lock: [nothing; 2], argument: null_mut() };
+    let (told, heard) = std::sync::mpsc::channel();
+    std::thread::spawn(move || queue.locked(&mut |_| queue.locked(&mut |_| told.send(()).unwrap())));
+    heard.recv_timeout(std::time::Duration::from_secs(10)).unwrap();
+}
+
+#[test]
+fn any_call_may_be_short_of_memory() {
+    let error = failed("vkQueueSubmit")(vk::Result::ERROR_OUT_OF_DEVICE_MEMORY);
+    assert!(error.is_lack_of_room());
+    assert_eq!(status_of(&error), OlbvhStatus::Memory);
 }
 
 #[test]

@@ -142,7 +142,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let status: BuildStatus = one(&words(tree.status, size_of::<BuildStatus>() / 4))?;
     compare_one("build.estimate_depth", "status.sum", &expected.status.sum, &status.sum)?;
     compare("build.estimate_depth", "status.total", &expected.status.total, &status.total)?;
-    compare_one("build.choose_depth", "status.heuristic_level", &expected.status.heuristic_level, &status.heuristic_level)?;
+    compare_one("build.choose_depth", "status.wanted_level", &expected.status.wanted_level, &status.wanted_level)?;
     compare_one("build.choose_depth", "status.level", &expected.status.level, &status.level)?;
     compare_one("build.choose_depth", "status.candidates", &expected.status.candidates, &status.candidates)?;
     compare_one("build.choose_depth", "status.overflow", &expected.status.overflow, &status.overflow)?;

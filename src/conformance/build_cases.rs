@@ -52,7 +52,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
         build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { way: Way::Narrow, ..case });
         let case = BuildCase { lists: Lists::All, ..case };
         let group = if thorough { mesh.group } else { Group::Full };
-        for way in [Way::Tight, Way::Clipped, Way::Root, Way::Nothing, Way::Shallow] {
+        for way in [Way::Tight, Way::Clipped, Way::Narrow, Way::Root, Way::Nothing, Way::Shallow] {
             build(cases, group, BuildCase { way, boxes: way == Way::Tight, ..case });
         }
         if thorough {

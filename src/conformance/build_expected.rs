@@ -27,7 +27,7 @@ impl Expected {
     pub(crate) fn new(twin: &mut Twin, options: &BuildOptions, room: Option<u32>, most: u32, level: u32) -> Verdict<Self> {
         let sizes = twin.sizes;
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
-        let mut status = BuildStatus { heuristic_level: heuristic, ..BuildStatus::default() };
+        let mut status = BuildStatus { wanted_level: heuristic, ..BuildStatus::default() };
         let sum: u64 = (0..).zip(sizes.histogram).map(|(alpha, n): (u64, u64)| alpha * n).sum();
         status.sum = [sum as u32, (sum >> 32) as u32];
         for (k, n) in sizes.entries.iter().enumerate() {

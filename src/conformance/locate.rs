@@ -10,7 +10,7 @@ use crate::error::Error;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{LocateOptions, LocateOutput, Path, PointInput, Scene, cmd_locate, locate, locate_all};
+use crate::query::{LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
 
@@ -66,24 +66,23 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
     let built = twin.tree(&options)?;
     let (points, _) = twin.points();
     let (mesh, locator) = (&twin.mesh, twin.locator(&built));
-    let quiet: &dyn Fn(u64, u64) = &|_, _| {};
     match case.how {
         How::Descent | How::Traversal(_) => {
-            let path = if let How::Traversal(stack) = case.how { Path::Traversal(stack) } else { Path::Descent };
-            let found = locate(device, &tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
+            let method = if let How::Traversal(stack) = case.how { LocateMethod::Traversal(stack) } else { LocateMethod::Descent };
+            let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
             compare_locations(twin.locations(&built), &found.owners, &found.barycentrics, points)
         }
         How::Runs | How::Sorted => {
             let sorted = case.how == How::Sorted;
-            let path = if sorted { Path::Sorted } else { Path::Runs };
+            let method = if sorted { LocateMethod::Sorted } else { LocateMethod::Runs };
             let order = if sorted { order_of(&built.tree().grid, points) } else { (0..points.len() as u32).collect() };
-            let found = locate(device, &tree, points, None, &LocateOptions { path, ..LocateOptions::default() }, quiet)?;
+            let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
             compare_locations(&locator.locate_in_runs(points, &order), &found.owners, &found.barycentrics, points)
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
             let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
-            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, TOLERANCE, quiet)?)
+            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, TOLERANCE, SILENT)?)
         }
         How::Values => {
             // Values are whole numbers below 2^12, so products and sums differ at most by the rounding of the division
@@ -94,7 +93,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                     on,
                     values: (0..n).map(|i| (super::data::mix(i as u32) % 4096) as f32).collect(),
                 };
-                let found = locate(device, &tree, points, Some((&field.values, on)), &LocateOptions::default(), quiet)?;
+                let found = locate(device, &tree, points, Some((&field.values, on)), &LocateOptions::default(), SILENT)?;
                 let near = |a: f32, b: f32| (a.is_nan() && b.is_nan()) || (a - b).abs() <= 4096.0 * 1e-6;
                 let values: Vec<f32> = twin.locations(&built).iter().map(|e| locator.value(&field, e)).collect();
                 if let Some(i) = (0..points.len()).find(|&i| !found.values.get(i).is_some_and(|v| near(*v, values[i]))) {
@@ -117,7 +116,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
 fn same_owners(gpu: &Gpu, twin: &mut Twin, device: &DeviceMesh, first: &Tree) -> Verdict {
     let (points, inside) = twin.points();
     let points = points[..inside].to_vec();
-    let owners = |tree: &Tree| Ok::<_, Error>(locate(device, tree, &points, None, &LocateOptions::default(), &|_, _| {})?.owners);
+    let owners = |tree: &Tree| Ok::<_, Error>(locate(device, tree, &points, None, &LocateOptions::default(), SILENT)?.owners);
     let expected = owners(first)?;
     if let Some(i) = expected.iter().position(|&o| o == NONE) {
         return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));

@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::{OverlapInput, overlap};
+use crate::query::{OverlapInput, SILENT, overlap};
 use crate::reference::boundary::{Topology, topology};
 use crate::reference::build::build;
 use crate::reference::overlap::{OverlapSide, overlap as reference};
@@ -115,7 +115,7 @@ fn compare_overlaps(a: Sides<'_>, b: Sides<'_>) -> Verdict<usize> {
     let kinds: &[bool] = if a.0.tree.lists == Lists::All { &[false, true] } else { &[false] };
     for &pairs in kinds {
         let expected = reference(a.0, b.0, pairs);
-        let found = overlap(a.1, b.1, pairs, &|_, _| {})?.overlap;
+        let found = overlap(a.1, b.1, pairs, SILENT)?.overlap;
         hits = expected.a.len();
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
         compare(stage, "a", &expected.a, &found.a)?;

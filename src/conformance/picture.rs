@@ -7,7 +7,7 @@ use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::render;
+use crate::query::{SILENT, render};
 use crate::reference::volume::{Scene, render as draw};
 use crate::render::{Plan, RenderSettings, TransferFunction};
 
@@ -58,19 +58,19 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let tree = Tree::build(gpu, device, &options)?;
         let normals = &scene.prepared.normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
-        let drawn = render(device, &tree, plan, (&field.values, field.on), normals, &|_, _| {})?;
+        let drawn = render(device, &tree, plan, (&field.values, field.on), normals, SILENT)?;
         let pixels = plan.pixels(&drawn.colors);
-        let expected = draw(&scene, &|_, _| {});
+        let expected = draw(&scene, SILENT);
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // Ray intervals depend on the leaves of the tree, the picture does not.
-        compare_one(&stage, "found samples", &expected.found_samples, &drawn.found_samples)?;
-        compare_one(&stage, "skipped samples", &expected.skipped_samples, &drawn.skipped_samples)?;
+        compare_one(&stage, "found samples", &expected.stats.found_samples, &drawn.stats.found_samples)?;
+        compare_one(&stage, "skipped samples", &expected.stats.skipped_samples, &drawn.stats.skipped_samples)?;
         near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
         let hides = plan.hides(&field.values);
         if hides {
             // The colours must equal, to the bit, those of a picture in which nothing is skipped.
-            let all = Plan { drawn: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
-            let all = render(device, &tree, &all, (&field.values, field.on), normals, &|_, _| {})?;
+            let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
+            let all = render(device, &tree, &all, (&field.values, field.on), normals, SILENT)?;
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
             let same = compare(&stage, "colours compared with those of every sample", &bits(&all.colors), &bits(&drawn.colors));
             twin.same_unless_tangled(same)?;

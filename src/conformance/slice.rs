@@ -8,7 +8,7 @@ use crate::error::Error;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::slice;
+use crate::query::{SILENT, slice};
 use crate::reference::slice::Slicer;
 use crate::render::Bounds;
 use crate::slicing::{Band, Extrapolate, Plane, SliceSettings};
@@ -71,7 +71,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
     };
     if voxels.plan(&host.grid).is_err() {
         // The coordinates reach the limits of single precision: the device must refuse these voxels, too.
-        let refused = slice(device, &tree, None, &voxels, extrapolate, &|_, _| {}, &mut |_| Ok(()));
+        let refused = slice(device, &tree, None, &voxels, extrapolate, SILENT, &mut |_| Ok(()));
         return compare_one("query.slice", "refusal", &true, &matches!(refused, Err(Error::Invalid(_))));
     }
     let field = case.stack.field.map(|on| field(mesh, on));
@@ -84,7 +84,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
         Ok(())
     };
     let values = field.as_ref().map(|f| (&f.values[..], f.on));
-    let sliced = slice(device, &tree, values, &voxels, extrapolate, &|_, _| {}, &mut hold)?;
+    let sliced = slice(device, &tree, values, &voxels, extrapolate, SILENT, &mut hold)?;
     verdict?;
     let tally = sliced.tally;
     compare_one("query.slice", "voxels", &voxels.voxels(), &(tally.inside + tally.touched + tally.empty))

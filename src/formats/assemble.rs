@@ -1,12 +1,14 @@
 //! Conversion of the points, cells and arrays of a file to a [`Mesh`] and its [`Report`], shared by all formats.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use super::array::{Array, Names};
 use super::budget::Budget;
 use super::cells::{CellType, Shape, split};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, printable};
+use super::{LoadOptions, Merge};
 use crate::error::{Error, Result};
 use crate::grid::COORDINATE_LIMIT;
 use crate::mesh::{Field, Mesh, On};
@@ -18,9 +20,14 @@ pub(crate) struct Assembly<'a> {
     pub format: String,
     /// Size of all files read.
     pub bytes: u64,
-    pub points: Vec<[f64; 3]>,
+    points: Vec<[f64; 3]>,
+    /// The point that replaces each point, an earlier one or itself; empty: no point is replaced.
+    merged: Vec<u32>,
+    merge: Merge,
     /// Number of the first point in the format, for messages.
     pub first_point: i64,
+    /// Numbers of the points in the file, for messages; empty: they follow each other.
+    pub point_tags: Vec<i64>,
     pub arrays: Vec<Array>,
     pub warnings: Vec<String>,
     /// Limit for the NaN that fill arrays which do not cover the mesh.
@@ -34,19 +41,24 @@ pub(crate) struct Assembly<'a> {
     flat: u64,
     tangled: u64,
     corners: Vec<u32>,
+    /// Number of corners of all cells together.
+    n_corners: u64,
 }
 
 impl<'a> Assembly<'a> {
-    pub fn new(source: &'a Source, format: String) -> Self {
+    pub fn new(source: &'a Source, options: &LoadOptions, format: String) -> Self {
         Self {
             source,
             format,
             bytes: source.len() as u64,
             points: Vec::new(),
+            merged: Vec::new(),
+            merge: options.merge,
             first_point: 0,
+            point_tags: Vec::new(),
             arrays: Vec::new(),
             warnings: Vec::new(),
-            padding: Budget::default(),
+            padding: Budget::new(source.len(), options),
             tets: Vec::new(),
             ids: Vec::new(),
             n_cells: 0,
@@ -55,7 +67,13 @@ impl<'a> Assembly<'a> {
             flat: 0,
             tangled: 0,
             corners: Vec::new(),
+            n_corners: 0,
         }
+    }
+
+    /// Number of points of the file.
+    pub fn n_points(&self) -> usize {
+        self.points.len()
     }
 
     /// Number of cells pushed so far.
@@ -69,8 +87,13 @@ impl<'a> Assembly<'a> {
         self.ids.reserve(cells);
     }
 
-    /// Adds the next cell of the file. `nodes` are indices of points, to each of which `offset` is added.
-    pub fn push(&mut self, kind: CellType, nodes: &[i64], offset: usize) -> Result<()> {
+    /// Adds the next cell of the file. `nodes` are indices of points.
+    pub fn push(&mut self, kind: CellType, nodes: &[i64]) -> Result<()> {
+        self.push_within(kind, nodes, 0..self.points.len())
+    }
+
+    /// Adds the next cell of the file. `nodes` are indices of points of a piece, which has the points `piece`.
+    pub fn push_within(&mut self, kind: CellType, nodes: &[i64], piece: Range<usize>) -> Result<()> {
         let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
         let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.source.path.display())))?;
         let place = |cell: u32| format!("cell {cell} ({})", kind.name);
@@ -79,19 +102,23 @@ impl<'a> Assembly<'a> {
             let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
             return Err(self.source.error_in(place(id), format!("{} points, but this type has {wanted}", nodes.len())));
         }
-        let n_points = self.points.len() - offset;
+        let n_points = piece.len();
         if let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) {
             let shown = bad.saturating_add(self.first_point);
-            let last = n_points as i64 - 1 + self.first_point;
+            let last = (n_points as i64 - 1).saturating_add(self.first_point);
             let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
             return Err(self.source.error_in(place(id), format!("names point {shown}, but {range}")));
         }
+        let point = |&v: &i64| {
+            let point = piece.start + v as usize;
+            self.merged.get(point).copied().unwrap_or(point as u32)
+        };
         let before = self.tets.len();
         let fate = match kind.shape {
             Shape::Flat => Fate::Boundary,
             Shape::Other => Fate::Unsupported,
             Shape::Tetrahedron => {
-                let tet = [0, 1, 2, 3].map(|i| (nodes[i] as usize + offset) as u32);
+                let tet = [0, 1, 2, 3].map(|i| point(&nodes[i]));
                 let volume = self.volume(tet);
                 self.negative += u64::from(volume < 0.0);
                 self.flat += u64::from(volume == 0.0);
@@ -101,7 +128,7 @@ impl<'a> Assembly<'a> {
             shape => {
                 let mut vertices = std::mem::take(&mut self.corners);
                 vertices.clear();
-                vertices.extend(nodes[..corners].iter().map(|&v| (v as usize + offset) as u32));
+                vertices.extend(nodes[..corners].iter().map(point));
                 let tets = &mut self.tets;
                 split(shape, &vertices, |tet| tets.push(tet));
                 self.corners = vertices;
@@ -110,6 +137,7 @@ impl<'a> Assembly<'a> {
             }
         };
         let pieces = self.tets.len() - before;
+        self.n_corners += corners as u64;
         self.ids.resize(self.tets.len(), id);
         self.count(kind.name, fate, pieces as u64);
         Ok(())
@@ -170,8 +198,14 @@ impl<'a> Assembly<'a> {
         let used = self.used()?;
         let (lo, hi) = bounds(&self.points, &used);
         let origin = Self::origin(lo, hi);
-        let points = self.convert(&used, origin)?;
-        let fields = self.fields();
+        let mut points = self.convert(&used, origin)?;
+        let n_used = used.iter().filter(|&&u| u).count() as u64;
+        if n_used == self.n_corners && self.ids.first() != self.ids.last() {
+            let remedy = "merge them, for example with the filter Clean to Grid of ParaView";
+            self.warnings.push(format!("each cell has points of its own, so every face counts as boundary and queries are slow; {remedy}"));
+        }
+        self.remove_replaced(&mut points);
+        let fields = self.fields(points.len());
         let missing = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| format!("{} {}", c.count, c.name));
         let missing = missing.collect::<Vec<_>>().join(", ");
         if !missing.is_empty() {
@@ -182,7 +216,7 @@ impl<'a> Assembly<'a> {
             bytes: self.bytes,
             seconds: 0.0,
             points: points.len() as u64,
-            unused_points: used.iter().filter(|&&u| !u).count() as u64,
+            unused_points: points.len() as u64 - n_used,
             cells: self.counts,
             tetrahedra: self.tets.len() as u64,
             negative: self.negative,
@@ -213,7 +247,8 @@ impl<'a> Assembly<'a> {
 
     fn bad_point(&self, point: usize, cell: u32, why: &str) -> Error {
         let [x, y, z] = self.points[point];
-        let place = format!("point {} (of cell {cell})", point as i64 + self.first_point);
+        let number = self.point_tags.get(point).copied().unwrap_or((point as i64).saturating_add(self.first_point));
+        let place = format!("point {number} (of cell {cell})");
         self.source.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
     }
 
@@ -241,11 +276,11 @@ impl<'a> Assembly<'a> {
     }
 
     /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron.
-    fn fields(&mut self) -> Vec<Field> {
+    fn fields(&mut self, n_points: usize) -> Vec<Field> {
         let mut fields = Vec::new();
         let mut names = Names::default();
         for mut array in std::mem::take(&mut self.arrays) {
-            let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
+            let count = if array.on == On::Points { n_points } else { self.n_cells };
             let shown = printable(array.name.as_bytes());
             if array.components == 0 || array.components > 9 {
                 self.warnings.push(format!("array `{shown}` is left out: {} components", array.components));
@@ -307,49 +342,51 @@ impl Assembly<'_> {
         });
     }
 
-    /// Lets the cells of later pieces use the points of earlier ones that have equal coordinates, so that the seam
-    /// between pieces is not a boundary. Points that coincide within a piece stay separate. `starts` holds the first
-    /// point of each piece.
-    pub fn merge_pieces(&mut self, starts: &[usize]) {
-        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.points.len());
-        let mut to: Vec<u32> = Vec::with_capacity(self.points.len());
-        let mut merged = 0;
-        for (i, p) in self.points.iter().enumerate() {
-            let piece_start = starts[starts.partition_point(|&s| s <= i).saturating_sub(1)];
-            // Adding 0 turns -0 into 0.
-            let target = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32);
-            let earlier = (target as usize) < piece_start;
-            merged += usize::from(earlier);
-            to.push(if earlier { target } else { i as u32 });
-        }
-        if merged == 0 {
+    /// Sets the points of all pieces; `starts` holds the first point of each. A cell that is pushed later uses the first
+    /// of several points with equal coordinates, within the limits of the option, so that cells which share a face cut it
+    /// in the same way.
+    pub fn set_points(&mut self, points: Vec<[f64; 3]>, starts: &[usize]) {
+        self.points = points;
+        if self.merge == Merge::Nothing || (self.merge == Merge::Pieces && starts.len() < 2) {
             return;
         }
-        // Move the points that are kept together.
-        let mut kept = 0;
-        let mut new = vec![0; to.len()];
-        for (i, &target) in to.iter().enumerate() {
-            if target as usize == i {
-                new[i] = kept as u32;
-                self.points[kept] = self.points[i];
-                kept += 1;
-            } else {
-                new[i] = new[target as usize];
-            }
+        let piece_start = |i: usize| starts[..starts.partition_point(|&start| start <= i)].last().copied().unwrap_or(0);
+        let limit = |i: usize| if self.merge == Merge::All { i } else { piece_start(i) };
+        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.points.len());
+        let replacement = |(i, p): (usize, &[f64; 3])| {
+            // Adding 0 turns -0 into 0.
+            let first = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32);
+            if (first as usize) < limit(i) { first } else { i as u32 }
+        };
+        let merged: Vec<u32> = self.points.iter().enumerate().map(replacement).collect();
+        let n = merged.iter().enumerate().filter(|&(i, &point)| point as usize != i).count();
+        if n > 0 {
+            let pieces = if starts.len() > 1 { format!("{} pieces; ", starts.len()) } else { String::new() };
+            self.warnings.push(format!("{pieces}{n} points that coincide with others are merged"));
+            self.merged = merged;
         }
-        self.points.truncate(kept);
-        for array in self.arrays.iter_mut().filter(|a| a.on == On::Points) {
-            let n = array.components;
-            let mut at = 0;
-            for (i, _) in to.iter().enumerate().filter(|&(i, &t)| t as usize == i) {
-                array.values.copy_within(i * n..(i + 1) * n, at);
-                at += n;
-            }
-            array.values.truncate(at);
-        }
-        self.tets.iter_mut().flatten().for_each(|v| *v = new[*v as usize]);
-        self.warnings.push(format!("{} pieces; {merged} points they share are joined", starts.len()));
     }
+
+    /// Removes the points that are replaced, and their values, and moves together what is kept.
+    fn remove_replaced(&mut self, points: &mut Vec<[f32; 3]>) {
+        if self.merged.is_empty() {
+            return;
+        }
+        let kept = |i: usize| self.merged.get(i).is_some_and(|&point| point as usize == i);
+        let mut new = vec![0; points.len()];
+        (0..points.len()).filter(|&i| kept(i)).zip(0..).for_each(|(i, position)| new[i] = position);
+        self.tets.as_flattened_mut().iter_mut().for_each(|v| *v = new[*v as usize]);
+        retain(points, kept);
+        for array in self.arrays.iter_mut().filter(|a| a.on == On::Points) {
+            retain(&mut array.values, |i| kept(i / array.components));
+        }
+    }
+}
+
+/// Keeps the values whose position satisfies a condition.
+fn retain<T>(values: &mut Vec<T>, kept: impl Fn(usize) -> bool) {
+    let mut positions = 0..;
+    values.retain(|_| positions.next().is_some_and(&kept));
 }
 
 #[cfg(test)]
@@ -359,9 +396,9 @@ mod tests {
     /// Adds arrays to a mesh of one tetrahedron; returns the names of the resulting fields, and the warnings.
     fn finish(arrays: &[(&str, On, usize, usize)]) -> (Vec<String>, Vec<String>) {
         let source = Source::new("one".as_ref(), Vec::new());
-        let mut assembly = Assembly::new(&source, "one tetrahedron".into());
-        assembly.points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        assembly.push(super::super::cells::vtk(10).unwrap(), &[0, 1, 2, 3], 0).unwrap();
+        let mut assembly = Assembly::new(&source, &LoadOptions::default(), "one tetrahedron".into());
+        assembly.set_points(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &[0]);
+        assembly.push(super::super::cells::vtk(10).unwrap(), &[0, 1, 2, 3]).unwrap();
         for &(name, on, components, values) in arrays {
             assembly.arrays.push(Array { name: name.into(), on, components, values: vec![0.0; values] });
         }

@@ -167,15 +167,19 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
     })
 }
 
-/// If a cell array of this name marks ghost cells (copies of cells of a neighbouring piece), the predicate for its
-/// values. Older versions of VTK store ghost levels.
+/// If a cell array of this name marks ghost cells (copies of cells of a neighbouring piece) and hidden ones, the
+/// predicate for its values. Older versions of VTK store ghost levels.
 pub(crate) fn ghost(array: &str) -> Option<fn(i64) -> bool> {
     match array {
-        "vtkGhostType" => Some(|bits| bits & 1 != 0),
+        "vtkGhostType" => Some(|bits| bits & (DUPLICATE | HIDDEN) != 0),
         "vtkGhostLevels" => Some(|level| level > 0),
         _ => None,
     }
 }
+
+/// Bits of `vtkGhostType` for cells.
+const DUPLICATE: i64 = 1;
+const HIDDEN: i64 = 32;
 
 /// The cell type with this element number in Gmsh.
 pub(crate) fn gmsh(number: i64) -> Option<CellType> {

@@ -6,7 +6,6 @@ use std::collections::{HashMap, HashSet};
 use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
-use super::budget::Budget;
 use super::gmsh_data::View;
 use super::gmsh_elements::Elements;
 use super::gmsh_reader::{Reader, Version, old};
@@ -55,8 +54,12 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
                 reader.end(b"$EndElements")?;
             }
             (b"Entities", Some(version @ (Version::V40 | Version::V41))) => {
-                reader.entities(version, &mut content.groups)?;
+                reader.entities(version, false, &mut content.groups)?;
                 reader.end(b"$EndEntities")?;
+            }
+            (b"PartitionedEntities", Some(version @ (Version::V40 | Version::V41))) => {
+                reader.entities(version, true, &mut content.groups)?;
+                reader.end(b"$EndPartitionedEntities")?;
             }
             (b"NodeData", Some(_)) => content.views.push(reader.view(On::Points, b"$EndNodeData")?),
             (b"ElementData", Some(_)) => content.views.push(reader.view(On::Cells, b"$EndElementData")?),
@@ -81,8 +84,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         Version::V40 => "4.0",
         Version::V41 => "4.1",
     };
-    let mut assembly = Assembly::new(source, format!("Gmsh {name}, {}", if reader.binary { "binary" } else { "text" }));
-    assembly.padding = Budget::new(source.bytes.len(), options);
+    let mut assembly = Assembly::new(source, options, format!("Gmsh {name}, {}", if reader.binary { "binary" } else { "text" }));
     if !content.skipped.is_empty() {
         assembly.warnings.push(format!("sections that are not read: {}", content.skipped.join(", ")));
     }
@@ -97,7 +99,8 @@ impl Content {
         }
         let points = Tags::new(&self.tags, false);
         let points = points.map_err(|tag| source.error_in("$Nodes", format!("two nodes have the number {tag}")))?;
-        assembly.points = std::mem::take(&mut self.points);
+        assembly.set_points(std::mem::take(&mut self.points), &[0]);
+        assembly.point_tags = std::mem::take(&mut self.tags);
         let elements = &mut self.elements;
         assembly.reserve(elements.kinds.len());
         let mut rest = elements.nodes.as_mut_slice();
@@ -111,13 +114,18 @@ impl Content {
                     source.error_in(place, format!("node {node} does not exist"))
                 })?;
             }
-            assembly.push(kind, nodes, 0)?;
+            assembly.push(kind, nodes)?;
+        }
+        let repeated = self.elements.repeated();
+        if repeated > 0 {
+            let message = "repeated cells: their volume belongs to several physical groups, so all of them count as boundary; save the file as version 4.1";
+            assembly.warnings.push(format!("{repeated} {message}"));
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
         let mut seen = HashSet::new();
         for view in std::mem::take(&mut self.views) {
-            let (tags, count) = if view.on == On::Points { (&points, assembly.points.len()) } else { (&cells, self.elements.kinds.len()) };
+            let (tags, count) = if view.on == On::Points { (&points, assembly.n_points()) } else { (&cells, self.elements.kinds.len()) };
             match view.array(tags, count, &mut assembly.padding) {
                 Ok(mut array) => {
                     if !seen.insert((view.on, view.name)) {
@@ -212,10 +220,19 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads the first physical group of each volume entity.
-    fn entities(&mut self, version: Version, groups: &mut HashMap<i64, i64>) -> Result<()> {
+    /// Reads the first physical group of each volume entity. In a mesh that is partitioned, the elements belong to parts of
+    /// entities; a part without a group belongs to the group of its parent.
+    fn entities(&mut self, version: Version, partitioned: bool, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();
+        }
+        if partitioned {
+            self.long("the number of partitions")?;
+            let n = self.long("the number of ghost entities")?;
+            for _ in 0..self.bounded(n, 8, "ghost entities")? {
+                self.int("the number of a ghost entity")?;
+                self.int("the partition of a ghost entity")?;
+            }
         }
         let mut counts = [0; 4];
         for count in &mut counts {
@@ -225,6 +242,7 @@ impl Reader<'_> {
         for (dimension, count) in counts.into_iter().enumerate() {
             for _ in 0..count {
                 let tag = self.int("the number of an entity")?;
+                let parent = if partitioned { self.parent()? } else { None };
                 // In version 4.0 a point has a bounding box as well.
                 for _ in 0..if dimension == 0 && version == Version::V41 { 3 } else { 6 } {
                     self.real("the bounds of an entity")?;
@@ -236,6 +254,9 @@ impl Reader<'_> {
                         groups.entry(tag).or_insert(group);
                     }
                 }
+                if let Some(&group) = parent.filter(|_| dimension == 3).and_then(|parent| groups.get(&parent)) {
+                    groups.entry(tag).or_insert(group);
+                }
                 if dimension > 0 {
                     let n = self.long("the number of bounding entities")?;
                     for _ in 0..self.bounded(n, 4, "bounding entities")? {
@@ -245,5 +266,14 @@ impl Reader<'_> {
             }
         }
         Ok(())
+    }
+    /// Reads the parent and the partitions of a part of an entity; returns the number of the parent if it is a volume.
+    fn parent(&mut self) -> Result<Option<i64>> {
+        let [dimension, tag] = [self.int("the dimension of a parent entity")?, self.int("the number of a parent entity")?];
+        let n = self.long("the number of partitions of an entity")?;
+        for _ in 0..self.bounded(n, 4, "partitions of an entity")? {
+            self.int("a partition")?;
+        }
+        Ok((dimension == 3).then_some(tag))
     }
 }

@@ -1,5 +1,7 @@
 //! Reader for `$Elements` of Gmsh files.
 
+use std::collections::{HashMap, HashSet};
+
 use super::cells::{self, CellType};
 use super::gmsh_reader::{Reader, Version};
 use super::source::{Source, Tokens, parse_integer, printable};
@@ -156,6 +158,27 @@ impl Elements {
         self.nodes.extend_from_slice(nodes);
         self.mark(kind, tag, marks);
         Ok(())
+    }
+
+    /// The number of volume cells that are repeats: version 2 has the cells of a volume once for each physical group.
+    pub fn repeated(&self) -> usize {
+        let mut groups = HashMap::new();
+        let marks = self.kinds.iter().zip(&self.entities).zip(&self.physical).filter(|((kind, _), _)| kind.shape.corners() > 0);
+        if marks.into_iter().all(|((_, entity), group)| *groups.entry(entity).or_insert(group) == group) {
+            return 0;
+        }
+        let mut rest = self.nodes.as_slice();
+        let mut seen = HashSet::new();
+        let again = |kind: &&CellType| {
+            let (nodes, after) = rest.split_at(kind.nodes.unwrap_or(0));
+            rest = after;
+            let mut corners = [i64::MAX; 8];
+            let n = kind.shape.corners();
+            corners[..n].copy_from_slice(&nodes[..n]);
+            corners.sort_unstable();
+            n > 0 && !seen.insert(corners)
+        };
+        self.kinds.iter().filter(again).count()
     }
 
     fn mark(&mut self, kind: CellType, tag: i64, marks: [i64; 2]) {

@@ -1,6 +1,7 @@
 //! Reader for the `.tet` files of Isaac Gym: a line `v x y z` for each point, and a line `t a b c d`, with points
 //! numbered from 0, for each tetrahedron.
 
+use super::LoadOptions;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
 use super::source::{Source, parse_float, parse_integer, printable};
@@ -15,14 +16,14 @@ pub(crate) fn has_tetrahedra(bytes: &[u8]) -> bool {
     bytes.split(|&b| b == b'\n' || b == b'\r').any(is_tetrahedron)
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
-    let mut assembly = Assembly::new(source, "Isaac Gym .tet".into());
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+    let mut assembly = Assembly::new(source, options, "Isaac Gym .tet".into());
     let (mut lines, mut words) = (Lines::new(source), Vec::new());
-    let mut tets: Vec<[i64; 4]> = Vec::new();
+    let (mut points, mut tets) = (Vec::new(), Vec::<[i64; 4]>::new());
     let mut skipped: Vec<String> = Vec::new();
     while let Some(at) = lines.next(&mut words) {
         match words[0] {
-            b"v" => assembly.points.push(numbers(source, at, &words, parse_float)?),
+            b"v" => points.push(numbers(source, at, &words, parse_float)?),
             b"t" => tets.push(numbers(source, at, &words, parse_integer)?),
             other => {
                 let shown = printable(other);
@@ -35,8 +36,9 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
     if !skipped.is_empty() {
         assembly.warnings.push(format!("lines that are not read, as they start with neither v nor t: {}", skipped.join(", ")));
     }
+    assembly.set_points(points, &[0]);
     assembly.reserve(tets.len());
-    tets.iter().try_for_each(|tet| assembly.push(TETRAHEDRON, tet, 0))?;
+    tets.iter().try_for_each(|tet| assembly.push(TETRAHEDRON, tet))?;
     Ok(assembly)
 }
 

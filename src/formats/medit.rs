@@ -1,5 +1,6 @@
 //! Reader for Medit meshes in text form (`.mesh`). `meditb` reads the binary form.
 
+use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
@@ -9,7 +10,7 @@ use crate::mesh::On;
 
 /// Sections of cells: keyword, number of the keyword in the binary form, and cell type.
 #[rustfmt::skip]
-pub(crate) const SECTIONS: [(&str, i64, CellType); 21] = [
+pub(crate) const SECTIONS: [(&str, i64, CellType); 22] = [
     ("Edges", 5, cell("line", Shape::Flat, 2)),
     ("Triangles", 6, cell("triangle", Shape::Flat, 3)),
     ("Quadrilaterals", 7, cell("quad", Shape::Flat, 4)),
@@ -27,10 +28,11 @@ pub(crate) const SECTIONS: [(&str, i64, CellType); 21] = [
     ("HexahedraQ2", 33, cell("quadratic hexahedron", Shape::Hexahedron, 27)),
     ("PrismsP2", 86, cell("quadratic wedge", Shape::Wedge, 18)),
     ("PyramidsP2", 87, cell("quadratic pyramid", Shape::Pyramid, 14)),
+    ("QuadrilateralsQ3", 88, cell("cubic quad", Shape::Flat, 16)),
     ("EdgesP3", 92, cell("cubic line", Shape::Flat, 4)),
-    ("TrianglesP3", 95, cell("cubic triangle", Shape::Flat, 10)),
-    ("TetrahedraP3", 101, cell("cubic tetrahedron", Shape::Tetrahedron, 20)),
-    ("HexahedraQ3", 104, cell("cubic hexahedron", Shape::Hexahedron, 64)),
+    ("TrianglesP3", 90, cell("cubic triangle", Shape::Flat, 10)),
+    ("TetrahedraP3", 96, cell("cubic tetrahedron", Shape::Tetrahedron, 20)),
+    ("HexahedraQ3", 98, cell("cubic hexahedron", Shape::Hexahedron, 64)),
 ];
 
 const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
@@ -50,8 +52,8 @@ pub(crate) struct Content {
 impl Content {
     /// Builds the mesh; points are numbered from 1.
     pub fn assemble(self, source: &Source, assembly: &mut Assembly<'_>) -> Result<()> {
-        assembly.points =
-            self.points.ok_or_else(|| source.error_line(source.bytes.len(), "the file ends, and there was no section Vertices"))?;
+        let missing = || source.error_line(source.bytes.len(), "the file ends, and there was no section Vertices");
+        assembly.set_points(self.points.ok_or_else(missing)?, &[0]);
         assembly.first_point = 1;
         for (kind, mut nodes) in self.cells {
             for node in &mut nodes {
@@ -60,7 +62,7 @@ impl Content {
             let width = kind.nodes.unwrap_or(1).max(1);
             assembly.reserve(nodes.len() / width);
             for cell in nodes.chunks_exact(width) {
-                assembly.push(kind, cell, 0)?;
+                assembly.push(kind, cell)?;
             }
         }
         for (name, on, values) in [("medit:ref", On::Points, self.point_marks), ("medit:ref (cells)", On::Cells, self.cell_marks)] {
@@ -78,7 +80,7 @@ impl Content {
     }
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let mut tokens = Tokens::new(source, 0..source.bytes.len(), Some(b'#'));
     let mut content = Content::default();
     let mut version = None;
@@ -109,7 +111,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         }
     }
     let name = version.map_or_else(|| "without a version".into(), |v| format!("version {v}"));
-    let mut assembly = Assembly::new(source, format!("Medit text, {name}"));
+    let mut assembly = Assembly::new(source, options, format!("Medit text, {name}"));
     if let Some(version) = version.filter(|v| !(1..=4).contains(v)) {
         assembly.warnings.push(format!("version {version} of the format is unknown; the file is read like version 2"));
     }

@@ -1,5 +1,6 @@
 //! Reader for binary Medit meshes (`.meshb`), versions 1 to 4, either byte order.
 
+use super::LoadOptions;
 use super::assemble::Assembly;
 use super::medit::{Content, SECTIONS};
 use super::scalar::{Number, Scalar};
@@ -17,7 +18,7 @@ struct Reader<'a> {
     version: i64,
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let big_endian = source.bytes.first() == Some(&0);
     let mut reader = Reader { source, at: 4, big_endian, version: 1 };
     reader.version = reader.number(Scalar::I32)?;
@@ -70,7 +71,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         }
         reader.at = past;
     }
-    let mut assembly = Assembly::new(source, format!("Medit binary, version {}", reader.version));
+    let mut assembly = Assembly::new(source, options, format!("Medit binary, version {}", reader.version));
     content.assemble(source, &mut assembly)?;
     Ok(assembly)
 }

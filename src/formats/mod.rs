@@ -59,9 +59,8 @@ pub use write::{
 /// How to read a mesh.
 #[derive(Clone, Debug)]
 pub struct LoadOptions {
-    /// Merge points of different pieces of a file that have equal coordinates (default), so that the seams between
-    /// pieces do not become boundary.
-    pub merge_pieces: bool,
+    /// Which points that have equal coordinates become one; the values of the first one count.
+    pub merge: Merge,
     /// Compressed arrays may unpack to this many times the size of the file plus 64 MiB; a file that needs more is
     /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
     /// more are left out. Default 100.
@@ -70,8 +69,22 @@ pub struct LoadOptions {
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { merge_pieces: true, expansion: 100 }
+        Self { merge: Merge::default(), expansion: 100 }
     }
+}
+
+/// Which points that have equal coordinates become one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Merge {
+    /// None of them.
+    Nothing,
+    /// A point and the first one of an earlier piece of the file, so that the seams between pieces do not become
+    /// boundary.
+    #[default]
+    Pieces,
+    /// All of them: for files in which each cell has points of its own. Slits, that is boundaries whose two sides
+    /// coincide, close as well.
+    All,
 }
 
 /// A mesh and the report about its file.
@@ -112,15 +125,15 @@ fn read(source: &Source, options: &LoadOptions, start: Instant) -> Result<Loaded
     let companion;
     let assembly = match detect::detect(source)? {
         Format::VtkXml => vtu::read(source, options)?,
-        Format::VtkLegacy => vtk::read(source)?,
+        Format::VtkLegacy => vtk::read(source, options)?,
         Format::Gmsh => gmsh::read(source, options)?,
-        Format::Medit => medit::read(source)?,
-        Format::MeditBinary => meditb::read(source)?,
+        Format::Medit => medit::read(source, options)?,
+        Format::MeditBinary => meditb::read(source, options)?,
         Format::TetGen => {
             companion = tetgen::companion(source)?;
-            tetgen::read(source, &companion)?
+            tetgen::read(source, &companion, options)?
         }
-        Format::Isaac => isaac::read(source)?,
+        Format::Isaac => isaac::read(source, options)?,
     };
     let (mesh, mut report) = assembly.finish()?;
     report.seconds = start.elapsed().as_secs_f64();

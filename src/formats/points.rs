@@ -9,9 +9,10 @@ use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
-/// point per line and columns separated by commas, semicolons or white space. The first line of a table may name the
-/// columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that
-/// start with `#` are comments. A table without points is valid, even an empty file.
+/// point per line and columns separated by commas, semicolons, tabs or spaces. Fields may be in quotation marks, and where
+/// commas do not separate columns they may be decimal marks. The first line of a table may name the columns: if it names
+/// `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that start with `#` are
+/// comments. A table without points is valid, even an empty file.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
@@ -53,9 +54,13 @@ fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
             continue;
         }
         let fields = split(line);
+        // Spreadsheets leave rows of separators behind.
+        if fields.iter().all(|field| field.is_empty()) {
+            continue;
+        }
         let Some(columns) = columns else {
             width = fields.len();
-            let numbers = fields.iter().filter(|f| number(f, line).is_some()).count();
+            let numbers = fields.iter().filter(|f| number(f).is_some()).count();
             let named = if numbers == width { None } else { named(&fields) };
             let chosen = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
                 let message = format!("{width} columns; there must be three, or a first line that names x, y and z among them");
@@ -65,56 +70,71 @@ fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
             // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing
             // error, not a header.
             if named.is_none() && numbers > 0 {
-                points.push(point(source, at, line, &fields, chosen)?);
+                points.push(point(source, at, &fields, chosen)?);
             }
             continue;
         };
         if fields.len() != width {
             return Err(source.error_line(at, format!("{} columns instead of {width}", fields.len())));
         }
-        points.push(point(source, at, line, &fields, columns)?);
+        points.push(point(source, at, &fields, columns)?);
     }
     Ok(points)
 }
 
+/// The bytes that may separate columns, the most certain first: a comma may also be a decimal mark, and a space may be
+/// part of a name.
+const SEPARATORS: [&[u8]; 4] = [b";", b"\t", b",", b" \t\x0b\x0c"];
+
+/// The fields of a line, by the first separator that makes all of them numbers, or else by the first one that the line
+/// contains.
 fn split(line: &[u8]) -> Vec<&[u8]> {
-    let clean = |f: &'static str| move |b: &u8| f.as_bytes().contains(b);
-    let separator = if line.contains(&b';') { Some(clean(";")) } else { line.contains(&b',').then(|| clean(",")) };
-    match separator {
-        Some(is) => line.split(is).map(<[u8]>::trim_ascii).collect(),
-        None => line.split(u8::is_ascii_whitespace).filter(|f| !f.is_empty()).collect(),
-    }
+    let mut found = SEPARATORS.iter().map(|separator| fields(line, separator)).filter(|fields| fields.len() > 1).peekable();
+    let first = found.peek().cloned().unwrap_or_else(|| fields(line, b""));
+    found.find(|fields| fields.iter().all(|field| number(field).is_some())).unwrap_or(first)
 }
 
-/// Parses a number; if semicolons separate the columns, the decimal mark may be a comma.
-fn number(field: &[u8], line: &[u8]) -> Option<f64> {
-    if line.contains(&b';') && field.contains(&b',') {
+/// The fields between separators outside quotation marks. Only commas and semicolons enclose empty fields.
+fn fields<'l>(line: &'l [u8], separator: &[u8]) -> Vec<&'l [u8]> {
+    let mut quoted = false;
+    let ends = |b: &u8| {
+        quoted ^= *b == b'"';
+        !quoted && separator.contains(b)
+    };
+    let unquoted = |field: &'l [u8]| {
+        let field = field.trim_ascii();
+        field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).unwrap_or(field).trim_ascii()
+    };
+    let keep_empty = !separator.contains(&b'\t');
+    line.split(ends).map(unquoted).filter(|field| keep_empty || !field.is_empty()).collect()
+}
+
+/// Parses a number, whose decimal mark may be a comma between two digits.
+fn number(field: &[u8]) -> Option<f64> {
+    parse_float(field).or_else(|| {
+        if field.starts_with(b",") || field.ends_with(b",") {
+            return None;
+        }
         let dotted: Vec<u8> = field.iter().map(|&b| if b == b',' { b'.' } else { b }).collect();
-        return parse_float(&dotted);
-    }
-    parse_float(field)
+        parse_float(&dotted)
+    })
 }
 
 /// The columns that hold x, y and z, found by their names.
 fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
     let find = |names: [&str; 3]| {
-        let at = names.map(|name| {
-            fields.iter().position(|f| {
-                let f = f.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).unwrap_or(f);
-                f.eq_ignore_ascii_case(name.as_bytes())
-            })
-        });
+        let at = names.map(|name| fields.iter().position(|f| f.eq_ignore_ascii_case(name.as_bytes())));
         Some([at[0]?, at[1]?, at[2]?])
     };
     // The last two sets of names are those of different ParaView versions.
     [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]].into_iter().find_map(find)
 }
 
-fn point(source: &Source, at: usize, line: &[u8], fields: &[&[u8]], columns: [usize; 3]) -> Result<[f64; 3]> {
+fn point(source: &Source, at: usize, fields: &[&[u8]], columns: [usize; 3]) -> Result<[f64; 3]> {
     let mut point = [0.0; 3];
     for (x, column) in point.iter_mut().zip(columns) {
         let field = fields.get(column).copied().unwrap_or_default();
-        let value = number(field, line);
+        let value = number(field);
         *x = value.ok_or_else(|| source.error_line(at, format!("`{}` is not a number", printable(field))))?;
     }
     Ok(point)

@@ -16,7 +16,8 @@ pub enum Fate {
     Split,
     /// Points, lines and surfaces, which have no volume.
     Boundary,
-    /// Copies of cells of a neighbouring piece, marked as such by the writer of a parallel file.
+    /// Copies of cells of a neighbouring piece, marked as such by the writer of a parallel file, and cells that are
+    /// marked as hidden.
     Ghost,
     /// Volumes of a type that cannot be read; they are missing in the mesh.
     Unsupported,
@@ -75,7 +76,7 @@ impl fmt::Display for CellCount {
             Fate::Straightened => write!(f, "taken by their corners, with straight edges"),
             Fate::Split => write!(f, "split into {} tetrahedra that keep the id of their cell", self.tetrahedra),
             Fate::Boundary => write!(f, "left out, no volume"),
-            Fate::Ghost => write!(f, "left out, ghost copies"),
+            Fate::Ghost => write!(f, "left out, ghost copies or hidden"),
             Fate::Unsupported => write!(f, "NOT READ, so the mesh has holes there; tetrahedralise them first"),
         }
     }

@@ -103,6 +103,11 @@ impl Source {
         self.error_in(format_args!("line {}", self.line(at)), message)
     }
 
+    /// An error about something that starts at byte `at`. Lines are counted here and not in advance, as that takes time.
+    pub fn error_at(&self, what: &str, at: usize, message: impl Into<String>) -> Error {
+        self.error_in(format_args!("{what} (line {})", self.line(at)), message)
+    }
+
     /// An error at a byte of binary data.
     pub fn error_byte(&self, at: usize, message: impl Into<String>) -> Error {
         self.error_in(format_args!("byte {at}"), message)
@@ -202,7 +207,7 @@ impl<'a> Tokens<'a> {
 
     /// The next token; at the end of the text an error that says what was expected.
     pub fn word(&mut self, what: &str) -> Result<(&'a [u8], usize)> {
-        self.next_token().ok_or_else(|| self.source.error_line(self.end, format!("the file ends where {what} should be")))
+        self.next_token().ok_or_else(|| self.source.error_line(self.end, format!("the {} ends where {what} should be", self.unit())))
     }
 
     /// The next token as an integer.
@@ -218,7 +223,8 @@ impl<'a> Tokens<'a> {
         let fail = |why: &str| self.source.error_line(at, format!("`{}` as {what}: {why}", printable(token)));
         let n = parse_integer(token).ok_or_else(|| fail("not an integer in range"))?;
         let n = usize::try_from(n).map_err(|_| fail("negative"))?;
-        if n > self.left() / 2 + 1 { Err(fail("more than the rest of the file can hold")) } else { Ok(n) }
+        let room = self.left() / 2 + 1;
+        if n > room { Err(fail(&format!("more than the rest of the {} can hold", self.unit()))) } else { Ok(n) }
     }
 
     /// The next token as a floating-point number.
@@ -238,6 +244,11 @@ impl<'a> Tokens<'a> {
         let feed = if rest[length..].starts_with(b"\r\n") { 2 } else { usize::from(length < rest.len()) };
         self.at += length + feed;
         Some((&rest[..length], start))
+    }
+
+    /// What the text is, for messages.
+    fn unit(&self) -> &'static str {
+        if self.end < self.source.bytes.len() { "line" } else { "file" }
     }
 
     /// Number of bytes that have not been read.
@@ -266,11 +277,23 @@ pub(crate) fn parse_integer(token: &[u8]) -> Option<i64> {
     if negative { Some(value) } else { value.checked_neg() }
 }
 
-/// Parses a floating-point number; Fortran's exponent letter D is accepted.
+/// Parses a floating-point number; Fortran's exponent letter D is accepted, and what C libraries write for NaN and
+/// infinity.
 pub(crate) fn parse_float(token: &[u8]) -> Option<f64> {
     let text = std::str::from_utf8(token).ok()?;
     text.parse().ok().or_else(|| {
-        let looks_fortran = text.len() <= 64 && text.bytes().all(|b| b.is_ascii_digit() || b"+-.dD".contains(&b));
-        looks_fortran.then(|| text.replace(['d', 'D'], "e").parse().ok()).flatten()
+        let text = Some(text).filter(|text| text.len() <= 64)?.to_ascii_lowercase();
+        let looks_fortran = text.bytes().all(|b| b.is_ascii_digit() || b"+-.d".contains(&b));
+        if looks_fortran { text.replace('d', "e").parse().ok() } else { parse_special(&text) }
     })
+}
+
+/// Parses `nan(…)`, and the older spellings `1.#QNAN` and the like, which may be filled up with zeros.
+fn parse_special(text: &str) -> Option<f64> {
+    let size = text.trim_start_matches(['+', '-']);
+    match size.trim_end_matches('0') {
+        "1.#inf" => Some(if text.starts_with('-') { f64::NEG_INFINITY } else { f64::INFINITY }),
+        "1.#ind" | "1.#nan" | "1.#qnan" | "1.#snan" => Some(f64::NAN),
+        _ => (size.starts_with("nan(") && size.ends_with(')')).then_some(f64::NAN),
+    }
 }

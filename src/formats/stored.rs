@@ -16,8 +16,9 @@ pub(crate) const WINDOW: usize = 1 << 18;
 /// An array of a file.
 pub(crate) struct Stored<'a> {
     source: &'a Source,
-    /// Description of the array for messages.
+    /// Description of the array for messages, and the position in the file that they name.
     what: String,
+    at: usize,
     content: Content,
     blocks: Option<Blocks>,
 }
@@ -42,8 +43,17 @@ pub(crate) struct Blocks {
 }
 
 impl<'a> Stored<'a> {
-    pub fn new(source: &'a Source, what: String, content: Content, blocks: Option<Blocks>) -> Self {
-        Self { source, what, content, blocks }
+    pub fn new(source: &'a Source, what: String, at: usize, content: Content, blocks: Option<Blocks>) -> Self {
+        Self { source, what, at, content, blocks }
+    }
+
+    /// The array with all its blocks unpacked, if they are larger than a window, so that none is unpacked for every window.
+    pub fn ready(mut self, scalar: Scalar) -> Result<Self> {
+        if self.blocks.as_ref().is_some_and(|blocks| blocks.block > WINDOW * scalar.size()) {
+            self.content = Content::Decoded(self.read(0..self.len())?.into_owned());
+            self.blocks = None;
+        }
+        Ok(self)
     }
 
     /// Size of the array in bytes, unpacked.
@@ -57,7 +67,7 @@ impl<'a> Stored<'a> {
             None => self.content.read(self.source, range),
             Some(blocks) => blocks.read(range, |packed| self.content.read(self.source, packed)).map(Cow::Owned),
         };
-        bytes.map_err(|message| self.source.error_in(&self.what, message))
+        bytes.map_err(|message| self.source.error_at(&self.what, self.at, message))
     }
 
     /// Converts the whole array to numbers.
@@ -113,6 +123,33 @@ impl Blocks {
 impl Stored<'_> {
     /// An array of bytes in memory, without a file.
     pub fn decoded(source: &Source, bytes: Vec<u8>) -> Stored<'_> {
-        Stored::new(source, String::new(), Content::Decoded(bytes), None)
+        Stored::new(source, String::new(), 0, Content::Decoded(bytes), None)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write as _;
+
+    use super::*;
+
+    #[test]
+    fn only_blocks_larger_than_a_window_are_unpacked_in_advance() {
+        let source = Source::new("none".as_ref(), Vec::new());
+        let bytes: Vec<u8> = (0..3 * WINDOW).map(|i| (i % 251) as u8).collect();
+        for block in [bytes.len(), WINDOW] {
+            let (mut content, mut packed) = (Vec::new(), Vec::new());
+            for part in bytes.chunks(block) {
+                let start = content.len();
+                let mut encoder = flate2::write::ZlibEncoder::new(&mut content, flate2::Compression::fast());
+                encoder.write_all(part).unwrap();
+                encoder.finish().unwrap();
+                packed.push(start..content.len());
+            }
+            let blocks = Blocks { compressor: Compressor::Zlib, packed, block, size: bytes.len() };
+            let stored = Stored::new(&source, String::new(), 0, Content::Decoded(content), Some(blocks)).ready(Scalar::U8).unwrap();
+            assert_eq!(stored.blocks.is_some(), block == WINDOW);
+            assert_eq!(stored.read(0..stored.len()).unwrap(), bytes);
+        }
     }
 }

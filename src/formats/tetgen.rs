@@ -1,5 +1,6 @@
 //! Reader for TetGen's pairs of `.node` and `.ele` files, numbered from 0, from 1, or in any way.
 
+use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
@@ -21,9 +22,9 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
 }
 
 /// Reads a mesh. `main` is the file that the user named; errors about the whole mesh refer to it.
-pub(crate) fn read<'a>(main: &'a Source, companion: &Source) -> Result<Assembly<'a>> {
+pub(crate) fn read<'a>(main: &'a Source, companion: &Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let (node, ele) = if ending(&main.path) == "node" { (main, companion) } else { (companion, main) };
-    let mut assembly = Assembly::new(main, "TetGen .node and .ele".into());
+    let mut assembly = Assembly::new(main, options, "TetGen .node and .ele".into());
     assembly.bytes = (node.bytes.len() + ele.bytes.len()) as u64;
     let tags = nodes(node, &mut assembly)?;
     elements(ele, &tags, &mut assembly)?;
@@ -103,7 +104,7 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
     }
     let mut tags = Vec::with_capacity(n);
     let mut columns = vec![Vec::new(); attributes + markers];
-    assembly.points.reserve(n);
+    let mut points = Vec::with_capacity(n);
     for i in 0..n {
         let at = lines.need(&mut words, "a point")?;
         if words.len() < 4 + attributes {
@@ -116,7 +117,7 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
         for (x, word) in point.iter_mut().zip(&words[1..4]) {
             *x = parse_float(word).ok_or_else(|| wrong(word))?;
         }
-        assembly.points.push(point);
+        points.push(point);
         for (c, column) in columns.iter_mut().enumerate() {
             let value = words.get(4 + c).map_or(Ok(0.0), |word| parse_float(word).ok_or_else(|| wrong(word)));
             column.push(value? as f32);
@@ -127,8 +128,10 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
         let name = if c < attributes { format!("attribute{c}") } else { "boundary_marker".into() };
         assembly.arrays.push(Array { name, on: On::Points, components: 1, values });
     }
-    assembly.first_point = tags.first().copied().unwrap_or(0);
-    Tags::new(&tags, false).map_err(|tag| source.error(format!("two points have the number {tag}")))
+    assembly.set_points(points, &[0]);
+    let numbers = Tags::new(&tags, false).map_err(|tag| source.error(format!("two points have the number {tag}")))?;
+    assembly.point_tags = tags;
+    Ok(numbers)
 }
 
 fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Result<()> {
@@ -159,7 +162,7 @@ fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Resu
             let found = points.get(tag).map(i64::from);
             *node = found.ok_or_else(|| source.error_line(at, format!("cell {i}: point {tag} does not exist")))?;
         }
-        assembly.push(kind, &nodes, 0)?;
+        assembly.push(kind, &nodes)?;
         for (c, column) in columns.iter_mut().enumerate() {
             let word = words[1 + width + c];
             column.push(parse_float(word).ok_or_else(|| wrong(word))? as f32);

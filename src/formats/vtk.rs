@@ -1,5 +1,6 @@
 //! Reader for legacy VTK files (`.vtk`), versions 1.0 to 5.1, text and binary (big-endian).
 
+use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells;
@@ -33,10 +34,10 @@ impl Cells<'_> {
     }
 }
 
-pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
+pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let mut reader = Reader { source, tokens: Tokens::new(source, 0..source.bytes.len(), None), binary: false };
     let format = reader.header()?;
-    let mut assembly = Assembly::new(source, format);
+    let mut assembly = Assembly::new(source, options, format);
     let (mut points, mut cells, mut types) = (None, None, None);
     let mut section: Option<Section> = None;
     while let Some((token, at)) = reader.tokens.next_token() {
@@ -60,7 +61,7 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         }
     }
     let missing = |what: &str| source.error_line(source.bytes.len(), format!("the file ends, and there was no {what}"));
-    assembly.points = points.ok_or_else(|| missing("POINTS"))?;
+    assembly.set_points(points.ok_or_else(|| missing("POINTS"))?, &[0]);
     let mut cells: Cells<'_> = cells.ok_or_else(|| missing("CELLS"))?;
     let mut types: Integers<'_> = types.ok_or_else(|| missing("CELL_TYPES"))?;
     if types.len() != cells.count {
@@ -77,14 +78,14 @@ pub(crate) fn read(source: &Source) -> Result<Assembly<'_>> {
         let kind = kind.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?;
         let nodes = cells.nodes(cell, &mut end)?;
         if ghosts.get(cell) == Some(&true) {
-            assembly.skip("ghost cell", Fate::Ghost);
+            assembly.skip("ghost or hidden cell", Fate::Ghost);
             continue;
         }
         // For a polyhedron the file lists its faces, not its points.
-        assembly.push(kind, if number == 42 { &[] } else { nodes }, 0)?;
+        assembly.push(kind, if number == 42 { &[] } else { nodes })?;
     }
     for array in &assembly.arrays {
-        let (count, what) = if array.on == On::Points { (assembly.points.len(), "POINTS") } else { (types.len(), "CELLS") };
+        let (count, what) = if array.on == On::Points { (assembly.n_points(), "POINTS") } else { (types.len(), "CELLS") };
         if array.values.len() != count * array.components {
             let found = array.values.len() / array.components.max(1);
             let message = format!("{found} tuples, but {what} has {count}");
@@ -103,8 +104,8 @@ impl<'a> Reader<'a> {
         };
         let version = printable(version.trim_ascii());
         self.tokens.line();
-        let (coding, at) = self.tokens.line().unwrap_or_default();
-        self.binary = match coding.trim_ascii().to_ascii_uppercase().as_slice() {
+        let (coding, at) = self.tokens.word("ASCII or BINARY")?;
+        self.binary = match coding.to_ascii_uppercase().as_slice() {
             b"ASCII" => false,
             b"BINARY" => true,
             _ => {

@@ -56,7 +56,8 @@ impl<'a> Reader<'a> {
         let Some(scalar) = scalar.filter(|_| self.binary) else { return self.values(scalar, count, what).map(Integers::parsed) };
         self.tokens.line();
         let range = self.range(Some(scalar), count, what)?;
-        Ok(Integers::stored(Stored::new(self.source, what.to_owned(), Content::File(range), None), scalar, true))
+        let stored = Stored::new(self.source, what.to_owned(), range.start, Content::File(range), None);
+        Ok(Integers::stored(stored, scalar, true))
     }
 
     /// The range of the bytes of `count` binary numbers, which is consumed.

@@ -44,19 +44,20 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let skeleton = Parser { source, reader: Reader::from_str(&text), stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
     let mut codec = skeleton.codec;
     codec.budget = Budget::new(source.len(), options);
-    let mut assembly = Assembly::new(source, skeleton.format);
-    assembly.padding = Budget::new(source.len(), options);
-    let mut places = Places::new();
-    let n_pieces = skeleton.pieces.len();
-    let mut starts = Vec::with_capacity(n_pieces);
+    let mut assembly = Assembly::new(source, options, skeleton.format);
+    let (mut points, mut starts) = (Vec::new(), Vec::with_capacity(skeleton.pieces.len()));
     for (i, piece) in skeleton.pieces.iter().enumerate() {
-        starts.push(assembly.points.len());
-        read_piece(source, &mut codec, &mut assembly, &mut places, piece, i)?;
+        starts.push(points.len());
+        read_points(source, &mut codec, &mut points, piece, i)?;
+    }
+    assembly.set_points(points, &starts);
+    let mut places = Places::new();
+    for (i, (piece, &start)) in skeleton.pieces.iter().zip(&starts).enumerate() {
+        let first_cell = assembly.cells();
+        read_cells(source, &mut codec, &mut assembly, piece, i, start)?;
+        read_arrays(source, &mut codec, &mut assembly, &mut places, piece, [start, first_cell])?;
     }
     assembly.complete_arrays();
-    if n_pieces > 1 && options.merge_pieces {
-        assembly.merge_pieces(&starts);
-    }
     Ok(assembly)
 }
 
@@ -101,7 +102,9 @@ impl Parser<'_, '_> {
                 Ok(Event::DocType(_)) => {
                     return fail("a document type declaration; VTK files have none, and entities are not expanded".into());
                 }
-                Ok(Event::GeneralRef(_)) => return fail("an entity reference in the data".into()),
+                Ok(Event::GeneralRef(_)) if self.stack.last().is_some_and(|element| element == "DataArray") => {
+                    return fail("an entity reference in the data".into());
+                }
                 Ok(Event::Text(_) | Event::CData(_)) => self.text(start..end),
                 Ok(Event::Start(e)) => {
                     if e.name().as_ref() == "AppendedData" {
@@ -118,7 +121,7 @@ impl Parser<'_, '_> {
                 Ok(Event::End(_)) => {
                     self.stack.pop();
                 }
-                Ok(Event::Comment(_) | Event::Decl(_) | Event::PI(_)) => {}
+                Ok(Event::Comment(_) | Event::Decl(_) | Event::PI(_) | Event::GeneralRef(_)) => {}
             }
         }
         let Some((mut codec, format)) = self.codec.take() else {
@@ -270,34 +273,36 @@ type Key<'p> = (On, &'p str, u64);
 /// the n-th of the other pieces.
 type Places<'p> = HashMap<(Key<'p>, usize), usize>;
 
-fn read_piece<'p>(
+fn read_points(source: &Source, codec: &mut Codec, points: &mut Vec<[f64; 3]>, piece: &Piece, index: usize) -> Result<()> {
+    if piece.points == 0 {
+        return Ok(());
+    }
+    let fail = |message: &str| source.error_line(piece.at, format!("piece {index}: {message}"));
+    let positions = piece.positions.as_ref().ok_or_else(|| fail("no <Points>"))?;
+    if positions.components != 3 {
+        return Err(fail("the points must have 3 components"));
+    }
+    let values: Vec<f64> = codec.floats(source, positions, piece.points)?;
+    points.extend(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
+    Ok(())
+}
+
+/// Reads the values of points and cells; `before` holds the numbers of points and cells of earlier pieces.
+fn read_arrays<'p>(
     source: &Source,
     codec: &mut Codec,
     assembly: &mut Assembly<'_>,
     places: &mut Places<'p>,
     piece: &'p Piece,
-    index: usize,
+    before: [usize; 2],
 ) -> Result<()> {
-    let fail = |message: &str| source.error_line(piece.at, format!("piece {index}: {message}"));
-    let n_points = piece.points;
-    let offset = assembly.points.len();
-    if n_points > 0 {
-        let positions = piece.positions.as_ref().ok_or_else(|| fail("no <Points>"))?;
-        if positions.components != 3 {
-            return Err(fail("the points must have 3 components"));
-        }
-        let values: Vec<f64> = codec.floats(source, positions, n_points)?;
-        assembly.points.extend(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
-    }
-    let first_cell = assembly.cells();
-    read_cells(source, codec, assembly, piece, index, offset)?;
     let mut turns: HashMap<Key<'p>, usize> = HashMap::new();
-    let tuples = [(On::Points, &piece.point_data, n_points), (On::Cells, &piece.cell_data, piece.cells)];
-    for (on, arrays, count) in tuples {
-        let before = if on == On::Points { offset } else { first_cell };
+    let [points, cells] = before;
+    let groups = [(On::Points, &piece.point_data, piece.points, points), (On::Cells, &piece.cell_data, piece.cells, cells)];
+    for (on, arrays, count, before) in groups {
         for array in arrays {
             if array.scalar.is_none() {
-                assembly.warnings.push(format!("array `{}` holds text and is left out", printable(array.name.as_bytes())));
+                assembly.warnings.push(format!("array `{}` holds text or bits and is left out", printable(array.name.as_bytes())));
             } else if array.components == 0 || array.components > 9 {
                 let message = format!("array `{}` has {} components and is left out", printable(array.name.as_bytes()), array.components);
                 assembly.warnings.push(message);
@@ -325,7 +330,7 @@ fn read_piece<'p>(
     Ok(())
 }
 
-fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize, offset: usize) -> Result<()> {
+fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, piece: &Piece, index: usize, first: usize) -> Result<()> {
     if piece.cells == 0 {
         return Ok(());
     }
@@ -343,6 +348,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
     }
     let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
     let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
+    let points = first..first + piece.points as usize;
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
@@ -366,9 +372,9 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly<'_>, p
             None => false,
         };
         if ghost {
-            assembly.skip("ghost cell", Fate::Ghost);
+            assembly.skip("ghost or hidden cell", Fate::Ghost);
         } else if let Some((_, kind)) = kind {
-            assembly.push(kind, nodes, offset)?;
+            assembly.push_within(kind, nodes, points.clone())?;
         }
     }
     Ok(())

@@ -120,9 +120,9 @@ impl Codec {
 
     /// The bytes of an array that is not stored as text.
     fn stored<'a>(&mut self, source: &'a Source, array: &StoredArray, scalar: Scalar, count: Option<u64>) -> Result<Stored<'a>> {
-        let what = name(source, array);
+        let what = described(array);
         if count == Some(0) {
-            return Ok(Stored::new(source, what, Content::Decoded(Vec::new()), None));
+            return Ok(Stored::new(source, what, array.at, Content::Decoded(Vec::new()), None));
         }
         let stream = self.stream(source, array)?;
         let found = match self.compressor {
@@ -130,7 +130,7 @@ impl Codec {
             Some(compressor) => self.packed(&stream, compressor, scalar, count).map(|(content, blocks)| (content, Some(blocks))),
         };
         let (content, blocks) = found.map_err(|message| place(source, array, &message))?;
-        Ok(Stored::new(source, what, content, blocks))
+        Stored::new(source, what, array.at, content, blocks).ready(scalar)
     }
 
     fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
@@ -206,13 +206,13 @@ impl Codec {
 }
 
 /// Describes an array for messages.
-fn name(source: &Source, array: &StoredArray) -> String {
-    format!("array `{}` (line {})", printable(array.name.as_bytes()), source.line(array.at))
+fn described(array: &StoredArray) -> String {
+    format!("array `{}`", printable(array.name.as_bytes()))
 }
 
 /// Makes an error about an array.
 fn place(source: &Source, array: &StoredArray, message: &str) -> Error {
-    source.error_in(name(source, array), message)
+    source.error_at(&described(array), array.at, message)
 }
 
 fn check_size(size: u64, scalar: Scalar, count: Option<u64>) -> Result<(), String> {
@@ -242,10 +242,9 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
                 let wide = || std::str::from_utf8(token).ok()?.parse().ok().map(T::from_u64);
                 parse_integer(token).map(T::from_i64).or_else(wide)
             };
-            let name = printable(array.name.as_bytes());
             values.push(value.ok_or_else(|| {
                 let kind = if scalar.is_float() { "number" } else { "whole number" };
-                source.error_line(at, format!("array `{name}`: `{}` is not a {kind}", printable(token)))
+                source.error_line(at, format!("{}: `{}` is not a {kind}", described(array), printable(token)))
             })?);
         }
     }

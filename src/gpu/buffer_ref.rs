@@ -55,16 +55,15 @@ impl BufferRef {
     /// The part that starts at `offset` and is `size` bytes long, both within this part; anything beyond is cut off.
     #[must_use]
     pub fn part(self, offset: u64, size: u64) -> Self {
-        debug_assert!(offset + size <= self.size, "part {offset}+{size} of {}", self.size);
         let offset = offset.min(self.size);
         let size = size.min(self.size - offset);
         let address = if self.address == 0 { 0 } else { self.address + offset };
         Self { buffer: self.buffer, offset: self.offset + offset, size, address }
     }
 
-    /// The 4-byte word at index `i`.
+    /// The 4-byte word at index `i`; empty if it is not within this part.
     #[must_use]
     pub fn word(self, i: u64) -> Self {
-        self.part(4 * i, 4)
+        self.part(i.saturating_mul(4), 4)
     }
 }

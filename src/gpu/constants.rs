@@ -1,78 +1,48 @@
 //! Buffers that kernels receive where there is nothing else to bind.
 
 use super::buffer_ref::{BufferRef, USAGE};
+use super::debug;
 use super::foundation::Foundation;
-use super::{debug, failed};
+use super::memory::allocate;
+use super::pool::{Kind, Memory};
 use crate::error::{Error, Result};
-use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::Allocator;
+use std::sync::Mutex;
 
-/// A small buffer in its own memory, created first and destroyed last. It holds a word of value `u32::MAX`, used as the
-/// device count where the host knows the count, and a part to bind in place of a kernel's optional array.
+/// A small buffer, created first and destroyed last. It holds a word of value `u32::MAX`, used as the device count where
+/// the host knows the count, and a part to bind in place of a kernel's optional array.
 #[derive(Default)]
-pub(super) struct Constants {
-    buffer: vk::Buffer,
-    memory: vk::DeviceMemory,
-    address: u64,
-}
+pub(super) struct Constants(Option<Memory>);
 
+/// Name of the buffer.
+const NAME: &str = "olbvh.constants";
 /// Size of the buffer in bytes.
 const BYTES: u64 = 512;
 
 impl Constants {
-    /// Creates the buffer. If that fails, `destroy` frees the parts already made.
-    pub fn make(&mut self, foundation: &Foundation, names: Option<&ash::ext::debug_utils::Device>) -> Result<()> {
-        let Foundation { instance, physical, device, report, .. } = foundation;
-        let addresses = report.requirements.buffer_addresses;
-        let mut usage = USAGE;
-        let mut flags = vk::MemoryAllocateFlagsInfo::default();
-        if addresses {
-            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-            flags = flags.flags(vk::MemoryAllocateFlags::DEVICE_ADDRESS);
-        }
-        // SAFETY: plain creation, binding and mapping of one small host-visible buffer; freed in `destroy`.
-        unsafe {
-            let info = vk::BufferCreateInfo::default().size(BYTES).usage(usage);
-            self.buffer = device.create_buffer(&info, None).map_err(failed("vkCreateBuffer"))?;
-            let needs = device.get_buffer_memory_requirements(self.buffer);
-            let memory = instance.get_physical_device_memory_properties(*physical);
-            let wanted = vk::MemoryPropertyFlags::HOST_VISIBLE | vk::MemoryPropertyFlags::HOST_COHERENT;
-            let find = |wanted| {
-                (0..memory.memory_type_count)
-                    .find(|&i| needs.memory_type_bits >> i & 1 == 1 && memory.memory_types[i as usize].property_flags.contains(wanted))
-            };
-            // Every invocation reads the word, so it should lie in device memory, if there is room, and not across a
-            // bus.
-            let mut allocated = Err(Error::NoDevice("no host-visible memory for buffers".into()));
-            for kind in [wanted | vk::MemoryPropertyFlags::DEVICE_LOCAL, wanted].into_iter().filter_map(find) {
-                let info = vk::MemoryAllocateInfo::default().allocation_size(needs.size).memory_type_index(kind).push_next(&mut flags);
-                allocated = device.allocate_memory(&info, None).map_err(failed("vkAllocateMemory"));
-                if allocated.is_ok() {
-                    break;
-                }
-            }
-            self.memory = allocated?;
-            device.bind_buffer_memory(self.buffer, self.memory, 0).map_err(failed("vkBindBufferMemory"))?;
-            let mapped = device.map_memory(self.memory, 0, vk::WHOLE_SIZE, vk::MemoryMapFlags::empty()).map_err(failed("vkMapMemory"))?;
-            mapped.cast::<u32>().write(u32::MAX);
-            device.unmap_memory(self.memory);
-            debug::name(names, self.buffer, "olbvh.constants");
-            if addresses {
-                self.address = device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(self.buffer));
-            }
-        }
+    /// Creates the buffer; `free` frees it, also after an error.
+    pub fn make(
+        &mut self,
+        foundation: &Foundation,
+        allocator: &Mutex<Allocator>,
+        names: Option<&ash::ext::debug_utils::Device>,
+    ) -> Result<()> {
+        let (device, addresses) = (&foundation.device, foundation.report.requirements.buffer_addresses);
+        // Every invocation reads the word, so it should lie in device memory, if there is room, and not across a bus.
+        let kind = Kind { usage: USAGE, location: MemoryLocation::CpuToGpu };
+        let memory = self.0.insert(allocate(device, allocator, addresses, NAME, kind, BYTES, &mut |_| Ok(()))?);
+        debug::name(names, memory.handle, NAME);
+        let mapped = memory.allocation.as_mut().and_then(|a| a.mapped_slice_mut());
+        let word = mapped.and_then(|bytes| bytes.first_chunk_mut::<4>());
+        *word.ok_or_else(|| Error::NoDevice("no host-visible memory for buffers".into()))? = u32::MAX.to_ne_bytes();
         Ok(())
     }
 
-    /// Destroys the handles that exist.
-    ///
-    /// # Safety
-    /// The handles belong to this device, and nothing uses them any more.
-    pub unsafe fn destroy(&self, device: &ash::Device) {
-        // SAFETY: the caller guarantees that the handles belong to this device and are unused; null handles are
-        // ignored.
-        unsafe {
-            device.destroy_buffer(self.buffer, None);
-            device.free_memory(self.memory, None);
+    /// Frees the buffer, which nothing uses any more.
+    pub fn free(&mut self, device: &ash::Device, allocator: &Mutex<Allocator>) {
+        if let Some(memory) = self.0.take() {
+            memory.free(device, allocator);
         }
     }
 
@@ -87,6 +57,7 @@ impl Constants {
     }
 
     fn all(&self) -> BufferRef {
-        BufferRef { buffer: self.buffer, offset: 0, size: BYTES, address: self.address }
+        let Memory { handle, address, .. } = self.0.as_ref().unwrap_or_else(|| unreachable!("freed in drop only"));
+        BufferRef { buffer: *handle, offset: 0, size: BYTES, address: *address }
     }
 }

@@ -47,10 +47,20 @@ pub struct GpuOptions {
 #[derive(Clone)]
 pub struct Gpu {
     // Declared before `inner`, so that the kept memory is freed before the device is destroyed.
-    pool: Option<Arc<Pool>>,
+    memory: Keep,
     inner: Arc<Inner>,
     target: Arc<Target>,
-    ledger: Option<Arc<Ledger>>,
+}
+
+/// How the memory of a handle's buffers is kept.
+#[derive(Clone)]
+enum Keep {
+    /// Taken and returned without a limit.
+    Freely,
+    /// Kept for other buffers, see [`Gpu::with_pool`].
+    Pooled(Arc<Pool>),
+    /// Counted against a limit, see [`Gpu::with_memory`].
+    Limited(Arc<Ledger>),
 }
 
 struct Inner {
@@ -130,8 +140,10 @@ impl Gpu {
             constants: Constants::default(),
             foundation,
         };
-        inner.constants.make(&inner.foundation, inner.debug_device.as_ref())?;
-        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), ledger: None, pool: None };
+        if let Some(allocator) = &inner.allocator {
+            inner.constants.make(&inner.foundation, allocator, inner.debug_device.as_ref())?;
+        }
+        let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), memory: Keep::Freely };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
         }
@@ -179,20 +191,21 @@ impl Gpu {
     /// The same device with a memory limit: all buffers made from this handle and its clones, transfer buffers
     /// included, may take at most `bytes` together; a buffer beyond that is refused with [`Error::Memory`]. The
     /// allocator takes memory from the driver in blocks of 16 MiB, or of the buffer's size if that is larger. Memory of
-    /// dropped buffers is not kept ([`Gpu::with_pool`]).
+    /// dropped buffers is not kept: the limit replaces a pool ([`Gpu::with_pool`]).
     #[must_use]
     pub fn with_memory(&self, bytes: u64) -> Self {
-        Self { ledger: Some(Arc::new(Ledger::new(bytes))), pool: None, ..self.clone() }
+        Self { memory: Keep::Limited(Arc::new(Ledger::new(bytes))), ..self.clone() }
     }
 
     /// The same device with a memory pool: when large buffers made from this handle and its clones are dropped, up to
     /// `bytes` of their memory is kept for buffers of nearly the same size. It is freed when this handle, its clones
     /// and everything made from them are gone, or when the device is full. Use it for repeated work: drivers clear
-    /// fresh memory, which may take as long as the work on it.
+    /// fresh memory, which may take as long as the work on it. A memory limit of this handle ([`Gpu::with_memory`]) does
+    /// not hold for the new one.
     #[must_use]
     pub fn with_pool(&self, bytes: u64) -> Self {
         let pool = Pool::new(self.device().clone(), self.allocator().clone(), bytes);
-        Self { pool: Some(Arc::new(pool)), ledger: None, ..self.clone() }
+        Self { memory: Keep::Pooled(Arc::new(pool)), ..self.clone() }
     }
 
     /// The limit set with [`Gpu::with_memory`]; `u64::MAX` without one.
@@ -211,11 +224,11 @@ impl Gpu {
     }
 
     pub(super) fn ledger(&self) -> Option<&Ledger> {
-        self.ledger.as_deref()
+        if let Keep::Limited(ledger) = &self.memory { Some(ledger) } else { None }
     }
 
     pub(super) fn pool(&self) -> Option<&Pool> {
-        self.pool.as_deref()
+        if let Keep::Pooled(pool) = &self.memory { Some(pool) } else { None }
     }
 
     /// Runs the self-test with these tuning parameters, as opening a device does.
@@ -335,9 +348,10 @@ impl Drop for Inner {
                 let _ = device.device_wait_idle();
             }
             self.pipelines.destroy(&self.foundation);
-            self.constants.destroy(device);
         }
-        drop(self.allocator.take());
+        if let Some(allocator) = self.allocator.take() {
+            self.constants.free(device, &allocator);
+        }
     }
 }
 

@@ -7,7 +7,8 @@ use super::{debug, failed};
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme};
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator};
+use std::sync::Mutex;
 
 /// Offsets of arrays within a buffer are multiples of this, which is enough for every device's storage-buffer offsets
 /// and for 16-byte loads.
@@ -16,25 +17,42 @@ pub const ALIGNMENT: u64 = 256;
 /// Addresses of buffers are multiples of this even if the device requires less: kernels load 16 bytes in one access.
 const LEAST_ALIGNMENT: u64 = 16;
 
-/// Makes a buffer of `size` bytes in fresh memory. `claim` receives the bytes that it takes.
-fn allocate(gpu: &Gpu, name: &str, kind: Kind, size: u64, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<Memory> {
+/// Makes a buffer of `size` bytes in fresh memory, with an address if the device has `addresses`. `claim` receives the
+/// bytes that it takes.
+pub(super) fn allocate(
+    device: &ash::Device,
+    allocator: &Mutex<Allocator>,
+    addresses: bool,
+    name: &str,
+    kind: Kind,
+    size: u64,
+    claim: &mut dyn FnMut(u64) -> Result<()>,
+) -> Result<Memory> {
     let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
-    let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage);
-    // SAFETY: the device is alive as long as `gpu`; on the error path below the handle is destroyed.
-    let handle = unsafe { gpu.device().create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
+    let address = if addresses { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+    let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage | address);
+    // SAFETY: plain creation; on the error path below the handle is destroyed.
+    let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
     let mut memory = Memory { kind, size, handle, allocation: None, address: 0 };
-    match bind(gpu, name, &mut memory, claim) {
+    match bind(device, allocator, addresses, name, &mut memory, claim) {
         Ok(()) => Ok(memory),
         Err(e) => {
-            memory.free(gpu.device(), gpu.allocator());
+            memory.free(device, allocator);
             Err(e)
         }
     }
 }
 
 /// Allocates memory for a new buffer and binds it.
-fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -> Result<()>) -> Result<()> {
-    let (device, handle, location) = (gpu.device(), memory.handle, memory.kind.location);
+fn bind(
+    device: &ash::Device,
+    allocator: &Mutex<Allocator>,
+    addresses: bool,
+    name: &str,
+    memory: &mut Memory,
+    claim: &mut dyn FnMut(u64) -> Result<()>,
+) -> Result<()> {
+    let (handle, location) = (memory.handle, memory.kind.location);
     let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: memory.size, reason };
     // SAFETY: the handle was just made.
     let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
@@ -42,14 +60,14 @@ fn bind(gpu: &Gpu, name: &str, memory: &mut Memory, claim: &mut dyn FnMut(u64) -
     claim(requirements.size)?;
     let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
     let description = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
-    let mut allocator = gpu.allocator().lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
+    let mut allocator = allocator.lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
     let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
     drop(allocator);
     // SAFETY: fresh memory that meets the requirements, bound once.
     let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
     memory.allocation = Some(allocation);
     bound.map_err(failed("vkBindBufferMemory"))?;
-    if gpu.has_addresses() {
+    if addresses {
         // SAFETY: the buffer was made with the address usage and is bound.
         memory.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
     }
@@ -83,9 +101,6 @@ impl Buffer {
     /// A buffer with usage flags in addition to those of every buffer.
     pub(super) fn with_usage(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation, more: vk::BufferUsageFlags) -> Result<Self> {
         let mut usage = USAGE | more;
-        if gpu.has_addresses() {
-            usage |= vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS;
-        }
         if gpu.acceleration().is_some() {
             usage |= vk::BufferUsageFlags::ACCELERATION_STRUCTURE_BUILD_INPUT_READ_ONLY_KHR;
         }
@@ -99,7 +114,7 @@ impl Buffer {
             *claimed = bytes;
             Ok(())
         };
-        let mut fresh = || allocate(gpu, name, kind, size.max(16), &mut claim);
+        let mut fresh = || allocate(gpu.device(), gpu.allocator(), gpu.has_addresses(), name, kind, size.max(16), &mut claim);
         let memory = match gpu.pool().and_then(|pool| pool.take(kind, size)) {
             Some(memory) => memory,
             // Memory kept by the pool may be what the device is short of.

@@ -7,6 +7,7 @@ use ash::vk;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
 use std::path::PathBuf;
+use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{PoisonError, RwLock};
 
 /// A pipeline with its layouts.
@@ -35,6 +36,9 @@ impl Pipeline {
 
 /// The name of a kernel, and its specialization constants.
 pub(super) type PipelineKey = (&'static str, Vec<(u32, u32)>);
+
+/// Number of files that this process has written, so that each has a temporary file of its own.
+static WRITTEN: AtomicU32 = AtomicU32::new(0);
 
 /// The pipelines compiled so far.
 pub(super) struct Pipelines {
@@ -86,7 +90,8 @@ impl Pipelines {
             return None;
         }
         std::fs::create_dir_all(file.parent()?).ok()?;
-        let temporary = file.with_extension(format!("{}.tmp", std::process::id()));
+        let (process, number) = (std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
+        let temporary = file.with_extension(format!("{process}.{number}.tmp"));
         std::fs::write(&temporary, data).ok()?;
         std::fs::rename(&temporary, file).ok()
     }

@@ -52,7 +52,7 @@ pub struct Recorder<'a> {
     hazard: Option<String>,
     timestamps: Option<(vk::QueryPool, u32)>,
     /// Names of the timed stages so far, with the timestamp slots of start and end.
-    pub(crate) stages: Vec<(String, u32, u32)>,
+    stages: Vec<(String, u32, u32)>,
     next_slot: u32,
     /// Used where buffers are bound by descriptors.
     pools: Pools<'a>,
@@ -63,7 +63,8 @@ pub struct Recorder<'a> {
 }
 
 impl<'a> Recorder<'a> {
-    /// A recorder for a command buffer in the recording state. `timestamps` is a reset query pool and its size.
+    /// A recorder for a command buffer in the recording state. `timestamps` is a reset query pool and its size; without
+    /// effect if the queue family has no timestamps.
     ///
     /// Recording binds a compute pipeline, sets push constants and, with descriptors, binds set 0 for compute; the host
     /// must bind its own again afterwards. Where the device binds buffers by descriptors, the recorder must be kept
@@ -76,6 +77,7 @@ impl<'a> Recorder<'a> {
     /// large as the recording functions require, and their contents are valid: hints and orders are numbers of this
     /// mesh, and a tree is one over this mesh.
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
+        let timestamps = timestamps.filter(|_| gpu.timestamp_bits() > 0);
         let (pools, room) = (Pools::Own(DescriptorPools::new(gpu)), DescriptorRoom::default());
         let (uses, stages, barriers) = (Vec::new(), Vec::new(), Vec::new());
         Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, room, barriers, drop_barrier: None }

@@ -118,7 +118,7 @@ impl Gpu {
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
             self.submit_to_queue(&submit, submission.fence)?;
             self.wait(submission.fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
-            let stages = if timed { self.read_timestamps(submission.queries, &recorder.stages)? } else { Vec::new() };
+            let stages = if timed { self.read_timestamps(submission.queries, recorder.timed_stages())? } else { Vec::new() };
             Ok((value, StageTimes { stages }))
         }
     }
@@ -203,13 +203,17 @@ impl Gpu {
     }
 
     /// Reads back a part of a buffer.
+    ///
     /// Writes by a command buffer of the host must be available to `HOST_READ`: mapped memory is read without a copy.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a part of another buffer, a failed Vulkan call, or no memory for the transfer.
+    /// [`Error::Invalid`] for a part that does not lie in the buffer, a failed Vulkan call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
-        if part.buffer != buffer.all().buffer || !self.is_same_device(&buffer.gpu) {
-            return Err(Error::Invalid(format!("a part to be read of another buffer or device than {}", buffer.name())));
+        // The range is checked as well: the part may be of an earlier buffer whose handle the driver gave out again.
+        let within = part.offset.checked_add(part.size).is_some_and(|end| end <= buffer.size());
+        if part.buffer != buffer.all().buffer || !within || !self.is_same_device(&buffer.gpu) {
+            let text = format!("the part to be read does not lie in the buffer `{}`, or that is on another device", buffer.name());
+            return Err(Error::Invalid(text));
         }
         let count = part.size as usize / size_of::<T>();
         let mut data = vec![T::zeroed(); count];

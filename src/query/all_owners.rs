@@ -1,7 +1,7 @@
 //! Every tetrahedron that contains a point (SPEC 3.1): counted first, then written into the memory available.
 
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
-use super::{Scene, capacity_of, list_parts};
+use super::{Progress, Scene, capacity_of, list_parts};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
@@ -120,7 +120,7 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
 ///
 /// # Errors
 /// As [`super::locate`]; and [`Error::TooLarge`] for 2^31 owners and more in one chunk of points.
-pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: &dyn Fn(u64, u64)) -> Result<Vec<Vec<u32>>> {
+pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<Vec<Vec<u32>>> {
     let gpu = tree.gpu();
     let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
     let mut all = Vec::with_capacity(points.len());

@@ -1,7 +1,7 @@
 //! Point location (SPEC 3.1): the owner of each point, its barycentric coordinates, and values of fields there.
 
 use super::order::{PointOrder, cmd_sort_points};
-use super::{Scene, list_parts, upload_field};
+use super::{Progress, Scene, list_parts, upload_field};
 use crate::build::{DeviceMesh, Tree, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
@@ -17,36 +17,35 @@ const MAX_STACK: u32 = 7 * MAX_LEVEL + 1;
 
 /// How the owner of a point is searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub enum Path {
+pub enum LocateMethod {
     /// Finds the point's leaf by descent over child masks.
     #[default]
     Descent,
     /// Takes points in runs of [`POINT_RUN`]. Each point is first searched for around the owner of the one before it,
     /// up to a few tetrahedra away, and found by descent if it is not there. Suits points that are each near the one
-    /// before. In a mesh whose tetrahedra do not overlap, the owners are those of [`Path::Descent`].
+    /// before. In a mesh whose tetrahedra do not overlap, the owners are those of [`LocateMethod::Descent`].
     Runs,
-    /// As [`Path::Runs`], but in the order given by [`PointInput::order`], for example that of
+    /// As [`LocateMethod::Runs`], but in the order given by [`PointInput::order`], for example that of
     /// [`super::cmd_sort_points`]; [`locate`] computes this order itself. Suits points in no particular order.
     Sorted,
     /// Finds the leaf by the paper's traversal with a short stack of this many nodes (brought into 1…71). Only the
     /// first 32,000 entries of a list are searched.
-    /// 71. Only the first 32,000 entries of a list are searched.
     Traversal(u32),
 }
 
-impl Path {
-    /// The fastest path for this many points in a tree with seeds ([`crate::options::Lists::Boundary`]) over this many
-    /// tetrahedra. `in_order` states that each point lies near the one before it.
+impl LocateMethod {
+    /// The fastest method for this many points in a tree with seeds ([`crate::options::Lists::Boundary`]) over this
+    /// many tetrahedra. `in_order` states that each point lies near the one before it.
     ///
     /// Searching around the last owner pays from about one point per four tetrahedra. In a mesh of 1.5 million
     /// tetrahedra (lavapipe, Mesa 25) a point takes, in nanoseconds:
     ///
     /// | | 262,144 points | 524,288 points | 1,048,576 points |
     /// |---|---|---|---|
-    /// | random, [`Path::Descent`] | 189–219 | 163–197 | 193–215 |
-    /// | random, [`Path::Sorted`] | 188–248 | 154–191 | 153–196 |
-    /// | along a Z curve, [`Path::Descent`] | 114–137 | 110–127 | 90–100 |
-    /// | along a Z curve, [`Path::Runs`] | 130–141 | 93–107 | 72–75 |
+    /// | random, [`LocateMethod::Descent`] | 189–219 | 163–197 | 193–215 |
+    /// | random, [`LocateMethod::Sorted`] | 188–248 | 154–191 | 153–196 |
+    /// | along a Z curve, [`LocateMethod::Descent`] | 114–137 | 110–127 | 90–100 |
+    /// | along a Z curve, [`LocateMethod::Runs`] | 130–141 | 93–107 | 72–75 |
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
         // Only points that are sorted together get nearer to each other.
         let together = if in_order { points } else { points.min(CHUNK) };
@@ -64,12 +63,12 @@ pub struct LocateOptions {
     /// How far below 0 the smallest barycentric coordinate of an owner may be in a boundary leaf.
     pub tolerance: f32,
     /// How owners are searched for.
-    pub path: Path,
+    pub method: LocateMethod,
 }
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        Self { tolerance: TOLERANCE, path: Path::Descent }
+        Self { tolerance: TOLERANCE, method: LocateMethod::Descent }
     }
 }
 
@@ -82,11 +81,11 @@ pub struct PointInput {
     pub stride: u32,
     /// Number of points.
     pub count: u32,
-    /// For [`Path::Descent`]: one tetrahedron per point from which its search starts, such as its last owner, or
-    /// `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed.
+    /// For [`LocateMethod::Descent`]: one tetrahedron per point from which its search starts, such as its last owner,
+    /// or `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed.
     pub hints: Option<BufferRef>,
-    /// For [`Path::Sorted`]: one word per place, the point that is located there; every point occurs once. Answers are
-    /// stored by point, not by place.
+    /// For [`LocateMethod::Sorted`]: one word per place, the point that is located there; every point occurs once.
+    /// Answers are stored by point, not by place.
     pub order: Option<BufferRef>,
 }
 
@@ -112,8 +111,8 @@ enum Guide {
 /// after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, or for [`Path::Sorted`] without an order; [`Error::TooLarge`] for points of
-/// more than 2^31 floats.
+/// [`Error::Invalid`] for a stride below 3, or for [`LocateMethod::Sorted`] without an order; [`Error::TooLarge`] for
+/// points of more than 2^31 floats.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
@@ -123,14 +122,14 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
     let groups = |run: u32| Groups::Count(count.div_ceil(run).div_ceil(workgroup));
-    let (run, guide, guides) = match options.path {
-        Path::Descent | Path::Traversal(_) => (1, Guide::Hints, hints),
-        Path::Runs => (POINT_RUN, Guide::Nothing, None),
-        Path::Sorted if order.is_none() => return Err(Error::Invalid("points to be located in an order that is not given".into())),
-        Path::Sorted => (POINT_RUN, Guide::Order, order),
+    let (run, guide, guides) = match options.method {
+        LocateMethod::Descent | LocateMethod::Traversal(_) => (1, Guide::Hints, hints),
+        LocateMethod::Runs => (POINT_RUN, Guide::Nothing, None),
+        LocateMethod::Sorted if order.is_none() => return Err(Error::Invalid("points to be located in an order that is not given".into())),
+        LocateMethod::Sorted => (POINT_RUN, Guide::Order, order),
     };
     r.stage("query.locate", |r| {
-        if let Path::Traversal(stack) = options.path {
+        if let LocateMethod::Traversal(stack) = options.method {
             let arguments = LocateByTraversal {
                 grid,
                 masks,
@@ -239,7 +238,7 @@ pub fn locate(
     points: &[[f32; 3]],
     field: Option<(&[f32], On)>,
     options: &LocateOptions,
-    report: &dyn Fn(u64, u64),
+    report: Progress<'_>,
 ) -> Result<Located> {
     let gpu = tree.gpu();
     let scene = Scene::new(mesh, tree)?;
@@ -249,7 +248,7 @@ pub fn locate(
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
     let values = gpu.buffer("olbvh.query.values", 4 * most)?;
-    let sorted = options.path == Path::Sorted;
+    let sorted = options.method == LocateMethod::Sorted;
     let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
     let (_memory, order) = Arena::reserve(gpu, "olbvh.query.order", carve)?;
     for chunk in points.chunks(CHUNK) {

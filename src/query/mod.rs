@@ -9,20 +9,26 @@ mod visible;
 mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
-pub use locate::{LocateOptions, LocateOutput, Located, Path, PointInput, cmd_interpolate, cmd_locate, locate};
+pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, PointInput, cmd_interpolate, cmd_locate, locate};
 pub use order::{PointOrder, cmd_sort_points};
 pub use overlap::{OverlapInput, OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;
 pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub use visible::{cmd_visible, visible_bytes};
 pub(crate) use volume::{Canvas, Rays};
-pub use volume::{Drawn, RenderInput, RenderMemory, RenderPart, Shown, cmd_render, render};
+pub use volume::{RenderInput, RenderMemory, RenderPart, Rendered, Visibility, cmd_render, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef};
 use crate::mesh::On;
 use crate::reference::locate::LIST_PART;
+
+/// Receives the progress of an owning call: how much is done, and the total. Each call says what it counts.
+pub type Progress<'a> = &'a dyn Fn(u64, u64);
+
+/// Receives progress and ignores it.
+pub const SILENT: &(dyn Fn(u64, u64) + Sync) = &|_, _| {};
 
 /// A binary tree in device memory: the structure that queries search for the LBVH baseline.
 #[derive(Clone, Copy, Debug)]

@@ -1,4 +1,4 @@
-//! The order in which [`super::Path::Sorted`] locates points: along the Morton curve.
+//! The order in which [`super::LocateMethod::Sorted`] locates points: along the Morton curve.
 
 use super::PointInput;
 use crate::build::check_points;

@@ -18,7 +18,7 @@ mod sets;
 pub use pairs::{PairMemory, cmd_count_pairs, cmd_list_pairs};
 pub use sets::{OverlapMemory, cmd_overlap};
 
-use super::{Rounds, Scene};
+use super::{Progress, Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Recorder, StageTime};
@@ -60,7 +60,7 @@ fn effort(status: &OverlapStatus) -> Effort {
 struct Job<'a> {
     gpu: &'a Gpu,
     scenes: [Scene; 2],
-    report: &'a dyn Fn(u64, u64),
+    report: Progress<'a>,
     done: Overlapped,
 }
 
@@ -151,7 +151,7 @@ impl Job<'_> {
 /// [`Error::Memory`], [`Error::TooLarge`] for 2^31 pairs and more, a failed Vulkan call, or [`Error::Invalid`] for
 /// meshes on different devices, a tree of another mesh, or pairs in a tree over B without the lists that pairs are
 /// found by.
-pub fn overlap(a: OverlapInput<'_>, b: OverlapInput<'_>, pairs: bool, report: &dyn Fn(u64, u64)) -> Result<Overlapped> {
+pub fn overlap(a: OverlapInput<'_>, b: OverlapInput<'_>, pairs: bool, report: Progress<'_>) -> Result<Overlapped> {
     b.mesh.check_device(a.mesh.gpu())?;
     let scenes = [Scene::new(a.mesh, a.tree)?, Scene::new(b.mesh, b.tree)?];
     let mut job = Job { gpu: a.tree.gpu(), scenes, report, done: Overlapped::default() };

@@ -10,18 +10,18 @@ pub fn visible_bytes(nodes: u32) -> u64 {
     4 * u64::from(nodes.div_ceil(32))
 }
 
-/// Records into `marks` which nodes of a tree have a value within one of the ranges `drawn` (two floats each, ascending
-/// and disjoint, as in [`crate::render::Plan::drawn`]). `drawn` consists of the ranges and their number. `marks` has
+/// Records into `marks` which nodes of a tree have a value within one of the ranges `values` (two floats each, ascending
+/// and disjoint, as in [`crate::render::Plan::visible_values`]). `values` consists of the ranges and their number. `marks` has
 /// [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are the nodes' ranges as
 /// [`crate::build::cmd_ranges`] records them. Compute shaders read and write everything; there is no barrier before or
 /// after.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if the pipeline cannot be made.
-pub fn cmd_visible(r: &mut Recorder<'_>, tree: &TreeMemory, ranges: BufferRef, drawn: (BufferRef, u32), marks: BufferRef) -> Result<()> {
+pub fn cmd_visible(r: &mut Recorder<'_>, tree: &TreeMemory, ranges: BufferRef, values: (BufferRef, u32), marks: BufferRef) -> Result<()> {
     let workgroup = r.gpu().target().each;
     let words = tree.capacity.nodes.div_ceil(32);
-    let arguments = Visible { status: tree.status, ranges, drawn: drawn.0, marks, drawn_ranges: drawn.1 };
+    let arguments = Visible { status: tree.status, ranges, drawn: values.0, marks, drawn_ranges: values.1 };
     let spec = VisibleSpec { workgroup, ..Default::default() };
     r.stage("query.visible", |r| r.dispatch(&arguments, spec, Groups::Count(words.div_ceil(workgroup))))
 }

@@ -10,7 +10,7 @@
 
 mod picture;
 pub(crate) use picture::{Canvas, Rays};
-pub use picture::{Drawn, render};
+pub use picture::{Rendered, render};
 
 use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_bytes};
 use crate::build::Capacity;
@@ -53,7 +53,7 @@ pub struct RenderInput {
     pub normals: Option<BufferRef>,
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
     /// picture is the same either way. With a binary tree nothing is skipped.
-    pub shown: Option<Shown>,
+    pub visibility: Option<Visibility>,
     /// Given if the mesh is a block of another one, and other blocks draw their parts of the picture.
     pub part: Option<RenderPart>,
 }
@@ -72,12 +72,12 @@ pub struct RenderPart {
 
 /// The values that are visible; nodes of an octree without any of them are skipped.
 #[derive(Clone, Copy, Debug)]
-pub struct Shown {
+pub struct Visibility {
     /// The range of the field's values in every node, as [`crate::build::cmd_ranges`] records them.
     pub ranges: BufferRef,
     /// Ranges outside of which the transfer function is transparent: two floats each, ascending and disjoint, as in
-    /// [`crate::render::Plan::drawn`].
-    pub drawn: BufferRef,
+    /// [`crate::render::Plan::visible_values`].
+    pub values: BufferRef,
     /// Number of these ranges. `[∞, ∞]` shows nothing, so a caller whose transfer function changes can pad the ranges
     /// to a fixed number with it.
     pub count: u32,
@@ -191,7 +191,7 @@ pub fn cmd_render(
 
 /// The flags and marks in `memory` if nodes are to be skipped.
 fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
-    let (Some(_), Structure::Octree(tree)) = (input.shown, searched.structure) else { return Ok(None) };
+    let (Some(_), Structure::Octree(tree)) = (input.visibility, searched.structure) else { return Ok(None) };
     let bits = visible_bytes(tree.capacity.nodes);
     match memory.visible {
         Some(visible) if bits <= visible.marks.size => Ok(Some(visible)),
@@ -207,10 +207,10 @@ fn cmd_plan(
     memory: &RenderMemory,
     visible: Option<Visible>,
 ) -> Result<()> {
-    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.shown, &searched.structure) {
+    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.visibility, &searched.structure) {
         let bits = visible_bytes(tree.capacity.nodes);
         r.copy(tree.flags.part(0, bits), flags);
-        cmd_visible(r, tree, shown.ranges, (shown.drawn, shown.count), marks)?;
+        cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), marks)?;
     }
     let [first_cell, last_cell] = input.part.map_or(CellRange::WHOLE, |part| part.cells).words();
     let arguments = VolumePlan {

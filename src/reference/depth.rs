@@ -76,8 +76,9 @@ impl Sizes {
     /// [`Error::Invalid`] for α outside 0…10. [`Error::TooLarge`] if not even the root fits.
     pub fn level(&self, options: &BuildOptions) -> Result<u32> {
         let heuristic = self.heuristic(options.alpha_fixed()?);
-        let wanted = options.level.map_or(heuristic, |level| level.min(MAX_LEVEL));
         let valid = u32::try_from(self.histogram.iter().sum::<u64>()).unwrap_or(u32::MAX);
+        // Without a valid tetrahedron, the tree is a root.
+        let wanted = if valid == 0 { 0 } else { options.level.map_or(heuristic, |level| level.min(MAX_LEVEL)) };
         let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {
             self.entries[l as usize] <= most
@@ -100,7 +101,7 @@ pub(crate) fn finer(options: &BuildOptions, built: u32, entries: u64, leaves: u6
     let finest = |most: u64| (built + 1..=MAX_LEVEL).rev().find(|&l| candidates[l as usize] <= most);
     let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(candidates[0] as u32)));
     let level = finest(anyway).map_or(level, |cheap| level.max(cheap)).min(finest(most)?);
-    if level <= built || options.budget.is_some() {
+    if level <= built || options.budget.is_some() || candidates[0] == 0 {
         return None;
     }
     log::info!(

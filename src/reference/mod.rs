@@ -1,4 +1,4 @@
-//! The reference implementation of every stage and query, in plain safe Rust, with the file names of the kernels. It is
+//! The reference implementation of every stage and query, in plain safe Rust; each file names its kernels. It is
 //! the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
 pub mod assign;

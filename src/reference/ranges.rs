@@ -67,16 +67,16 @@ pub fn ranges(mesh: &Mesh, topology: &Topology, tree: &TreeArrays, field: &Field
     keys.into_iter().map(floats).collect()
 }
 
-/// One bit per node, set if something is visible in the node: a value within one of the ranges `drawn` (ascending and
+/// One bit per node, set if something is visible in the node: a value within one of the ranges `values` (ascending and
 /// disjoint). Ranges of nodes are widened a little, since interpolation may round beyond them. Twin of
 /// `glsl/query/visible`.
-pub fn visible(ranges: &[[f32; 2]], drawn: &[[f32; 2]]) -> Vec<u32> {
+pub fn visible(ranges: &[[f32; 2]], values: &[[f32; 2]]) -> Vec<u32> {
     let rounding = two_to(-19);
     let one = |&[lo, hi]: &[f32; 2]| {
         let rounding = canonical(lo.abs().max(hi.abs()) * rounding);
         let (a, b) = (canonical(canonical(lo) - rounding), canonical(canonical(hi) + rounding));
-        let first = drawn.partition_point(|&[_, end]| end < a);
-        lo <= hi && drawn.get(first).is_some_and(|&[begin, _]| begin <= b)
+        let first = values.partition_point(|&[_, end]| end < a);
+        lo <= hi && values.get(first).is_some_and(|&[begin, _]| begin <= b)
     };
     ranges.par_chunks(32).map(|word| (0..).zip(word).fold(0, |bits, (i, range)| bits | u32::from(one(range)) << i)).collect()
 }

@@ -153,7 +153,8 @@ impl<'a> Slicer<'a> {
     fn extrapolated(&self, t: u32, x: Vec3) -> f32 {
         let (Some(field), (tet, v)) = (self.field, self.around(t, x)) else { return f32::NAN };
         let weights = tet.weights(x);
-        let linear = self.extrapolate == Extrapolate::Linear && field.on == On::Points && weights.sum > 0.0;
+        let solid = weights.sum > 0.0 && tet.volume() != 0.0;
+        let linear = self.extrapolate == Extrapolate::Linear && field.on == On::Points && solid;
         let barycentric = if linear {
             weights.barycentric(tet.rank)
         } else {

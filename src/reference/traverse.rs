@@ -92,7 +92,13 @@ pub fn traverse_leaves(tree: &TreeArrays, stack: usize, mut f_n: impl FnMut(Node
             if node.level >= resume {
                 trail |= (n as u32 - 1) << shift;
             }
-            let left = ((trail >> shift & 7) as usize).min(n - 1);
+            let digit = (trail >> shift & 7) as usize;
+            let left = digit.min(n - 1);
+            if left < digit {
+                // F_N has become stricter, so the path may lead elsewhere, and the trail below it is another node's.
+                trail = trail & ((1 << shift) - 1) | (left as u32) << shift;
+                resume = node.level;
+            }
             for &sibling in accepted[n - left..n].iter().rev() {
                 stack.push(sibling);
             }

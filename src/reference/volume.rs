@@ -21,29 +21,19 @@ use super::ranges::{ranges, visible};
 use crate::error::{Error, Result};
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
-use crate::render::{Bounds, Plan, Prepared, RenderSettings};
+use crate::render::{Bounds, Plan, Prepared, RenderSettings, RenderStats};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// A drawn picture.
+/// A finished picture, and what it cost.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
     /// Straight RGBA, 8 bits per channel, row 0 on top.
     pub pixels: Vec<u8>,
-    /// Number of samples taken within the ray intervals.
-    pub samples: u64,
-    /// Number of samples within the intervals that were skipped, since nothing is visible in their nodes.
-    pub skipped_samples: u64,
-    /// Number of samples taken that lie in the mesh.
-    pub found_samples: u64,
-    /// Milliseconds for the field's ranges, if some values are transparent.
-    pub ranges_ms: f64,
-    /// Milliseconds for the ray intervals.
-    pub interval_ms: f64,
-    /// Milliseconds for marching.
-    pub march_ms: f64,
+    /// Numbers of samples, and times.
+    pub stats: RenderStats,
 }
 
 /// What is drawn: a mesh, its tree, a field.
@@ -76,12 +66,12 @@ impl<'a> Scene<'a> {
                 "field `{name}` has {n} values where the mesh needs {expected}, or the topology is not the mesh's"
             )));
         }
-        let (lo, hi) = (tree.grid.lo, tree.grid.hi);
-        let bounds = Bounds { lo: [lo[0], lo[1], lo[2]], hi: [hi[0], hi[1], hi[2]] };
+        let bounds = Bounds::from(&tree.grid);
         let valid = |tet: usize| topology.is_valid(tet as u32);
         let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
         let start = Instant::now();
-        let visible = prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.drawn));
+        let visible =
+            prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.visible_values));
         let ranges_ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
         let locator = Locator::new(mesh, topology, tree).with_tolerance(0.0);
         Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, part: CellRange::WHOLE, locator })
@@ -147,5 +137,6 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     let ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
     let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
     let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
-    Picture { pixels, samples, skipped_samples, found_samples, ranges_ms: scene.ranges_ms, interval_ms, march_ms }
+    let ranges_ms = scene.ranges_ms;
+    Picture { pixels, stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 } }
 }

@@ -24,19 +24,21 @@
 
 pub mod auto;
 pub mod camera;
-mod drawn;
 pub mod maps;
 pub mod plan;
 pub mod settings;
 pub mod shading;
+mod stats;
 mod step;
 pub mod transfer;
+mod visible_values;
 
 pub use auto::auto_opacity;
 pub use camera::{Bounds, Camera, CameraSpec, Projection, RayGrid};
 pub use plan::{MAX_SAMPLES, Plan, Prepared, TABLE_SIZE, interval_slack};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
+pub use stats::RenderStats;
 pub use step::{SuitedStep, suited_step};
 pub use transfer::TransferFunction;
 

@@ -1,8 +1,8 @@
 //! The settings of a picture evaluated for one mesh and field: everything that the kernels and the reference renderer
 //! need.
 
-use super::drawn::drawn_values;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
+use super::visible_values::visible_values;
 use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, gradient_normals, shading_normals};
 use crate::error::{Error, Result};
 use crate::grid::{canonical, two_to};
@@ -35,7 +35,7 @@ pub struct Plan {
     pub table: Vec<[f32; 4]>,
     /// Ranges of values, ascending and disjoint, outside of which the table is transparent; with iso-surfaces, the
     /// iso-values.
-    pub drawn: Vec<[f32; 2]>,
+    pub visible_values: Vec<[f32; 2]>,
     /// Values of the iso-surfaces that are drawn instead of the volume, ascending and distinct.
     pub iso: Vec<f32>,
     /// Opacity at which a ray ends.
@@ -104,7 +104,7 @@ impl Plan {
             step: step as f32,
             value_lo,
             value_scale,
-            drawn: if surfaces { iso.iter().map(|&v| [v; 2]).collect() } else { drawn_values(&table, value_lo, value_scale) },
+            visible_values: if surfaces { iso.iter().map(|&v| [v; 2]).collect() } else { visible_values(&table, value_lo, value_scale) },
             table,
             iso,
             termination: settings.termination,
@@ -115,10 +115,10 @@ impl Plan {
 
     /// Whether some of these values are transparent, so that parts of the mesh can be skipped.
     pub fn hides(&self, values: &[f32]) -> bool {
-        let everything = matches!(self.drawn[..], [[lo, hi]] if lo.is_infinite() && hi.is_infinite());
+        let everything = matches!(self.visible_values[..], [[lo, hi]] if lo.is_infinite() && hi.is_infinite());
         let is_hidden = |v: f32| {
-            let first = self.drawn.partition_point(|&[_, end]| end < v);
-            v.is_finite() && self.drawn.get(first).is_none_or(|&[begin, _]| v < begin)
+            let first = self.visible_values.partition_point(|&[_, end]| end < v);
+            v.is_finite() && self.visible_values.get(first).is_none_or(|&[begin, _]| v < begin)
         };
         !everything && values.iter().copied().any(is_hidden)
     }
@@ -150,7 +150,7 @@ impl Plan {
         }
     }
 
-    /// The picture for `colors` as in [`crate::query::Drawn`], composited over the background: four bytes per pixel,
+    /// The picture for `colors` as in [`crate::query::Rendered`], composited over the background: four bytes per pixel,
     /// straight alpha.
     pub fn pixels(&self, colors: &[[f32; 4]]) -> Vec<u8> {
         let [width, height] = self.size;

@@ -7,7 +7,7 @@ use crate::gpu::{Gpu, StageTime};
 use crate::kernels::Target;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{BuildOptions, Lists};
-use crate::query::{self, LocateOptions};
+use crate::query::{self, LocateOptions, SILENT};
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
 use crate::reference::locate::Locator;
@@ -129,24 +129,23 @@ impl<'a> Workload<'a> {
 
     /// Runs every query; stores the answers in `answers` and returns the times of the stages.
     fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<Vec<StageTime>> {
-        let silent = &|_, _| {};
         let mut stages = Vec::new();
         for tree in [&on.whole, &on.boundary] {
-            let located = query::locate(&on.mesh, tree, &self.points, None, &LocateOptions::default(), silent)?;
+            let located = query::locate(&on.mesh, tree, &self.points, None, &LocateOptions::default(), SILENT)?;
             stages.extend(located.stages);
             answers.owners.push(located.owners);
             answers.barycentrics.extend(located.barycentrics);
         }
-        let drawn = query::render(&on.mesh, &on.whole, &self.plan, (&self.field.values, On::Points), None, silent)?;
-        answers.colors = drawn.colors;
-        let sliced = query::slice(&on.mesh, &on.whole, None, &self.voxels, Extrapolate::Nearest, silent, &mut |band| {
+        let rendered = query::render(&on.mesh, &on.whole, &self.plan, (&self.field.values, On::Points), None, SILENT)?;
+        answers.colors = rendered.colors;
+        let sliced = query::slice(&on.mesh, &on.whole, None, &self.voxels, Extrapolate::Nearest, SILENT, &mut |band| {
             answers.kinds.extend(band.kinds);
             answers.voxels.extend(band.owners);
             Ok(())
         })?;
         let parts = [
-            ("query.intervals", drawn.interval_ms),
-            ("query.march", drawn.march_ms),
+            ("query.intervals", rendered.stats.interval_ms),
+            ("query.march", rendered.stats.march_ms),
             ("query.slice_locate", sliced.locate_ms),
             ("query.slice_touch", sliced.touch_ms),
         ];

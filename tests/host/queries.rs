@@ -8,8 +8,8 @@ use olbvh::mesh::{Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{
-    LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, Path, PointInput, PointOrder, RenderInput, RenderMemory, Rounds,
-    Scene, Shown, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
+    LocateMethod, LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput, RenderMemory,
+    Rounds, Scene, SliceInput, SliceMemory, StructureView, Visibility, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
     cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
 use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
@@ -82,7 +82,7 @@ impl Queries {
             gpu.upload("olbvh.test.view", &[plan.view()]).unwrap(),
             gpu.upload("olbvh.test.table", &plan.table).unwrap(),
             // One range more than there are, which shows nothing.
-            gpu.upload("olbvh.test.drawn", &[&plan.drawn[..], &[[f32::INFINITY; 2]]].concat()).unwrap(),
+            gpu.upload("olbvh.test.drawn", &[&plan.visible_values[..], &[[f32::INFINITY; 2]]].concat()).unwrap(),
             gpu.upload("olbvh.test.normals", &normals).unwrap(),
         ];
         Self {
@@ -114,7 +114,7 @@ impl Queries {
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         cmd_sort_points(r, self.scene.tree.grid, &self.points, &self.order)?;
         r.barrier("sort_points → locate");
-        let options = LocateOptions { path: Path::Sorted, ..LocateOptions::default() };
+        let options = LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() };
         cmd_count_owners(r, &self.scene, &self.points, &self.owners, &options)?;
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
@@ -125,9 +125,9 @@ impl Queries {
         cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
         let field = (self.field.all(), On::Points);
         cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
-        let [view, table, drawn, normals] = self.drawn.each_ref().map(Buffer::all);
-        let shown = Some(Shown { ranges: self.ranges, drawn, count: self.plan.drawn.len() as u32 + 1 });
-        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), shown, part: None };
+        let [view, table, values, normals] = self.drawn.each_ref().map(Buffer::all);
+        let visibility = Some(Visibility { ranges: self.ranges, values, count: self.plan.visible_values.len() as u32 + 1 });
+        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), visibility, part: None };
         cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
         let other = Scene::new(&self.other, &self.other_tree)?;
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;

@@ -220,3 +220,21 @@ fn what_makes_no_sense_is_refused() {
     let band = slice(&mesh, &topology, &tree, None, voxels, Extrapolate::Nearest);
     assert!(band.kinds.iter().all(|&k| k == EMPTY));
 }
+
+/// The weights of a flat tetrahedron sum to rounding noise, so it has no gradient to go on with.
+#[test]
+fn flat_tetrahedra_are_not_extrapolated() {
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [3.0, 3.0, 0.0], [0.0, 0.0, 1.0]];
+    let (mesh, topology) = prepared(Mesh { points, tets: vec![[0, 1, 2, 3], [0, 1, 2, 4]], ..Mesh::default() });
+    let tree = tree(&mesh, &topology, 0.0, Assign::Exact);
+    let field = Field { name: String::from("f"), on: On::Points, values: vec![1.0, 2.0, 3.0, 4.0, 5.0] };
+    for k in 0..500 {
+        let below = 0.1 + k as f32 / 2000.0;
+        let half = [[0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.5]];
+        let [across, down, up] = half;
+        let voxels = VoxelGrid { origin: [0.3, 0.3, -below], across, down, up, half, size: [1, 1], layers: 1 };
+        let [nearest, linear] =
+            [Extrapolate::Nearest, Extrapolate::Linear].map(|e| slice(&mesh, &topology, &tree, Some(&field), voxels, e));
+        assert_eq!((&nearest.owners[..], &nearest.values), (&[0][..], &linear.values), "{below} below");
+    }
+}

@@ -8,6 +8,7 @@ use olbvh::options::Assign;
 use olbvh::reference::leaves::cell_box;
 use olbvh::reference::traverse::{Node, full_stack, traverse, traverse_leaves};
 use olbvh::tree::TreeArrays;
+use std::cell::Cell;
 use std::ops::ControlFlow;
 
 /// The leaves that a recursion visits.
@@ -128,4 +129,32 @@ fn a_full_stack_asks_every_node_once() {
     assert_eq!(asked(usize::MAX), tree.nodes());
     assert!(asked(8) >= tree.nodes() && asked(0) > asked(8));
     assert!(asked(0) <= tree.nodes() * 8 * tree.grid.level);
+}
+
+/// The squared distance from a point to the cell of a node.
+fn square(tree: &TreeArrays, node: Node, x: [f32; 3]) -> f32 {
+    let cell = cell_box(&tree.grid, node.level, node.code);
+    (0..3).map(|c| (cell[c] - x[c]).max(x[c] - cell[c + 3]).max(0.0).powi(2)).sum()
+}
+
+/// A search for the nearest leaf rejects more and more nodes, and still finds it.
+#[test]
+fn a_predicate_may_become_stricter() {
+    let (mesh, topology) = prepared(kuhn_jittered([17; 3], 0.3, 2).unwrap());
+    let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
+    let kept = |node: Node, seed: u32| node.level < tree.grid.level || scramble(node, seed).trailing_zeros() >= 5;
+    for seed in 0..400 {
+        let x = [0, 1, 2].map(|c| 17.0 * (scramble(Node { index: c, ..Node::default() }, seed) & 0xffff) as f32 / 65535.0);
+        let all = leaves(&tree, usize::MAX, &|node| kept(node, seed));
+        let nearest = all.iter().map(|&leaf| square(&tree, leaf, x)).fold(f32::INFINITY, f32::min);
+        for stack in [0, 1, 2, 8] {
+            let best = Cell::new(f32::INFINITY);
+            let closer = |node| kept(node, seed) && square(&tree, node, x) < best.get();
+            traverse_leaves(&tree, stack, closer, |leaf| {
+                best.set(square(&tree, leaf, x));
+                ControlFlow::Continue(())
+            });
+            assert_eq!(best.get(), nearest, "stack {stack}, seed {seed}");
+        }
+    }
 }

@@ -12,10 +12,10 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
+use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
-use olbvh::reference::volume::Picture;
-use olbvh::render::Bounds;
+use olbvh::render::{Bounds, RenderStats};
 use olbvh::slicing::Band;
 use olbvh::tree::TreeBytes;
 
@@ -35,36 +35,27 @@ pub trait Engine {
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds the owner, barycentric coordinates and field value of each point.
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>>;
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Located>>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds where they overlap.
     fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>>;
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Picture>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks>;
 }
 
 /// A picture and the values that were derived for it.
-pub struct Drawn {
-    /// The picture.
-    pub picture: Picture,
+pub struct Picture {
+    /// Straight RGBA, 8 bits per channel, row 0 on top.
+    pub pixels: Vec<u8>,
+    /// Numbers of samples, and times.
+    pub stats: RenderStats,
     /// The field's values at the ends of the transfer function.
     pub range: [f32; 2],
     /// Distance between two samples on a ray.
     pub step: f32,
-}
-
-/// Where a point lies.
-#[derive(Clone, Copy, Debug)]
-pub struct Located {
-    /// Tetrahedron of the mesh, or `u32::MAX`.
-    pub owner: u32,
-    /// Barycentric coordinates in it; 0 outside the mesh.
-    pub bary: [f32; 4],
-    /// Value of the field; NaN outside the mesh or without a field.
-    pub value: f32,
 }
 
 /// Figures about a mesh and its tree.

@@ -9,7 +9,7 @@ use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
 use olbvh::options::Fineness;
-use olbvh::query::{self, LocateOptions};
+use olbvh::query::{LocateMethod, LocateOptions};
 use serde_json::json;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
@@ -89,8 +89,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
-    let path = query::Path::suited(local.len(), mesh.tets.len(), args.coherent);
-    let asked = Points { mesh, options, points: &local, how: LocateOptions { path, tolerance: args.tolerance } };
+    let method = LocateMethod::suited(local.len(), mesh.tets.len(), args.coherent);
+    let asked = Points { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);
     let start = Instant::now();
@@ -102,11 +102,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     } else {
         let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
-        let owner: Vec<u32> = located.iter().map(|l| if l.owner == u32::MAX { l.owner } else { mesh.cell_id(l.owner) }).collect();
-        let bary: Vec<[f32; 4]> = located.iter().map(|l| l.bary).collect();
-        let value: Vec<f32> = located.iter().map(|l| l.value).collect();
-        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &bary, value: field.map(|_| &value[..]) })?;
-        Done { found: located.iter().filter(|l| l.owner != u32::MAX).count(), took }
+        let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
+        let value = field.map(|_| &located.values[..]);
+        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &located.barycentrics, value })?;
+        Done { found: located.owners.iter().filter(|&&tet| tet != u32::MAX).count(), took }
     };
     drop(progress);
     let took = done.took;

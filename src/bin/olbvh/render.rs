@@ -2,7 +2,7 @@
 
 use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Outcome};
-use crate::engine::{self, Drawn};
+use crate::engine::{self, Picture};
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds};
@@ -38,7 +38,7 @@ drawn fast.";
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// Output file, a .png picture. `-`: standard output, while the summary goes to standard error.
+    /// Output file, a .png stats. `-`: standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
     /// Name of the field to draw. Default: the first field of points, or else of cells; without any field, the height
@@ -129,8 +129,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
-    let (drawn, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
-    let Drawn { picture, range: [lo, hi], step } = drawn;
+    let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
+    let Picture { pixels, stats, range: [lo, hi], step } = picture;
     drop(progress);
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
         common.remark(format_args!(
@@ -138,11 +138,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         ));
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
-    write_png(output.path(), settings.size[0], settings.size[1], &picture.pixels)?;
+    write_png(output.path(), settings.size[0], settings.size[1], &pixels)?;
     let json = json!({
-        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1], "field": field.name, "range": [lo, hi], "iso": settings.iso,
-        "step": step, "samples": picture.samples, "skipped_samples": picture.skipped_samples, "found_samples": picture.found_samples,
-        "ranges_ms": picture.ranges_ms, "interval_ms": picture.interval_ms, "march_ms": picture.march_ms,
+        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1],
+        "field": field.name, "range": [lo, hi], "iso": settings.iso,
+        "step": step, "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
+        "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "seconds": seconds, "device": engine.name(),
     });
     let text = format!(
@@ -151,11 +152,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         field.name,
         settings.size[0],
         settings.size[1],
-        grouped(picture.samples),
-        grouped(picture.found_samples),
-        grouped(picture.skipped_samples),
-        milliseconds(picture.interval_ms),
-        milliseconds(picture.march_ms),
+        grouped(stats.samples),
+        grouped(stats.found_samples),
+        grouped(stats.skipped_samples),
+        milliseconds(stats.interval_ms),
+        milliseconds(stats.march_ms),
         engine.name(),
         in_blocks(&took)
     );

@@ -5,7 +5,7 @@ use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, recorded};
 use crate::capi::{OlbvhStatus, border, handle, put, tolerance};
 use crate::error::{Error, Result};
 use crate::query::{
-    LocateOptions, LocateOutput, OwnersMemory, Path, PointInput, PointOrder, cmd_count_owners, cmd_interpolate, cmd_list_owners,
+    LocateMethod, LocateOptions, LocateOutput, OwnersMemory, PointInput, PointOrder, cmd_count_owners, cmd_interpolate, cmd_list_owners,
     cmd_locate, cmd_sort_points,
 };
 
@@ -64,13 +64,13 @@ pub struct OlbvhOwnerParts {
 
 impl OlbvhLocation {
     fn options(&self) -> Result<LocateOptions> {
-        let path = match self.path {
-            0 => Path::Descent,
-            1 => Path::Runs,
-            2 => Path::Sorted,
+        let method = match self.path {
+            0 => LocateMethod::Descent,
+            1 => LocateMethod::Runs,
+            2 => LocateMethod::Sorted,
             other => return Err(Error::Invalid(format!("path {other} is not known"))),
         };
-        Ok(LocateOptions { tolerance: tolerance(self.tolerance), path })
+        Ok(LocateOptions { tolerance: tolerance(self.tolerance), method })
     }
 
     fn input(&self) -> Result<PointInput> {
@@ -94,7 +94,7 @@ pub extern "C" fn olbvh_location_parts(
 ) -> OlbvhStatus {
     border(|| {
         let (scene, location) = (handle(scene, "scene")?, handle(location, "location")?);
-        let sorted = location.options()?.path == Path::Sorted;
+        let sorted = location.options()?.method == LocateMethod::Sorted;
         let bytes = if sorted { location.memory.carve(|a| PointOrder::carve(&scene.gpu, a, location.count))?.0 } else { 0 };
         put(out, OlbvhLocationParts { bytes })
     })
@@ -110,7 +110,7 @@ pub extern "C" fn olbvh_cmd_locate(
     recorded(recording, |r| {
         let (OlbvhScene { gpu, scene, .. }, location) = (handle(scene, "scene")?, handle(location, "location")?);
         let (options, mut input) = (location.options()?, location.input()?);
-        if options.path == Path::Sorted {
+        if options.method == LocateMethod::Sorted {
             let order = location.memory.place(|a| PointOrder::carve(gpu, a, location.count))?;
             cmd_sort_points(r, scene.tree.grid, &input, &order)?;
             r.barrier("sort_points → locate");
@@ -151,7 +151,7 @@ pub extern "C" fn olbvh_cmd_owners(
 ) -> OlbvhStatus {
     recorded(recording, |r| {
         let (OlbvhScene { gpu, scene, .. }, location) = (handle(scene, "scene")?, handle(location, "location")?);
-        let input = PointInput { hints: None, ..location.input()? };
+        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input()?;
         let memory = memory.place(|a| OwnersMemory::carve(gpu, a, location.count))?;
         let options = LocateOptions { tolerance: tolerance(location.tolerance), ..LocateOptions::default() };
         cmd_count_owners(r, scene, &input, &memory, &options)?;

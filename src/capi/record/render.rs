@@ -7,7 +7,7 @@ use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::error::Result;
 use crate::primitives::Arena;
-use crate::query::{RenderInput, RenderMemory, Scene, Shown, StructureView, cmd_render};
+use crate::query::{RenderInput, RenderMemory, Scene, StructureView, Visibility, cmd_render};
 use crate::render::{Bounds, Plan};
 use std::mem::offset_of;
 
@@ -96,8 +96,8 @@ pub extern "C" fn olbvh_view_make(
         view.frame.iter_mut().zip(bytemuck::cast_slice(std::slice::from_ref(&frame))).for_each(|(to, word)| *to = *word);
         view.table.iter_mut().zip(&plan.table).for_each(|(to, entry)| *to = *entry);
         // Disjoint ranges take at least three entries of the table each, so there is room for all.
-        view.drawn.iter_mut().zip(&plan.drawn).for_each(|(to, range)| *to = *range);
-        view.drawn_count = plan.drawn.len() as u32;
+        view.drawn.iter_mut().zip(&plan.visible_values).for_each(|(to, range)| *to = *range);
+        view.drawn_count = plan.visible_values.len() as u32;
         put(out, view)
     })
 }
@@ -142,7 +142,7 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
     recorded(recording, |r| {
         let (scene, picture) = (&handle(scene, "scene")?.scene, handle(picture, "picture")?);
         let view = picture.view.holds(offset_of!(OlbvhView, drawn_count) as u64, "a view")?;
-        let drawn = view.part(offset_of!(OlbvhView, drawn) as u64, (512 * size_of::<[f32; 2]>()) as u64);
+        let values = view.part(offset_of!(OlbvhView, drawn) as u64, (512 * size_of::<[f32; 2]>()) as u64);
         let ranges = picture.ranges.optional(range_bytes(scene.tree.capacity.nodes), "ranges")?;
         let input = RenderInput {
             size: [picture.width, picture.height],
@@ -151,7 +151,7 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
             table: view.part(offset_of!(OlbvhView, table) as u64, (offset_of!(OlbvhView, drawn) - offset_of!(OlbvhView, table)) as u64),
             field: picture.field.read(scene)?,
             normals: picture.normals.optional(12 * u64::from(scene.mesh.input.points), "normals")?,
-            shown: ranges.map(|ranges| Shown { ranges, drawn, count: picture.drawn_count.min(512) }),
+            visibility: ranges.map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
             part: None,
         };
         let memory = picture.memory.place(picture.carve(scene))?;

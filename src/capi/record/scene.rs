@@ -68,7 +68,8 @@ pub struct OlbvhSceneArrays {
     pub addresses: [u32; 22],
     /// Buffers of the other bindings, in order.
     pub bindings: [OlbvhBuffer; 10],
-    /// What was built, in words: level of the leaves, level that was requested, candidates, entries, nodes, internal
+    /// What was built, in words: level of the leaves, level before the limits (by alpha or as requested; larger than
+    /// the level of the leaves where a capacity lowered it), candidates, entries, nodes, internal
     /// nodes, leaves, …
     pub status: OlbvhBuffer,
 }
@@ -163,13 +164,15 @@ pub extern "C" fn olbvh_scene_free(scene: *mut OlbvhScene) {
     release(scene);
 }
 
-/// Reports where the arrays of a scene are. `field`, a float per point, may be null.
+/// Reports where the arrays of a scene are. `field`, a float per point, may be null or of size 0: none.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const OlbvhBuffer, out: *mut OlbvhSceneArrays) -> OlbvhStatus {
     border(|| {
         let scene = &handle(scene, "scene")?.scene;
         // SAFETY: the caller passes null or a valid `OlbvhBuffer`.
-        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, unsafe { field.as_ref() }.map(OlbvhBuffer::part));
+        let field = unsafe { field.as_ref() }.copied().unwrap_or_default();
+        let field = field.optional(4 * u64::from(scene.mesh.input.points), "a field")?;
+        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field);
         let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
         put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status: scene.tree.status.into() })
     })

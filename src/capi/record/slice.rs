@@ -35,7 +35,7 @@ pub struct OlbvhSlicing {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhSlicingParts {
-    /// Size of the memory in bytes: 29 per voxel, and 32 per run of 64 voxels in the same column of a layer.
+    /// Size of the memory in bytes: 28 per voxel, and 32 per run of 64 voxels in the same column of a layer.
     pub bytes: u64,
     /// A word per voxel, row by row, as for `olbvh_slice`.
     pub answers: OlbvhBuffer,

@@ -5,7 +5,7 @@ use crate::capi::query::*;
 use crate::gpu::Buffer;
 use crate::mesh::Field;
 use crate::options::TOLERANCE;
-use crate::query::{LocateOptions, OverlapInput, locate, locate_all, overlap, render, slice};
+use crate::query::{LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
 use crate::render::{Bounds, Plan, Prepared};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
@@ -59,9 +59,9 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
         sliced.extend(band.values.iter().map(|v| v.to_bits()));
         Ok(())
     };
-    slice(&mesh, &tree, field, &voxels().read(), Extrapolate::Linear, &|_, _| {}, &mut sink).unwrap();
+    slice(&mesh, &tree, field, &voxels().read(), Extrapolate::Linear, SILENT, &mut sink).unwrap();
     let inputs = [OverlapInput { mesh: &mesh, tree: &tree }, OverlapInput { mesh: &other, tree: &other_tree }];
-    let [sets, pairs] = [false, true].map(|pairs| overlap(inputs[0], inputs[1], pairs, &|_, _| {}).unwrap().overlap);
+    let [sets, pairs] = [false, true].map(|pairs| overlap(inputs[0], inputs[1], pairs, SILENT).unwrap().overlap);
     let bits = |found: &[u32], mesh: &Mesh| {
         let mut words = vec![0; mesh.tets.len().div_ceil(32)];
         found.iter().for_each(|i| words[*i as usize / 32] |= 1 << (i % 32));
@@ -69,13 +69,13 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
     };
     let points = &meshes[0].points;
     Expected {
-        colors: render(&mesh, &tree, plan, (&values, On::Points), normals, &|_, _| {}).unwrap().colors,
+        colors: render(&mesh, &tree, plan, (&values, On::Points), normals, SILENT).unwrap().colors,
         answers,
         sliced,
         hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
         pairs: pairs.pairs.unwrap(),
-        owners: locate_all(&mesh, &tree, points, TOLERANCE, &|_, _| {}).unwrap(),
-        located: locate(&mesh, &tree, points, field, &LocateOptions::default(), &|_, _| {}).unwrap().values,
+        owners: locate_all(&mesh, &tree, points, TOLERANCE, SILENT).unwrap(),
+        located: locate(&mesh, &tree, points, field, &LocateOptions::default(), SILENT).unwrap().values,
     }
 }
 
@@ -203,7 +203,9 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         ok(olbvh_cmd_locate(recording, a.scene, &raw const location));
         ok(olbvh_cmd_barrier(recording));
         ok(olbvh_cmd_interpolate(recording, a.scene, &raw const location, &raw const field, interpolated.all().into()));
-        ok(olbvh_cmd_owners(recording, a.scene, &raw const location, owner_memory.all().into(), lists.all().into()));
+        // Hints are not used, whatever they are.
+        let odd = OlbvhLocation { hints: OlbvhBuffer { size: 1, ..NOTHING }, ..location };
+        ok(olbvh_cmd_owners(recording, a.scene, &raw const odd, owner_memory.all().into(), lists.all().into()));
         ok(olbvh_cmd_overlap(recording, a.scene, b.scene, overlap_memory.all().into(), four));
         ok(olbvh_cmd_count_pairs(recording, a.scene, b.scene, pair_memory.all().into(), eight));
         ok(olbvh_cmd_list_pairs(recording, a.scene, b.scene, pair_memory.all().into(), found.all().into(), eight));

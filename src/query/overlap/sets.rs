@@ -75,8 +75,6 @@ impl OverlapMemory {
 /// recorded rounds [`crate::layout::OverlapStatus::unfinished`] says how many tetrahedra are undecided; their bits are
 /// still zero. Recording again with [`Rounds::resume`] (same scenes, same memory) continues the search. Trees with
 /// [`crate::options::Lists::Boundary`] suffice.
-/// 0. Recording again with [`Rounds::resume`] (same scenes, same memory) continues the search. Trees with
-/// [`crate::options::Lists::Boundary`] suffice.
 ///
 /// Entry: meshes and trees are read by compute shaders. First use of `memory`: transfer writes. Last use: compute reads
 /// and writes. There is no barrier before or after, so the caller records one from compute shader writes to whatever

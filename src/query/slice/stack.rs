@@ -9,7 +9,7 @@ use crate::grid::CellRange;
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, StructureView, upload_field};
+use crate::query::{Built, Progress, Rounds, StructureView, upload_field};
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
 /// Voxels of one band, unless a single row has more.
@@ -131,7 +131,7 @@ pub fn slice(
     field: Option<(&[f32], On)>,
     voxels: &VoxelGrid,
     extrapolate: Extrapolate,
-    report: &dyn Fn(u64, u64),
+    report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<Sliced> {
     let mut slicing = Slicing::new(mesh, built, field, (voxels, extrapolate), None)?;

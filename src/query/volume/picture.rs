@@ -1,7 +1,7 @@
 //! Drawing of a whole picture by means of [`cmd_render`]: allocates memory, and submits one round at a time until every
 //! ray is done.
 
-use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Shown, cmd_render};
+use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu};
@@ -9,32 +9,19 @@ use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Built, Rounds, Structure, StructureView, upload_field};
-use crate::render::{Plan, TABLE_SIZE};
+use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, upload_field};
+use crate::render::{Plan, RenderStats, TABLE_SIZE};
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long.
 const STRIP: u32 = 1 << 20;
 
-/// A drawn picture, and what it cost.
+/// A finished picture, and what it cost; times are those of the device.
 #[derive(Clone, Debug, Default)]
-pub struct Drawn {
+pub struct Rendered {
     /// Premultiplied colour and opacity, row 0 on top.
     pub colors: Vec<[f32; 4]>,
-    /// Number of samples taken.
-    pub samples: u64,
-    /// Samples within the intervals that were skipped, since nothing is visible in their nodes.
-    pub skipped_samples: u64,
-    /// Number of samples taken that lie in the mesh.
-    pub found_samples: u64,
-    /// Device time in milliseconds of the field's ranges and of the marks of visible nodes, if some values are
-    /// transparent.
-    pub ranges_ms: f64,
-    /// Device time in milliseconds of the ray intervals.
-    pub interval_ms: f64,
-    /// Device time in milliseconds of the march.
-    pub march_ms: f64,
-    /// Number of submissions that the march took.
-    pub submissions: u32,
+    /// Numbers of samples, and times.
+    pub stats: RenderStats,
 }
 
 /// The rays of a picture in host memory, kept from one block of a mesh to the next.
@@ -69,7 +56,7 @@ pub(crate) struct Canvas<'a> {
     buffer: Buffer,
     /// Rows of a strip.
     rows: u32,
-    drawn: Drawn,
+    stats: RenderStats,
 }
 
 impl<'a> Canvas<'a> {
@@ -98,7 +85,7 @@ impl<'a> Canvas<'a> {
         let uniforms = [
             gpu.upload("olbvh.query.view", &[plan.view()])?,
             gpu.upload("olbvh.query.table", &plan.table)?,
-            gpu.upload("olbvh.query.drawn", &plan.drawn)?,
+            gpu.upload("olbvh.query.drawn", &plan.visible_values)?,
         ];
         let skipped = match &searched.structure {
             Structure::Octree(tree) if plan.hides(values) => Some(tree),
@@ -115,8 +102,8 @@ impl<'a> Canvas<'a> {
         }
         let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
         let (memory, ranges) = carve(&mut Arena::new(buffer.all()), rows)?;
-        let drawn = Drawn::default();
-        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, drawn };
+        let stats = RenderStats::default();
+        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, stats };
         canvas.gather_ranges()?;
         Ok(canvas)
     }
@@ -126,16 +113,16 @@ impl<'a> Canvas<'a> {
         if let (Structure::Octree(tree), Some(ranges)) = (&self.searched.structure, self.ranges) {
             let field = (self.field.0.all(), self.field.1);
             let ((), time) = self.gpu.submit("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
-            self.drawn.ranges_ms += time.milliseconds("build.ranges");
+            self.stats.ranges_ms += time.milliseconds("build.ranges");
         }
         Ok(())
     }
 
     /// Draws a picture of this size from the first row of the view, or a part of one. `report` receives the number of
     /// rays done and their total.
-    fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: &dyn Fn(u64, u64)) -> Result<()> {
-        let Self { gpu, searched, plan, memory, drawn, .. } = self;
-        let [view, table, shown] = self.uniforms.each_ref().map(Buffer::all);
+    fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: Progress<'_>) -> Result<()> {
+        let Self { gpu, searched, plan, memory, stats, .. } = self;
+        let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
         let input = RenderInput {
             size,
             view,
@@ -143,26 +130,26 @@ impl<'a> Canvas<'a> {
             table,
             field: (self.field.0.all(), self.field.1),
             normals: self.normals.as_ref().map(Buffer::all),
-            shown: self.ranges.map(|ranges| Shown { ranges, drawn: shown, count: plan.drawn.len() as u32 }),
+            visibility: self.ranges.map(|ranges| Visibility { ranges, values, count: plan.visible_values.len() as u32 }),
             part,
         };
         let ((), time) = gpu.submit("olbvh.query.intervals", |r| cmd_render(r, searched, &input, memory, Rounds::begin(0)))?;
-        drawn.ranges_ms += time.milliseconds("query.visible");
-        drawn.interval_ms += time.milliseconds("query.intervals");
+        stats.ranges_ms += time.milliseconds("query.visible");
+        stats.interval_ms += time.milliseconds("query.intervals");
         let rays = u64::from(size[0]) * u64::from(size[1]);
         let status = loop {
             let ((), time) = gpu.submit("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
-            drawn.march_ms += time.milliseconds("query.march");
-            drawn.submissions += 1;
+            stats.march_ms += time.milliseconds("query.march");
+            stats.submissions += 1;
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
             report(rays.saturating_sub(u64::from(status.unfinished)), rays);
             if status.unfinished == 0 {
                 break status;
             }
         };
-        drawn.samples += wide(status.samples);
-        drawn.skipped_samples += wide(status.skipped);
-        drawn.found_samples += wide(status.found);
+        stats.samples += wide(status.samples);
+        stats.skipped_samples += wide(status.skipped);
+        stats.found_samples += wide(status.found);
         Ok(())
     }
 
@@ -172,7 +159,7 @@ impl<'a> Canvas<'a> {
     /// # Errors
     /// A failed Vulkan call, or too little memory for transfers. `rays` then holds what is done; drawing the block
     /// again with these rays does not take the same samples again.
-    pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<Drawn> {
+    pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<RenderStats> {
         let [width, height] = self.plan.size;
         for row in (0..height).step_by(self.rows as usize) {
             let size = [width, self.rows.min(height - row)];
@@ -183,11 +170,11 @@ impl<'a> Canvas<'a> {
             let pixels = first[0]..first[0] + size[0] as usize * size[1] as usize;
             let items = first[1]..first[1] + super::rays(size)? as usize;
             let (colors, states) = (&mut rays.colors[pixels], &mut rays.states[items]);
-            self.draw_strip(size, RenderPart { cells, row }, colors, states, &|_, _| {})?;
+            self.draw_strip(size, RenderPart { cells, row }, colors, states, SILENT)?;
             let last = self.memory.rays.part(0, size_of_val(states) as u64);
             states.copy_from_slice(&self.gpu.download(&self.buffer, last)?);
         }
-        Ok(self.drawn)
+        Ok(self.stats)
     }
 
     /// Draws rows of the picture, with the colours gathered so far in `colors`, and the rays' states.
@@ -197,7 +184,7 @@ impl<'a> Canvas<'a> {
         part: RenderPart,
         colors: &mut [[f32; 4]],
         states: &[RayState],
-        report: &dyn Fn(u64, u64),
+        report: Progress<'_>,
     ) -> Result<()> {
         self.gpu.write(&mut self.buffer, self.memory.colors.offset, colors)?;
         self.gpu.write(&mut self.buffer, self.memory.rays.offset, states)?;
@@ -224,15 +211,15 @@ pub fn render(
     plan: &Plan,
     field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
-    report: &dyn Fn(u64, u64),
-) -> Result<Drawn> {
+    report: Progress<'_>,
+) -> Result<Rendered> {
     let [width, height] = plan.size;
     let rays = u64::from(width) * u64::from(height);
     let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(STRIP))?;
     if canvas.rows == height {
         canvas.draw(plan.size, None, report)?;
         let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;
-        return Ok(Drawn { colors, ..canvas.drawn });
+        return Ok(Rendered { colors, stats: canvas.stats });
     }
     super::rays(plan.size)?;
     let mut colors = vec![[0.0; 4]; rays as usize];
@@ -245,5 +232,5 @@ pub fn render(
         let part = RenderPart { cells: CellRange::WHOLE, row };
         canvas.draw_strip(size, part, colors, states, &|done, _| report(before + done, rays))?;
     }
-    Ok(Drawn { colors, ..canvas.drawn })
+    Ok(Rendered { colors, stats: canvas.stats })
 }

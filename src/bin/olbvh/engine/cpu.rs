@@ -1,14 +1,14 @@
 //! The engine that computes on the CPU with the reference implementation.
 
-use super::{Drawn, Engine, Located, Report, Sink, Summary};
+use super::{Engine, Picture, Report, Sink, Summary};
 use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query::{self, LocateOptions};
+use olbvh::query::{LocateMethod, LocateOptions, Located};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
-use olbvh::reference::locate::{self, Location, Locator, order_of};
+use olbvh::reference::locate::{self, Locator, order_of};
 use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
@@ -63,7 +63,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Located>> {
         on_host((asked.mesh, &asked.options), memory, |tree| Ok(tree.locate(asked.points, field, &asked.how, report)))
     }
 
@@ -88,11 +88,11 @@ impl Engine for Cpu {
         Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds })
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Picture>> {
         on_host((asked.mesh, &asked.options), memory, |tree| {
             let scene = Scene::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
-            let picture = volume::render(&scene, report);
-            Ok(Drawn { picture, range: scene.range(), step: scene.plan().step })
+            let volume::Picture { pixels, stats } = volume::render(&scene, report);
+            Ok(Picture { pixels, stats, range: scene.range(), step: scene.plan().step })
         })
     }
 
@@ -140,19 +140,22 @@ impl<'a> CpuTree<'a> {
         Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Vec<Located> {
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Located {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
-        let mut all = Vec::with_capacity(points.len());
+        let mut all = Located::default();
         // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
         for chunk in points.chunks(locate::CHUNK) {
-            let located = match options.path {
-                query::Path::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
-                query::Path::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
-                query::Path::Descent | query::Path::Traversal(_) => locator.locate_all(chunk),
+            let found = match options.method {
+                LocateMethod::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
+                LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
+                LocateMethod::Descent | LocateMethod::Traversal(_) => locator.locate_all(chunk),
             };
-            let value = |l: &Location| field.map_or(f32::NAN, |field| locator.value(field, l));
-            all.extend(located.iter().map(|l| Located { owner: l.owner, bary: l.barycentric, value: value(l) }));
-            report(all.len() as u64, points.len() as u64);
+            all.owners.extend(found.iter().map(|l| l.owner));
+            all.barycentrics.extend(found.iter().map(|l| l.barycentric));
+            if let Some(field) = field {
+                all.values.extend(found.iter().map(|l| locator.value(field, l)));
+            }
+            report(all.owners.len() as u64, points.len() as u64);
         }
         all
     }

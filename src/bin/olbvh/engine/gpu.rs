@@ -1,6 +1,6 @@
 //! The engine that computes on a Vulkan device.
 
-use super::{Drawn, Engine, Located, Report, Shapes, Sink, Summary};
+use super::{Engine, Picture, Report, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
 use olbvh::blocks::{self, InBlocks, Meshes, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -8,10 +8,9 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query;
+use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::overlap::Overlap;
-use olbvh::reference::volume::Picture;
 use std::path::PathBuf;
 
 /// An opened device, and the target of its kernels with its origin.
@@ -74,7 +73,7 @@ impl Engine for Device {
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
             bounds: tree.grid().into(),
             level: built.level,
-            wanted: options.level.unwrap_or(built.heuristic_level),
+            wanted: built.wanted_level,
             entries: u64::from(built.entries),
             nodes: u64::from(built.nodes),
             leaves: u64::from(built.leaves),
@@ -87,12 +86,9 @@ impl Engine for Device {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Vec<Located>>> {
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Located>> {
         let values = field.map(|f| (f.values.as_slice(), f.on));
-        let (answer, took) = blocks::locate(&self.0, self.memory(memory), asked, values, report)?.into_parts();
-        let value = |i: usize| answer.values.get(i).copied().unwrap_or(f32::NAN);
-        let located = answer.owners.iter().zip(&answer.barycentrics).enumerate();
-        Ok(took.with(located.map(|(i, (&owner, &bary))| Located { owner, bary, value: value(i) }).collect()))
+        blocks::locate(&self.0, self.memory(memory), asked, values, report)
     }
 
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
@@ -104,12 +100,9 @@ impl Engine for Device {
         Ok(took.with(found.overlap))
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Drawn>> {
-        let (blocks::Picture { drawn, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.into_parts();
-        let pixels = plan.pixels(&drawn.colors);
-        let query::Drawn { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, .. } = drawn;
-        let picture = Picture { pixels, samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms };
-        Ok(took.with(Drawn { picture, range, step: plan.step }))
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Picture>> {
+        let (blocks::Picture { rendered, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.into_parts();
+        Ok(took.with(Picture { pixels: plan.pixels(&rendered.colors), stats: rendered.stats, range, step: plan.step }))
     }
 
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
