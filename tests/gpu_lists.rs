@@ -275,3 +275,25 @@ fn long_lists_make_leaves_finer() {
     let level = |fineness| cube.tree(&gpu, &BuildOptions { fineness, ..alpha }).0.status().level;
     assert_eq!(Fineness::EVERY.map(level), [4, 4, 5]);
 }
+
+/// Some drivers end loops after 65,535 passes, so none may go on as long as cells are bad; and the level of a tree over
+/// nothing is 0, whatever is asked for.
+#[test]
+fn stretches_of_bad_cells() {
+    let gpu = gpu(Binding::Address);
+    let mut mesh = kuhn([4; 3]).unwrap();
+    let bad = || std::iter::repeat_n([0; 4], 70_000);
+    mesh.tets.splice(100..100, bad());
+    let subject = Subject::new(&gpu, "a stretch of bad cells", mesh);
+    for lists in Lists::EVERY {
+        subject.tree(&gpu, &options(0.0, Assign::Aabb, lists));
+    }
+    let nothing = Subject::new(&gpu, "bad cells", Mesh { tets: bad().take(10).collect(), ..kuhn([1; 3]).unwrap() });
+    for fineness in Fineness::EVERY {
+        for level in [None, Some(5)] {
+            let (tree, _) = nothing.tree(&gpu, &BuildOptions { fineness, level, ..BuildOptions::default() });
+            assert_eq!((tree.status().wanted_level, tree.status().level), (0, 0));
+        }
+    }
+    quiet(&gpu);
+}

@@ -16,7 +16,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("mesh", &["error"]),
     ("options", &["error"]),
     ("tree", &["grid", "layout", "options"]),
-    ("slicing", &["error", "grid", "layout"]),
+    ("slicing", &["error", "grid", "layout", "options"]),
     ("render", &["error", "grid", "layout", "mesh"]),
     ("reference", &["error", "grid", "layout", "mesh", "options", "render", "slicing", "tree"]),
     ("formats", &["error", "grid", "mesh"]),

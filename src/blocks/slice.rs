@@ -117,7 +117,7 @@ impl Job<'_> {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
             let need = if met { block.bytes(self.gpu, &self.source.options)? } else { 0 };
             let mut why = None;
-            if need <= self.memory {
+            if !met || need <= self.memory {
                 match if met { self.visit(&block, &mut all) } else { Ok(()) } {
                     Err(e) if e.is_lack_of_room() => why = Some(e),
                     Err(e) => return Err(e),

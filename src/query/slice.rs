@@ -141,7 +141,7 @@ pub fn cmd_slice(
         cmd_plan(r, searched, input, memory)?;
     }
     for round in 0..rounds.count {
-        let fresh = u32::from(round == 0 && !rounds.resume);
+        let fresh = round == 0 && !rounds.resume;
         r.fill(memory.status, 0);
         r.barrier("slice.clear → slice.locate");
         cmd_locate_voxels(r, searched, memory, input, fresh)?;
@@ -166,17 +166,17 @@ fn cmd_locate_voxels(
     r: &mut Recorder<'_>,
     searched: &StructureView,
     memory: &SliceMemory,
-    asked: &SliceInput<'_>,
-    begins: u32,
+    input: &SliceInput<'_>,
+    fresh: bool,
 ) -> Result<()> {
-    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let groups = Groups::Count(asked.runs().div_ceil(r.gpu().target().query));
-    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(asked.part.is_some()), searched.lists());
+    let (cells, arrays) = (searched.mesh.input.cells, &searched.mesh.arrays);
+    let groups = Groups::Count(input.runs().div_ceil(r.gpu().target().query));
+    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(input.part.is_some()), searched.lists());
     let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
-    let (buffer, field, on_cells) = of_field(r, asked);
+    let (buffer, field, on_cells) = of_field(r, input);
     r.stage("query.slice_locate", |r| {
         dispatch!(r, groups, searched, SliceLocate SliceLocateSpec {} { lists }, LbvhSliceLocate LbvhSliceLocateSpec, {
-            cells: input.cells,
+            cells: cells,
             vertices: arrays.vertices,
             neighbours: arrays.neighbours,
             plans: memory.plan,
@@ -185,7 +185,7 @@ fn cmd_locate_voxels(
             status: memory.status,
             field: buffer,
             values: memory.values,
-            fresh: begins,
+            fresh: u32::from(fresh),
         }, { run, walk, part, budget, tolerance, field, on_cells })
     })
 }
@@ -197,21 +197,21 @@ fn of_field(r: &Recorder<'_>, input: &SliceInput<'_>) -> (BufferRef, u32, u32) {
     (buffer, u32::from(input.field.is_some()), u32::from(on == On::Cells))
 }
 
-fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
-    let (input, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let (boundary, voxels) = (arrays.boundary, part.count());
+fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
+    let (cells, arrays) = (searched.mesh.input.cells, &searched.mesh.arrays);
+    let (boundary, voxels) = (arrays.boundary, input.count());
     let workgroup = r.gpu().target().query;
     r.stage("query.slice_touch", |r| {
         let SliceMemory { answers, status, plan: plans, runs, touches: states, .. } = *memory;
-        let ([width, height], rows) = (part.voxels.size, part.rows.count);
+        let ([width, height], rows) = (input.voxels.size, input.rows.count);
         let collect = SliceCollect { answers, status, plans, runs, states, width, height, rows };
         let spec = SliceCollectSpec { workgroup, run: VOXEL_RUN, ..Default::default() };
-        r.dispatch(&collect, spec, Groups::Count(part.runs().div_ceil(workgroup)))?;
+        r.dispatch(&collect, spec, Groups::Count(input.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");
         let listed = Count::device(voxels, plans.part(offset_of!(SlicePlan, listed) as u64, 16));
         let groups = listed.groups(r, workgroup, memory.groups, "slice.arguments → slice.touch")?;
         dispatch!(r, groups, searched, SliceTouch SliceTouchSpec { boundary } {}, LbvhSliceTouch LbvhSliceTouchSpec, {
-            cells: input.cells,
+            cells: cells,
             vertices: arrays.vertices,
             plans: plans,
             states: states,
@@ -222,9 +222,9 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &Sli
     })
 }
 
-fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, part: &SliceInput<'_>) -> Result<()> {
+fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
     let SliceMemory { answers, values, status, plan: plans, touches: states, groups, .. } = *memory;
-    let (buffer, field, on_cells) = of_field(r, part);
+    let (buffer, field, on_cells) = of_field(r, input);
     let arguments = SliceValues {
         grid: searched.mesh.arrays.grid,
         cells: searched.mesh.input.cells,
@@ -235,9 +235,9 @@ fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemo
         answers,
         values,
         status,
-        voxels: part.count(),
+        voxels: input.count(),
     };
-    let linear = u32::from(part.extrapolate == Extrapolate::Linear);
+    let linear = u32::from(input.extrapolate == Extrapolate::Linear);
     let spec = SliceValuesSpec { workgroup: r.gpu().target().query, on_cells, linear, field, ..Default::default() };
     // Uses the same number of workgroups as the test of the boxes.
     r.stage("query.slice_values", |r| r.dispatch(&arguments, spec, Groups::Indirect(groups)))

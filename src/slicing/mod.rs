@@ -19,9 +19,9 @@ pub mod settings;
 pub use settings::{Plane, SliceSettings};
 
 use crate::error::{Error, Result};
-use crate::grid::CellRange;
-use crate::grid::{canonical, two_to};
+use crate::grid::{CellRange, canonical, two_to};
 use crate::layout::{Grid, SlicePlan};
+use crate::options::named;
 use glam::DVec3;
 use std::ops::Range;
 
@@ -50,6 +50,8 @@ pub enum Extrapolate {
     /// `Nearest`.)
     Linear,
 }
+
+named!(Extrapolate, "extrapolation", [Nearest = "nearest", Linear = "linear"]);
 
 /// The positions of the voxels of a stack of layers.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -38,7 +38,7 @@ drawn fast.";
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// Output file, a .png stats. `-`: standard output, while the summary goes to standard error.
+    /// Output file, a .png picture. `-`: standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
     /// Name of the field to draw. Default: the first field of points, or else of cells; without any field, the height

@@ -1,6 +1,6 @@
 //! The subcommand `olbvh slice`.
 
-use crate::arguments::{range, vector};
+use crate::arguments::{named, range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
@@ -8,14 +8,14 @@ use crate::output::{self, Progress};
 use crate::slice_output::{Appearance, Layers, layer_file, materials};
 use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
-use olbvh::blocks::Stack;
+use olbvh::blocks::{InBlocks, Stack};
 use olbvh::formats::OutputFormat;
 use olbvh::mesh::{Field, On};
 use olbvh::options::Fineness;
 use olbvh::reference::boundary::valid_grid;
-use olbvh::render::Bounds;
 use olbvh::render::transfer::DEFAULT_MAP;
-use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally};
+use olbvh::render::{Bounds, TransferFunction};
+use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally, VoxelGrid};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -73,7 +73,7 @@ pub struct Args {
     field: Option<String>,
     /// Value of voxels that the mesh only touches. nearest: that at the closest point of the mesh. linear: the field of
     /// the closest cell, extrapolated to the centre of the voxel.
-    #[arg(long, default_value = "nearest", value_name = "nearest|linear", value_parser = extrapolate)]
+    #[arg(long, default_value = "nearest", value_name = "nearest|linear", value_parser = named::<Extrapolate>)]
     extrapolate: Extrapolate,
     /// Also write the cell id of each voxel: to NAME.owner.npy, or as an array of the .vti.
     #[arg(long)]
@@ -103,61 +103,16 @@ const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, Output
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let format = output::announce(&args.output, &FORMATS, &[&args.mesh])?;
-    if format == OutputFormat::Npy {
-        for beside in ["kind.npy", "owner.npy"] {
-            output::announce(&args.output.with_extension(beside), &FORMATS, &[&args.mesh])?;
-        }
-    }
-    for (given, option, formats, endings) in [
-        (args.owners, "--owners", &[OutputFormat::Npy, OutputFormat::Vti][..], ".npy and .vti"),
-        (args.tf.is_some(), "--tf", &[OutputFormat::Png], ".png"),
-        (args.range.is_some(), "--range", &[OutputFormat::Png, OutputFormat::Svx], ".png and .svx"),
-        (args.unit.is_some(), "--unit", &[OutputFormat::Svx], ".svx"),
-    ] {
-        if given && !formats.contains(&format) {
-            return Err(Failure::Usage(format!("{option} is for {endings} files")));
-        }
-    }
+    let format = args.format()?;
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
-    let Bounds { lo, hi } = (&valid_grid(mesh)).into();
-    let mut settings = SliceSettings {
-        plane: args.normal.map_or(Plane::Axis(args.axis), Plane::Normal),
-        at: args.at,
-        layers: args.layers.unwrap_or(1),
-        size: args.size,
-        thickness: args.thickness,
-        spacing: args.spacing,
-    };
-    if format == OutputFormat::Svx {
-        let whole = settings.cubes(lo, hi, mesh.origin, true)?;
-        settings = if args.layers.is_none() { whole } else { settings.cubes(lo, hi, mesh.origin, false)? };
-        if settings.layers < whole.layers {
-            common.remark(format_args!(
-                "{} of the {} layers that fill the mesh; without --layers, all are made",
-                settings.layers, whole.layers
-            ));
-        }
-    }
-    let voxels = settings.voxels(lo, hi, mesh.origin)?;
-    if voxels.voxels() > MOST_VOXELS {
-        let all = grouped(voxels.voxels());
-        return Err(Failure::Usage(format!("{all} voxels, more than the maximum of 2^40; take fewer --layers or a smaller --size")));
-    }
-    let range = args.range.or(colors.range()).or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
-    let materials = field.and_then(materials);
-    if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
-        common.remark(format_args!(
-            "{name} does not number materials from 1 to 255; the package has its values from {} to {}",
-            range[0], range[1]
-        ));
-    }
-    let look = Appearance { colors, range, unit: args.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials };
+    let bounds = Bounds::from(&valid_grid(mesh));
+    let voxels = args.voxels(format, &bounds, mesh.origin, common)?;
+    let look = args.look(format, colors, field, common);
     let placement = Placement::new(&voxels, mesh);
     let [width, height] = voxels.size;
     let mut layers = Layers::create(&args.output, format, ([width, height, voxels.layers], &placement), mesh, args.owners, look)?;
@@ -172,36 +127,125 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
-    let axis = args.normal.is_none().then(|| AXES[args.axis]);
     if tally.inside + tally.touched == 0 {
-        common.remark(placement.remark_on_emptiness(axis, &Bounds { lo, hi }, mesh));
+        common.remark(placement.remark_on_emptiness(args.axis_name(), &bounds, mesh));
     }
-    let file = |layer: u32| match format {
-        OutputFormat::Png => layer_file(&args.output, layer, voxels.layers).display().to_string(),
-        _ => args.output.display().to_string(),
-    };
-    let (first, last) = (file(0), file(voxels.layers - 1));
-    let shown = if first == last { first.clone() } else { format!("{first} to {last}") };
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
-    let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
-    let json = json!({
-        "file": first, "last_file": last, "layers": voxels.layers, "width": width, "height": height,
-        "origin": placement.origin, "spacing": placement.spacing, "axis": axis, "axes": placement.axes, "thickness": placement.thickness,
-        "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
-        "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": took.build_seconds * 1e3, "blocks": took.trees,
-        "peak_bytes": took.peak, "device": engine.name(),
-    });
-    let text = format!(
-        "{shown}: {} of {width}x{height} voxels; {} inside, {} touched, {} empty; {} on {}{}\n",
-        counted(voxels.layers.into(), "layer"),
-        grouped(tally.inside),
-        grouped(tally.touched),
-        grouped(tally.empty),
-        milliseconds(seconds * 1e3),
-        engine.name(),
-        in_blocks(&took)
-    );
-    output::summary(common, &json, &text)
+    let done = Done { format, voxels, placement, field, tally, took, seconds, device: engine.name() };
+    done.report(args, common)
+}
+
+impl Args {
+    /// The format of the output, to which all options apply.
+    fn format(&self) -> Outcome<OutputFormat> {
+        let format = output::announce(&self.output, &FORMATS, &[&self.mesh])?;
+        if format == OutputFormat::Npy {
+            for beside in ["kind.npy", "owner.npy"] {
+                output::announce(&self.output.with_extension(beside), &FORMATS, &[&self.mesh])?;
+            }
+        }
+        for (given, option, formats, endings) in [
+            (self.owners, "--owners", &[OutputFormat::Npy, OutputFormat::Vti][..], ".npy and .vti"),
+            (self.tf.is_some(), "--tf", &[OutputFormat::Png], ".png"),
+            (self.range.is_some(), "--range", &[OutputFormat::Png, OutputFormat::Svx], ".png and .svx"),
+            (self.unit.is_some(), "--unit", &[OutputFormat::Svx], ".svx"),
+        ] {
+            if given && !formats.contains(&format) {
+                return Err(Failure::Usage(format!("{option} is for {endings} files")));
+            }
+        }
+        Ok(format)
+    }
+
+    /// The stack of voxels over a mesh with these bounds. Those of a package are cubes.
+    fn voxels(&self, format: OutputFormat, &Bounds { lo, hi }: &Bounds, origin: [f64; 3], common: &Common) -> Outcome<VoxelGrid> {
+        let mut settings = SliceSettings {
+            plane: self.normal.map_or(Plane::Axis(self.axis), Plane::Normal),
+            at: self.at,
+            layers: self.layers.unwrap_or(1),
+            size: self.size,
+            thickness: self.thickness,
+            spacing: self.spacing,
+        };
+        if format == OutputFormat::Svx {
+            let whole = settings.cubes(lo, hi, origin, true)?;
+            settings = if self.layers.is_none() { whole } else { settings.cubes(lo, hi, origin, false)? };
+            if settings.layers < whole.layers {
+                common.remark(format_args!(
+                    "{} of the {} layers that fill the mesh; without --layers, all are made",
+                    settings.layers, whole.layers
+                ));
+            }
+        }
+        let voxels = settings.voxels(lo, hi, origin)?;
+        if voxels.voxels() > MOST_VOXELS {
+            let all = grouped(voxels.voxels());
+            return Err(Failure::Usage(format!("{all} voxels, more than the maximum of 2^40; take fewer --layers or a smaller --size")));
+        }
+        Ok(voxels)
+    }
+
+    /// How values of a field are shown.
+    fn look(&self, format: OutputFormat, colors: TransferFunction, field: Option<&Field>, common: &Common) -> Appearance {
+        let range = self.range.or(colors.range()).or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
+        let materials = field.and_then(materials);
+        if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
+            common.remark(format_args!(
+                "{name} does not number materials from 1 to 255; the package has its values from {} to {}",
+                range[0], range[1]
+            ));
+        }
+        Appearance { colors, range, unit: self.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials }
+    }
+
+    /// Name of the axis perpendicular to the layers; `None` on an oblique plane.
+    fn axis_name(&self) -> Option<&'static str> {
+        self.normal.is_none().then(|| AXES[self.axis])
+    }
+}
+
+/// A stack that was sliced.
+struct Done<'a> {
+    format: OutputFormat,
+    voxels: VoxelGrid,
+    placement: Placement,
+    field: Option<&'a Field>,
+    tally: Tally,
+    took: InBlocks,
+    seconds: f64,
+    device: String,
+}
+
+impl Done<'_> {
+    /// Prints the summary.
+    fn report(&self, args: &Args, common: &Common) -> Outcome {
+        let Self { voxels, placement, field, tally, took, seconds, device, .. } = self;
+        let file = |layer: u32| match self.format {
+            OutputFormat::Png => layer_file(&args.output, layer, voxels.layers).display().to_string(),
+            _ => args.output.display().to_string(),
+        };
+        let (first, last) = (file(0), file(voxels.layers - 1));
+        let shown = if first == last { first.clone() } else { format!("{first} to {last}") };
+        let [width, height] = voxels.size;
+        let on = field.map(|f| if f.on == On::Points { "points" } else { "cells" });
+        let json = json!({
+            "file": first, "last_file": last, "layers": voxels.layers, "width": width, "height": height,
+            "origin": placement.origin, "spacing": placement.spacing, "axis": args.axis_name(), "axes": placement.axes,
+            "thickness": placement.thickness, "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
+            "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": took.build_seconds * 1e3, "blocks": took.trees,
+            "peak_bytes": took.peak, "device": device,
+        });
+        let text = format!(
+            "{shown}: {} of {width}x{height} voxels; {} inside, {} touched, {} empty; {} on {device}{}\n",
+            counted(voxels.layers.into(), "layer"),
+            grouped(tally.inside),
+            grouped(tally.touched),
+            grouped(tally.empty),
+            milliseconds(seconds * 1e3),
+            in_blocks(took)
+        );
+        output::summary(common, &json, &text)
+    }
 }
 
 /// Names of the axes.
@@ -209,14 +253,6 @@ const AXES: [&str; 3] = ["x", "y", "z"];
 
 fn axis(text: &str) -> Result<usize, String> {
     AXES.iter().position(|a| a.eq_ignore_ascii_case(text)).ok_or_else(|| "an axis is x, y or z".into())
-}
-
-fn extrapolate(text: &str) -> Result<Extrapolate, String> {
-    match text {
-        "nearest" => Ok(Extrapolate::Nearest),
-        "linear" => Ok(Extrapolate::Linear),
-        _ => Err("nearest or linear".into()),
-    }
 }
 
 /// Parses `WxH`, or `W` for square voxels.
