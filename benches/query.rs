@@ -12,7 +12,7 @@ use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, TOLERANCE};
 use olbvh::query::{self, LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene};
 use olbvh::reference::boundary::topology;
-use olbvh::render::{Bounds, Prepared, RenderSettings};
+use olbvh::render::{Bounds, Prepared, RenderSettings, ValidTets};
 use std::time::Duration;
 use submit::submit;
 
@@ -83,7 +83,8 @@ fn rendering(c: &mut Criterion) {
     let bounds = Bounds { lo: [0.0; 3], hi: [CELLS as f32; 3] };
     let settings = RenderSettings { size: [256, 256], ..RenderSettings::default() };
     let field = &mesh.fields[0];
-    let prepared = Prepared::new(&settings, &mesh, &bounds, &topology.neighbours, |_| true, field).expect("a plan");
+    let valid = ValidTets { bounds, neighbours: &topology.neighbours, is_valid: &|_| true };
+    let prepared = Prepared::new(&settings, &mesh, &valid, field).expect("a plan");
     let draw = || {
         query::render(&on_device, &tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), SILENT).expect("a picture")
     };

@@ -9,7 +9,7 @@ use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
 use olbvh::query::{self, Built, LocateOptions, OverlapInput, Rendered, SILENT};
 use olbvh::reference::boundary::NONE;
-use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction};
+use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction, ValidTets};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh, and both structures over it.
@@ -138,8 +138,8 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
 fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Rendered> {
     let bounds = Bounds::from(b.device.grid());
     let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
-    let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
-    let prepared = Prepared::new(settings, &b.mesh, &bounds, &neighbours, valid, field).ok()?;
+    let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|t| bad.binary_search(&t).is_err() };
+    let prepared = Prepared::new(settings, &b.mesh, &valid, field).ok()?;
     let normals = settings.shading.then_some(&prepared.normals[..]);
     let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, SILENT).unwrap();
     let (expected, drawn) = (draw(&b.tree), draw(&b.lbvh));

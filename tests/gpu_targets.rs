@@ -10,7 +10,7 @@ use olbvh::kernels::{Row, Target};
 use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{self, LocateOptions, OverlapInput, SILENT};
-use olbvh::render::{Bounds, Prepared, RenderSettings};
+use olbvh::render::{Bounds, Prepared, RenderSettings, ValidTets};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
 
@@ -30,8 +30,8 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let build = |lists| Tree::build(gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
     let (all, boundary) = (build(Lists::All), build(Lists::Boundary));
-    let grid = device.grid();
-    let [lo, hi] = [grid.lo, grid.hi].map(|c| [c[0], c[1], c[2]]);
+    let bounds = Bounds::from(device.grid());
+    let Bounds { lo, hi } = bounds;
     let at = |i: u32, step: u32, c: usize| lo[c] + (hi[c] - lo[c]) * (i * step % 1009) as f32 / 1009.0;
     let points: Vec<[f32; 3]> = (0..3000).map(|i| [at(i, 1, 0), at(i, 313, 1), at(i, 71, 2)]).collect();
     let locate = |tree| query::locate(&device, tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
@@ -41,7 +41,8 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let field = &mesh.fields[0];
     let settings = RenderSettings { size: [40, 32], ..RenderSettings::default() };
     let neighbours = device.neighbours().unwrap();
-    let prepared = Prepared::new(&settings, mesh, &Bounds { lo, hi }, &neighbours, |_| true, field).unwrap();
+    let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
+    let prepared = Prepared::new(&settings, mesh, &valid, field).unwrap();
     let values = (field.values.as_slice(), On::Points);
     let drawn = query::render(&device, &boundary, &prepared.plan, values, Some(&prepared.normals), SILENT).unwrap();
     assert!(drawn.stats.found_samples > 0);

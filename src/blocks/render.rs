@@ -12,7 +12,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Plan, Prepared, RenderSettings, RenderStats};
+use crate::render::{Plan, Prepared, RenderSettings, RenderStats, ValidTets};
 use rayon::prelude::*;
 use std::slice::from_ref;
 
@@ -65,7 +65,8 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) ->
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
     // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
-    let prepared = Prepared::new(settings, mesh, &(&source.grid).into(), &neighbours, |t| source.is_valid(t as u32), field)?;
+    let valid = ValidTets { bounds: (&source.grid).into(), neighbours: &neighbours, is_valid: &|t| source.is_valid(t) };
+    let prepared = Prepared::new(settings, mesh, &valid, field)?;
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
     let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, stats: RenderStats::default(), took };
@@ -89,9 +90,10 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) ->
 fn render_whole(placed: &Placed, asked: &View<'_>, report: Progress<'_>) -> Result<Picture> {
     let (Placed { mesh, tree, .. }, View { field, settings, .. }) = (placed, asked);
     let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
-    let valid = |t: usize| bad.binary_search(&(t as u32)).is_err();
     let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
-    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &tree.grid().into(), &neighbours, valid, field)?;
+    let is_valid = |t| bad.binary_search(&t).is_err();
+    let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
+    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &valid, field)?;
     drop(neighbours);
     let normals = (!normals.is_empty()).then_some(normals.as_slice());
     let rendered = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;

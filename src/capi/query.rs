@@ -6,7 +6,7 @@ use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh};
 use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
-use crate::render::{Prepared, RenderSettings, TransferFunction};
+use crate::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
@@ -208,8 +208,9 @@ pub extern "C" fn olbvh_render(
         let field = Field { name: "values".into(), on, values };
         let device = &mesh.device;
         let (neighbours, bad) = (device.neighbours()?, device.bad_cells()?);
-        let valid = |tet: usize| bad.binary_search(&(tet as u32)).is_err();
-        let prepared = Prepared::new(&settings, &mesh.download()?, &tree.grid().into(), &neighbours, valid, &field)?;
+        let is_valid = |tet| bad.binary_search(&tet).is_err();
+        let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
+        let prepared = Prepared::new(&settings, &mesh.download()?, &valid, &field)?;
         let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
         pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())

@@ -118,8 +118,8 @@ impl Content {
         }
         let repeated = self.elements.repeated();
         if repeated > 0 {
-            let message = "repeated cells: their volume belongs to several physical groups, so all of them count as boundary; save the file as version 4.1";
-            assembly.warnings.push(format!("{repeated} {message}"));
+            let why = "their volume belongs to several physical groups, so all of them count as boundary";
+            assembly.warnings.push(format!("{repeated} repeated cells: {why}; save the file as version 4.1"));
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });

@@ -21,7 +21,7 @@ use super::ranges::{ranges, visible};
 use crate::error::{Error, Result};
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
-use crate::render::{Bounds, Plan, Prepared, RenderSettings, RenderStats};
+use crate::render::{Plan, Prepared, RenderSettings, RenderStats, ValidTets};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -66,9 +66,9 @@ impl<'a> Scene<'a> {
                 "field `{name}` has {n} values where the mesh needs {expected}, or the topology is not the mesh's"
             )));
         }
-        let bounds = Bounds::from(&tree.grid);
-        let valid = |tet: usize| topology.is_valid(tet as u32);
-        let prepared = Prepared::new(settings, mesh, &bounds, &topology.neighbours, valid, field)?;
+        let is_valid = |tet| topology.is_valid(tet);
+        let valid = ValidTets { bounds: (&tree.grid).into(), neighbours: &topology.neighbours, is_valid: &is_valid };
+        let prepared = Prepared::new(settings, mesh, &valid, field)?;
         let start = Instant::now();
         let visible =
             prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.visible_values));

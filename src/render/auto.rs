@@ -1,5 +1,6 @@
 //! Automatic opacity, for fields without an opacity given.
 
+use super::{OPACITY_UNIT, ValidTets};
 use crate::mesh::{Field, Mesh, On};
 use glam::DVec3;
 
@@ -17,33 +18,23 @@ const MOST: f64 = 0.85;
 /// Opacity points for a field over `range`, derived from the distribution of its values over the mesh's volume. Common
 /// values become faint, so that rare ones show through them, and high values count somewhat more than low ones. The
 /// opacities are scaled so that about a quarter of the light passes an average ray, whose length is the mean chord of
-/// the mesh (four times volume over surface). `unit` is the length that opacities refer to; `neighbours` and `valid`
-/// are as for [`shading_normals`](super::shading_normals).
-pub fn auto_opacity(
-    mesh: &Mesh,
-    neighbours: &[[u32; 4]],
-    valid: impl Fn(usize) -> bool,
-    field: &Field,
-    range: [f32; 2],
-    unit: f64,
-) -> Vec<(f32, f32)> {
+/// the mesh (four times volume over surface).
+pub fn auto_opacity(mesh: &Mesh, valid: &ValidTets<'_>, field: &Field, range: [f32; 2]) -> Vec<(f32, f32)> {
+    let unit = valid.bounds.diagonal() * OPACITY_UNIT;
     let (lo, span) = (f64::from(range[0]), f64::from(range[1]) - f64::from(range[0]));
     let mut bins = [0.0f64; BINS];
     let (mut volume, mut surface) = (0.0, 0.0);
-    for (tet, (ids, across)) in mesh.tets.iter().zip(neighbours).enumerate() {
-        if !valid(tet) {
-            continue;
-        }
-        let p = ids.map(|id| DVec3::from_array(mesh.points[id as usize].map(f64::from)) / unit);
+    for (tet, ids) in valid.of(mesh) {
+        let p = ids.map(|id| DVec3::from_array(mesh.points[id].map(f64::from)) / unit);
         let v = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]).abs() / 6.0;
         volume += v;
-        for (face, &next) in [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)].into_iter().zip(across) {
-            if next == u32::MAX {
+        for (i, face) in [(1, 2, 3), (0, 2, 3), (0, 1, 3), (0, 1, 2)].into_iter().enumerate() {
+            if valid.is_outside(tet, i) {
                 surface += (p[face.1] - p[face.0]).cross(p[face.2] - p[face.0]).length() / 2.0;
             }
         }
         let value = |i: usize| field.values.get(i).map_or(f64::NAN, |&v| (f64::from(v) - lo) / span);
-        let values = if field.on == On::Points { ids.map(|id| value(id as usize)) } else { [value(tet); 4] };
+        let values = if field.on == On::Points { ids.map(value) } else { [value(tet); 4] };
         if values.iter().all(|v| (0.0..=1.0).contains(v)) {
             // The volume of the tetrahedron is spread evenly over the bins from the smallest to the largest value.
             let bin = |v: f64| ((v * BINS as f64) as usize).min(BINS - 1);

@@ -31,6 +31,7 @@ pub mod shading;
 mod stats;
 mod step;
 pub mod transfer;
+mod valid;
 mod visible_values;
 
 pub use auto::auto_opacity;
@@ -41,6 +42,7 @@ pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
 pub use stats::RenderStats;
 pub use step::{SuitedStep, suited_step};
 pub use transfer::TransferFunction;
+pub use valid::ValidTets;
 
 /// `1/√x` of a normal positive `x`, computed by correctly rounded multiplications and subtractions alone, so that every
 /// device gets the same bits. The relative error is below 2^-22. Twin of the function in the shading kernel.

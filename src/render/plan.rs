@@ -3,7 +3,9 @@
 
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::visible_values::visible_values;
-use super::{Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, auto_opacity, gradient_normals, shading_normals};
+use super::{
+    Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, ValidTets, auto_opacity, gradient_normals, shading_normals,
+};
 use crate::error::{Error, Result};
 use crate::grid::{canonical, two_to};
 use crate::layout::{Grid, RenderView};
@@ -77,7 +79,8 @@ impl Plan {
         let reach = camera.reach(settings.size, bounds);
         if reach > step * f64::from(MAX_SAMPLES) {
             return Err(Error::Invalid(format!(
-                "rays that reach the mesh after {:.0} steps of {step}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a smaller angle or a step of {} or more",
+                "rays that reach the mesh after {:.0} steps of {step}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a \
+                 smaller angle or a step of {} or more",
                 reach / step,
                 reach / f64::from(MAX_SAMPLES)
             )));
@@ -96,7 +99,9 @@ impl Plan {
             let a = if opaque { 1.0 } else { a };
             [r, g, b, (1.0 - (1.0 - f64::from(a)).powf(exponent)) as f32]
         };
-        let (value_lo, value_scale) = (range[0] as f32, (1.0 / (range[1] - range[0])) as f32);
+        // Not denormal, as devices may flush it: ranges beyond 2^126 end early.
+        let value_scale = (1.0 / (range[1] - range[0])).max(f64::from(f32::MIN_POSITIVE)) as f32;
+        let value_lo = range[0] as f32;
         let table: Vec<_> = (0..TABLE_SIZE).map(entry).collect();
         Ok(Self {
             size: settings.size,
@@ -203,59 +208,48 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Prepares everything needed to draw `field` on `mesh`. `neighbours` has four entries per tetrahedron,
-    /// [`u32::MAX`] if the face opposite to that vertex is on the surface. `valid` says which tetrahedra count, and
-    /// `bounds` are the bounds of these.
+    /// Prepares everything needed to draw `field` on `mesh`.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn new(
-        settings: &RenderSettings,
-        mesh: &Mesh,
-        bounds: &Bounds,
-        neighbours: &[[u32; 4]],
-        valid: impl Fn(usize) -> bool,
-        field: &Field,
-    ) -> Result<Self> {
-        let own = || used_range(mesh, &valid, field);
+    pub fn new(settings: &RenderSettings, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Result<Self> {
+        let own = || used_range(mesh, valid, field);
         let range = settings.range.or(settings.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
         let mut settings = RenderSettings { range: Some(range), ..settings.clone() };
         settings.check()?;
         if !settings.iso.is_empty() && field.on == On::Cells {
             return Err(Error::Invalid(format!(
-                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or an opacity that shows some values only",
+                "iso-surfaces of `{}`, a field of cells, which jumps from cell to cell; take a field of points, or an opacity that \
+                 shows some values only",
                 field.name
             )));
         }
         if settings.iso.is_empty() && !settings.transfer.has_opacity() {
-            let unit = bounds.diagonal() * OPACITY_UNIT;
-            settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, neighbours, &valid, field, range, unit))?;
+            settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, valid, field, range))?;
         }
         let mut used = vec![false; mesh.points.len()];
-        for (_, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
-            for &id in ids {
-                used[id as usize] = true;
-            }
+        for id in valid.of(mesh).flat_map(|(_, ids)| ids) {
+            used[id] = true;
         }
         let points = mesh.points.iter().zip(used).filter(|(_, used)| *used);
         let points: Vec<DVec3> = points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect();
         let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
-        let camera = settings.camera.resolve_around(bounds, &points, mesh.origin, aspect)?;
-        let plan = Plan::with_camera(&settings, &camera, bounds, None)?;
+        let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
+        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, None)?;
         let normals = match (settings.shading, settings.iso.is_empty()) {
             (false, _) => Vec::new(),
-            (true, true) => shading_normals(mesh, neighbours, &valid, field, range, bounds),
-            (true, false) => gradient_normals(mesh, &valid, field, bounds),
+            (true, true) => shading_normals(mesh, valid, field, range),
+            (true, false) => gradient_normals(mesh, valid, field),
         };
         Ok(Self { plan, camera, normals, range })
     }
 }
 
 /// The smallest and the largest finite value in valid tetrahedra.
-fn used_range(mesh: &Mesh, valid: &impl Fn(usize) -> bool, field: &Field) -> Option<[f32; 2]> {
+fn used_range(mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Option<[f32; 2]> {
     let mut range: Option<[f32; 2]> = None;
-    for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
-        let ids = if field.on == On::Points { ids.map(|id| id as usize) } else { [tet; 4] };
+    for (tet, ids) in valid.of(mesh) {
+        let ids = if field.on == On::Points { ids } else { [tet; 4] };
         for v in ids.into_iter().filter_map(|i| field.values.get(i).copied()).filter(|v| v.is_finite()) {
             range = Some(range.map_or([v, v], |[lo, hi]| [lo.min(v), hi.max(v)]));
         }

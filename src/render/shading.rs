@@ -5,7 +5,7 @@
 //! like any field, these normals light the surface and the fronts inside the mesh, and leave even regions alone.
 
 use crate::mesh::{Field, Mesh, On};
-use crate::render::{Bounds, inverse_sqrt};
+use crate::render::{ValidTets, inverse_sqrt};
 use glam::{DVec3, Vec3};
 
 /// Part of the light that comes from all directions.
@@ -84,45 +84,29 @@ fn dot(a: [f32; 3], b: [f32; 3]) -> f32 {
     (a[0] * b[0] + a[1] * b[1]) + a[2] * b[2]
 }
 
-/// A normal per vertex of the mesh, for shading. `neighbours` has four entries per tetrahedron, [`u32::MAX`] if the
-/// face opposite to that vertex is on the surface. `valid` says which tetrahedra count. A field with values per
-/// tetrahedron has no gradient, so only the surface is lit.
-pub fn shading_normals(
-    mesh: &Mesh,
-    neighbours: &[[u32; 4]],
-    valid: impl Fn(usize) -> bool,
-    field: &Field,
-    range: [f32; 2],
-    bounds: &Bounds,
-) -> Vec<[f32; 3]> {
+/// A normal per vertex of the mesh, for shading. A field with values per tetrahedron has no gradient, so only the
+/// surface is lit.
+pub fn shading_normals(mesh: &Mesh, valid: &ValidTets<'_>, field: &Field, range: [f32; 2]) -> Vec<[f32; 3]> {
     let span = f64::from(range[1]) - f64::from(range[0]);
     let steep = if span > 0.0 { STEEP / span } else { 0.0 };
-    normals(mesh, |tet, face| neighbours.get(tet).is_some_and(|across| across[face] == u32::MAX), valid, field, steep, bounds)
+    normals(mesh, valid, |tet, i| valid.is_outside(tet, i), field, steep)
 }
 
 /// A normal of length 1 per vertex, for iso-surfaces: the gradient of the field, also on the surface of the mesh; 0
 /// where there is none.
-pub fn gradient_normals(mesh: &Mesh, valid: impl Fn(usize) -> bool, field: &Field, bounds: &Bounds) -> Vec<[f32; 3]> {
-    normals(mesh, |_, _| false, valid, field, f64::INFINITY, bounds)
+pub fn gradient_normals(mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Vec<[f32; 3]> {
+    normals(mesh, valid, |_, _| false, field, f64::INFINITY)
 }
 
 /// Normals of the surface (the faces that `is_outside`); elsewhere the gradient (change of value per diagonal) times
 /// `steep`, at most 1 long, or of length 1 if `steep` is infinite.
-fn normals(
-    mesh: &Mesh,
-    is_outside: impl Fn(usize, usize) -> bool,
-    valid: impl Fn(usize) -> bool,
-    field: &Field,
-    steep: f64,
-    bounds: &Bounds,
-) -> Vec<[f32; 3]> {
-    let length = bounds.diagonal();
+fn normals(mesh: &Mesh, valid: &ValidTets<'_>, is_outside: impl Fn(usize, usize) -> bool, field: &Field, steep: f64) -> Vec<[f32; 3]> {
+    let length = valid.bounds.diagonal();
     let has_gradient = steep > 0.0 && field.on == On::Points && field.values.len() == mesh.points.len();
     // For each vertex: normal times area, volume of the tetrahedra below, area.
     let mut surface = vec![(DVec3::ZERO, 0.0, 0.0); mesh.points.len()];
     let mut inside = vec![(DVec3::ZERO, 0.0); mesh.points.len()];
-    for (tet, ids) in mesh.tets.iter().enumerate().filter(|&(tet, _)| valid(tet)) {
-        let ids = ids.map(|id| id as usize);
+    for (tet, ids) in valid.of(mesh) {
         // Lengths are in diagonals, so that no product overflows for meshes of any size.
         let p = ids.map(|id| DVec3::from_array(mesh.points[id].map(f64::from)) / length);
         let volume = (p[1] - p[0]).cross(p[2] - p[0]).dot(p[3] - p[0]);
@@ -170,15 +154,17 @@ fn normals(
 mod tests {
     use super::*;
     use crate::mesh::kuhn;
+    use crate::render::Bounds;
 
     #[test]
     fn normals_of_a_corner_tetrahedron_point_outwards() {
         let mut mesh = Mesh::new(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], vec![[0, 1, 2, 3]]);
         mesh.fields.push(Field { name: "x".into(), on: On::Points, values: vec![0.0, 1.0, 0.0, 0.0] });
         let bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
+        let valid = ValidTets { bounds, neighbours: &[[u32::MAX; 4]], is_valid: &|_| true };
         for ids in [[0, 1, 2, 3], [1, 0, 2, 3]] {
             mesh.tets = vec![ids];
-            let normals = shading_normals(&mesh, &[[u32::MAX; 4]], |_| true, &mesh.fields[0], [0.0, 1.0], &bounds);
+            let normals = shading_normals(&mesh, &valid, &mesh.fields[0], [0.0, 1.0]);
             let s = normals[0][0];
             assert!(s < 0.0 && normals[0].iter().all(|v| (v - s).abs() < 1e-5), "{normals:?}");
             assert!(normals[1][0] > 0.0 && normals[2][1] > 0.0 && normals[3][2] > 0.0);
@@ -193,7 +179,8 @@ mod tests {
             mesh.fields[0].values = mesh.points.iter().map(|p| p[1] / scale).collect();
             let bounds = Bounds { lo: [0.0; 3], hi: [2.0 * scale; 3] };
             // Without a surface every vertex has the gradient.
-            let normals = shading_normals(&mesh, &vec![[0; 4]; mesh.tets.len()], |_| true, &mesh.fields[0], [0.0, 2.0], &bounds);
+            let valid = ValidTets { bounds, neighbours: &vec![[0; 4]; mesh.tets.len()], is_valid: &|_| true };
+            let normals = shading_normals(&mesh, &valid, &mesh.fields[0], [0.0, 2.0]);
             let expected = STEEP as f32 * 12f32.sqrt() / 2.0;
             assert!(normals.iter().all(|n| (n[1] - expected).abs() < 1e-4 && n[0].abs() < 1e-5), "{scale}: {:?} {expected}", normals[13]);
         }

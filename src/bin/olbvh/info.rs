@@ -7,8 +7,9 @@ use crate::output;
 use crate::text::{Page, bytes, grouped, joined, milliseconds};
 use olbvh::formats::{Fate, Loaded};
 use olbvh::grid::MAX_LEVEL;
-use olbvh::mesh::{Mesh, On};
+use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Fineness, Lists};
+use olbvh::reference::boundary::Fault;
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -17,14 +18,14 @@ use std::path::PathBuf;
 #[command(after_help = "\
 Examples:
   olbvh info bracket.vtu
-  olbvh info bracket.vtu --alpha 1 --assign planes
+  olbvh info bracket.vtu --alpha 1 --assign exact
   olbvh info bracket.vtu --budget 2MiB
   olbvh info bracket.vtu --level 6            leaves of level 6
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
 Bad cells are left out of the tree: those with a vertex that does not exist or occurs twice, or with a coordinate that is not finite or has a \
-magnitude of 2^125 (4.3e37) or more. Boundary cells have a face on the surface or no volume, or overlap a neighbour. Negative cells have their vertices \
-in the other order, which does no harm where cells do not overlap.")]
+magnitude of 2^125 (4.3e37) or more. Boundary cells have a face on the surface or no volume, or overlap a neighbour, or lie at a crowded point \
+(where more than 128 cells may meet). Negative cells have their vertices in the other order, which does no harm where cells do not overlap.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
@@ -51,9 +52,9 @@ fn bounds(mesh: &Mesh, summary: &Summary) -> [[f64; 3]; 2] {
 }
 
 fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value {
-    let mesh = &loaded.mesh;
+    let (mesh, tree) = (&loaded.mesh, &args.tree);
     let [lo, hi] = bounds(mesh, s);
-    let field = |f: &olbvh::mesh::Field| {
+    let field = |f: &Field| {
         let on = if f.on == On::Points { "points" } else { "cells" };
         json!({ "name": f.name, "on": on, "min": f.range().map(|r| r[0]), "max": f.range().map(|r| r[1]) })
     };
@@ -81,22 +82,36 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "topology_ms": s.topology_ms,
         "neighbour_bytes": s.neighbour_bytes,
         "tree": {
-            "l": s.level, "l_wanted": s.wanted, "alpha": args.tree.level.is_none().then_some(args.tree.alpha), "level": args.tree.level, "assign": args.tree.assign.name(), "lists": args.tree.lists.name(), "budget": args.tree.budget, "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves,
-            "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
+            "l": s.level, "l_wanted": s.wanted, "alpha": tree.level.is_none().then_some(tree.alpha), "level": tree.level,
+            "assign": tree.assign.name(), "lists": tree.lists.name(), "budget": tree.budget,
+            "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves, "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
         },
     });
     if args.bad_cells {
-        let entry =
-            |(tet, fault): &(u32, olbvh::reference::boundary::Fault)| json!({ "cell": mesh.cell_id(*tet), "reason": fault.to_string() });
+        let entry = |(tet, fault): &(u32, Fault)| json!({ "cell": mesh.cell_id(*tet), "reason": fault.to_string() });
         all["bad_cell_list"] = s.bad.iter().map(entry).collect();
     }
     all
 }
 
 fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
-    let (mesh, report) = (&loaded.mesh, &loaded.report);
     let mut page = Page::default();
+    add_mesh(&mut page, args, loaded, s);
+    add_fields(&mut page, &loaded.mesh);
+    add_tree(&mut page, args, device, s);
+    add_memory(&mut page, s);
+    if verbose {
+        add_stages(&mut page, shapes, s);
+    }
+    if args.bad_cells && !s.bad.is_empty() {
+        add_bad_cells(&mut page, &loaded.mesh, s);
+    }
+    page
+}
+
+fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, s: &Summary) {
+    let Loaded { mesh, report } = loaded;
     page.section(&format!("Mesh {}", args.mesh.display()));
     page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
     page.row("points", grouped(mesh.points.len() as u64));
@@ -125,11 +140,17 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     let [lo, hi] = bounds(mesh, s);
     page.row("bounds", format_args!("({}) to ({})", joined(&lo, ", "), joined(&hi, ", ")));
     page.row("extent", joined(&[0, 1, 2].map(|c| s.bounds.hi[c] - s.bounds.lo[c]), " × "));
+}
+
+fn add_fields(page: &mut Page, mesh: &Mesh) {
     page.section(if mesh.fields.is_empty() { "No fields" } else { "Fields" });
     for f in &mesh.fields {
         let range = f.range().map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
         page.row(&f.name, format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
     }
+}
+
+fn add_tree(page: &mut Page, args: &Args, device: &str, s: &Summary) {
     page.section(&format!(
         "Tree ({}, {}, lists {}{}), built in {} on {device}",
         args.tree.level.map_or_else(|| format!("alpha {}", args.tree.alpha), |level| format!("level {level}")),
@@ -147,6 +168,10 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
     let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.wants_finer(each) && s.wanted == s.level && finer <= MAX_LEVEL;
     let hint = if hint { format!("; pictures are drawn faster with --level {finer}") } else { String::new() };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
+}
+
+/// Adds the arrays of the tree and the neighbours.
+fn add_memory(page: &mut Page, s: &Summary) {
     for (name, n) in s.memory.arrays() {
         let what = match name {
             "P" => "primitive ids",
@@ -167,19 +192,21 @@ fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded,
         "neighbours, boundary",
         format_args!("found in {}; neighbours take {neighbours} besides the tree", milliseconds(s.topology_ms)),
     );
-    if verbose {
-        if let Some(shapes) = shapes {
-            page.row("kernels", shapes);
-        }
-        for (name, ms) in &s.stages {
-            page.row(format_args!("  {name}"), milliseconds(*ms));
-        }
+}
+
+/// Adds the target of the kernels and the time of each stage.
+fn add_stages(page: &mut Page, shapes: Option<&Shapes>, s: &Summary) {
+    if let Some(shapes) = shapes {
+        page.row("kernels", shapes);
     }
-    if args.bad_cells && !s.bad.is_empty() {
-        page.section("Bad cells");
-        for (tet, fault) in &s.bad {
-            page.row(format_args!("cell {}", mesh.cell_id(*tet)), fault);
-        }
+    for (name, ms) in &s.stages {
+        page.row(format_args!("  {name}"), milliseconds(*ms));
     }
-    page
+}
+
+fn add_bad_cells(page: &mut Page, mesh: &Mesh, s: &Summary) {
+    page.section("Bad cells");
+    for (tet, fault) in &s.bad {
+        page.row(format_args!("cell {}", mesh.cell_id(*tet)), fault);
+    }
 }

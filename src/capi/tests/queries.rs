@@ -6,7 +6,7 @@ use crate::gpu::Buffer;
 use crate::mesh::Field;
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
-use crate::render::{Bounds, Plan, Prepared};
+use crate::render::{Bounds, Plan, Prepared, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
 
@@ -267,7 +267,8 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         let bounds = Bounds::from(gpu.tree.grid());
         let (neighbours, field) =
             (gpu.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
-        Prepared::new(&settings.read().unwrap(), &mesh, &bounds, &neighbours, |_| true, &field).unwrap().plan
+        let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
+        Prepared::new(&settings.read().unwrap(), &mesh, &valid, &field).unwrap().plan
     };
     let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
         let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
