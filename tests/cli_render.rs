@@ -54,6 +54,23 @@ fn render_writes_a_picture_and_its_figures() {
     assert_eq!(names, ["a.png"], "nothing else is left");
 }
 
+/// Two tetrahedra with points of their own and a common face.
+#[test]
+fn points_that_coincide_are_merged_on_demand() {
+    let folder = TempDir::new().unwrap();
+    let points = "0 0 0 1 0 0 0 1 0 0 0 1 1 0 0 0 1 0 0 0 1 1 1 1";
+    let cells = "CELLS 2 10 4 0 1 2 3 4 4 5 6 7 CELL_TYPES 2 10 10";
+    let file = format!("# vtk DataFile Version 3.0\ntwo\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 float {points}\n{cells}\n");
+    std::fs::write(folder.path().join("two.vtk"), file).unwrap();
+    let info = ["info", "two.vtk", "--device", "cpu"];
+    assert!(text(&olbvh(folder.path(), &info).stderr).contains("--merge all"));
+    for (merge, points) in [("nothing", 8), ("pieces", 8), ("all", 5)] {
+        assert_eq!(json(folder.path(), &[&info[..], &["--merge", merge]].concat())["points"], points);
+    }
+    let message = fails(folder.path(), 2, &[&info[..], &["--merge", "some"]].concat());
+    assert!(message.contains("known are nothing, pieces, all"), "{message}");
+}
+
 #[test]
 fn render_takes_every_setting() {
     let folder = TempDir::new().unwrap();

@@ -124,6 +124,9 @@ fn tables_of_points() {
         "1.0,\t2.5,\t-3\n4,\t5,\t6e3\n",
         "x,y,z\n1,2.5,-3\n4,5,6e3\n,,\n , ,\n",
         "x;y;z\n1;2.5;-3\n4;5;6e3\n;;\n",
+        ",,,,\n1,2.5,-3\n4,5,6e3\n",
+        "x,y,z\n1 2.5 -3\n4 5 6e3\n",
+        "x,y,z,name\n1,2.5,-3,a;b\n4,5,6e3,c;d\n",
     ] {
         std::fs::write(&path, text).unwrap();
         assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
@@ -150,6 +153,24 @@ fn tables_of_points() {
         assert!(error.contains(place), "{text}: {error}");
     }
     assert!(matches!(load_points(folder.path().join("none.csv")), Err(Error::Io { .. })));
+}
+
+/// Tables are read in parts of a mebibyte.
+#[test]
+fn large_tables_of_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("p.csv");
+    let wanted: Vec<_> = (0..200_000).map(f64::from).map(|i| [i, 0.5 * i, -i]).collect();
+    let lines: Vec<String> = wanted.iter().map(|p| format!("{},{},{}", p[0], p[1], p[2])).collect();
+    for end in ["\n", "\r\n"] {
+        let text = lines.join(end);
+        assert!(text.len() > 3 << 20);
+        std::fs::write(&path, &text).unwrap();
+        assert_eq!(load_points(&path).unwrap(), wanted);
+        std::fs::write(&path, format!("{text}{end}1,2{end}{text}{end}1,two,3")).unwrap();
+        let error = load_points(&path).unwrap_err().to_string();
+        assert!(error.contains("line 200001: 2 columns instead of 3"), "{error}");
+    }
 }
 
 #[test]

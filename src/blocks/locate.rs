@@ -2,7 +2,7 @@
 
 use super::cut::{Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, LEAST, Refused, check_field, pieces, smaller, unless_too_large};
+use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
@@ -100,15 +100,11 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: A
             continue;
         }
         let need = block.bytes(gpu, &source.options)?;
-        let mut why = None;
-        if need <= memory {
-            let placed = job.took.build(|| block.place(gpu, &source));
-            match placed.and_then(|placed| job.ask(&placed, &ids)) {
-                Err(e) if e.is_lack_of_room() => why = Some(e),
-                Err(e) => return Err(e),
-                Ok(()) => continue,
-            }
-        }
+        let tried = try_block(need, memory, || {
+            let placed = job.took.build(|| block.place(gpu, &source))?;
+            job.ask(&placed, &ids)
+        })?;
+        let Tried::TooLarge(why) = tried else { continue };
         let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
             let beside = PER_POINT * FEW.min(ids.len()) as u64;
             let refused = Refused { gpu, sources: from_ref(&source), beside, may: ANYWHERE };

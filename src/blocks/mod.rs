@@ -95,6 +95,24 @@ fn unless_too_large<T>(answer: Result<T>) -> Result<Option<T>> {
     }
 }
 
+/// How the work on a block ended.
+enum Tried {
+    Done,
+    /// The block does not fit; if it was tried, the reason.
+    TooLarge(Option<Error>),
+}
+
+/// Does the work on a block that takes about `need` bytes, if there are as many.
+fn try_block(need: u64, memory: u64, work: impl FnOnce() -> Result<()>) -> Result<Tried> {
+    if need > memory {
+        return Ok(Tried::TooLarge(None));
+    }
+    match work() {
+        Err(e) if e.is_lack_of_room() => Ok(Tried::TooLarge(Some(e))),
+        done => done.map(|()| Tried::Done),
+    }
+}
+
 /// A block of this many tetrahedra or fewer is not cut again.
 const LEAST: usize = 1024;
 

@@ -4,7 +4,7 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, smaller, unless_too_large};
+use super::{ANYWHERE, InBlocks, Refused, Tried, smaller, try_block, unless_too_large};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
@@ -89,19 +89,15 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
         for (node, source) in nodes.iter().zip(&sources) {
             need = need.saturating_add(node.block.bytes(gpu, &source.options)?);
         }
-        let mut why = None;
-        if need <= memory {
-            match visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took) {
-                Err(e) if e.is_lack_of_room() => why = Some(e),
-                Err(e) => return Err(e),
-                Ok(found) => {
-                    merge(&mut all, found);
-                    done += share;
-                    report((done * 1e6) as u64, 1_000_000);
-                    continue;
-                }
-            }
-        }
+        let tried = try_block(need, memory, || {
+            merge(&mut all, visit(gpu, &sources, &nodes, &mut placed, pairs, &mut took)?);
+            Ok(())
+        })?;
+        let Tried::TooLarge(why) = tried else {
+            done += share;
+            report((done * 1e6) as u64, 1_000_000);
+            continue;
+        };
         let larger = usize::from(nodes[1].tets() > nodes[0].tets());
         let cut = [larger, 1 - larger].into_iter().find_map(|side| Some((side, nodes[side].halves(&sources[side])?)));
         let Some((side, halves)) = cut else {

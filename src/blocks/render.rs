@@ -4,7 +4,7 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{InBlocks, Refused, check_field, pieces, smaller, unless_too_large};
+use super::{InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
@@ -120,13 +120,7 @@ impl Job<'_> {
             return Ok(None);
         }
         let need = block.bytes(self.gpu, &self.source.options)?;
-        let mut why = None;
-        if need <= self.memory {
-            match self.draw(block, &met, rays) {
-                Err(e) if e.is_lack_of_room() => why = Some(e),
-                other => return other.map(|()| None),
-            }
-        }
+        let Tried::TooLarge(why) = try_block(need, self.memory, || self.draw(block, &met, rays))? else { return Ok(None) };
         let order = |axis: usize, last: u32| low_first(&self.prepared.plan, &self.source.grid, axis, last);
         let may = |axis: usize, last: u32| order(axis, last).is_some();
         let Some([low, high]) = smaller(self.source, block, pieces(need, self.memory), &may) else {

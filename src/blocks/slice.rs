@@ -5,7 +5,7 @@
 
 use super::cut::{Block, Placed, Source};
 use super::size::least_bytes;
-use super::{ANYWHERE, InBlocks, Refused, check_field, pieces, smaller, unless_too_large};
+use super::{ANYWHERE, InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
@@ -115,20 +115,14 @@ impl Job<'_> {
         log::debug!("slice: {} rows from row {row} of layer {layer} on, after {begun} voxels", rows.count);
         while let Some((block, share)) = waiting.pop() {
             let met = block.bounds(self.source).is_some_and(|bounds| voxels.meets(rows, bounds, &self.source.grid));
-            let need = if met { block.bytes(self.gpu, &self.source.options)? } else { 0 };
-            let mut why = None;
-            if !met || need <= self.memory {
-                match if met { self.visit(&block, &mut all) } else { Ok(()) } {
-                    Err(e) if e.is_lack_of_room() => why = Some(e),
-                    Err(e) => return Err(e),
-                    Ok(()) => {
-                        self.done += share;
-                        (self.report)(self.done as u64, voxels.voxels());
-                        self.blocks.push(block);
-                        continue;
-                    }
-                }
-            }
+            let need = block.bytes(self.gpu, &self.source.options)?;
+            let tried = if met { try_block(need, self.memory, || self.visit(&block, &mut all))? } else { Tried::Done };
+            let Tried::TooLarge(why) = tried else {
+                self.done += share;
+                (self.report)(self.done as u64, voxels.voxels());
+                self.blocks.push(block);
+                continue;
+            };
             let Some([low, high]) = smaller(self.source, &block, pieces(need, self.memory), ANYWHERE) else {
                 let beside = RESERVE + PER_ROW_VOXEL * u64::from(voxels.size[0]);
                 let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: ANYWHERE };

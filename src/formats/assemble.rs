@@ -201,7 +201,7 @@ impl<'a> Assembly<'a> {
         let mut points = self.convert(&used, origin)?;
         let n_used = used.iter().filter(|&&u| u).count() as u64;
         if n_used == self.n_corners && self.ids.first() != self.ids.last() {
-            let remedy = "merge them, for example with the filter Clean to Grid of ParaView";
+            let remedy = "--merge all (Merge::All) makes coinciding points one";
             self.warnings.push(format!("each cell has points of its own, so every face counts as boundary and queries are slow; {remedy}"));
         }
         self.remove_replaced(&mut points);

@@ -267,6 +267,7 @@ impl Reader<'_> {
         }
         Ok(())
     }
+
     /// Reads the parent and the partitions of a part of an entity; returns the number of the parent if it is a volume.
     fn parent(&mut self) -> Result<Option<i64>> {
         let [dimension, tag] = [self.int("the dimension of a parent entity")?, self.int("the number of a parent entity")?];

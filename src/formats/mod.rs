@@ -47,6 +47,7 @@ use std::time::Instant;
 
 use crate::error::Result;
 use crate::mesh::Mesh;
+use crate::options::named;
 use detect::Format;
 pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
@@ -86,6 +87,8 @@ pub enum Merge {
     /// coincide, close as well.
     All,
 }
+
+named!(Merge, "kind of merging", [Nothing = "nothing", Pieces = "pieces", All = "all"]);
 
 /// A mesh and the report about its file.
 #[derive(Clone, Debug)]

@@ -1,6 +1,8 @@
 //! Readers for points to locate: NumPy arrays and text tables.
 
+use rayon::prelude::*;
 use std::io::Read;
+use std::ops::Range;
 use std::path::Path;
 
 use super::detect::ending;
@@ -9,10 +11,10 @@ use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
-/// point per line and columns separated by commas, semicolons, tabs or spaces. Fields may be in quotation marks, and where
-/// commas do not separate columns they may be decimal marks. The first line of a table may name the columns: if it names
-/// `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines that start with `#` are
-/// comments. A table without points is valid, even an empty file.
+/// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may be
+/// in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table may
+/// name the columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines
+/// that start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
@@ -43,61 +45,102 @@ fn points(source: &Source) -> Result<Vec<[f64; 3]>> {
     table(source)
 }
 
+/// How the lines of a table hold points.
+struct Columns {
+    /// The bytes that separate columns.
+    separator: &'static [u8],
+    /// Number of columns.
+    width: usize,
+    /// The columns of x, y and z.
+    at: [usize; 3],
+}
+
 fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
-    let mut points = Vec::new();
-    let mut columns: Option<[usize; 3]> = None;
-    let mut width = 0;
     let mut lines = Tokens::new(source, 0..source.bytes.len(), None);
-    while let Some((line, at)) = lines.line() {
-        let line = line.trim_ascii();
-        if line.is_empty() || line.starts_with(b"#") {
-            continue;
-        }
-        let fields = split(line);
-        // Spreadsheets leave rows of separators behind.
-        if fields.iter().all(|field| field.is_empty()) {
-            continue;
-        }
-        let Some(columns) = columns else {
-            width = fields.len();
-            let numbers = fields.iter().filter(|f| number(f).is_some()).count();
-            let named = if numbers == width { None } else { named(&fields) };
-            let chosen = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
-                let message = format!("{width} columns; there must be three, or a first line that names x, y and z among them");
-                source.error_line(at, message)
-            })?;
-            columns = Some(chosen);
-            // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing
-            // error, not a header.
-            if named.is_none() && numbers > 0 {
-                points.push(point(source, at, &fields, chosen)?);
-            }
-            continue;
-        };
-        if fields.len() != width {
-            return Err(source.error_line(at, format!("{} columns instead of {width}", fields.len())));
-        }
-        points.push(point(source, at, &fields, columns)?);
+    let Some(columns) = columns(source, &mut lines)? else { return Ok(Vec::new()) };
+    let parts: Vec<_> = parts(source, lines.at..source.bytes.len()).collect();
+    let read = |part: Range<usize>| columns.points(source, Tokens::new(source, part, None));
+    let points: Vec<Result<Vec<_>>> = parts.into_par_iter().map(read).collect();
+    Ok(points.into_iter().collect::<Result<Vec<_>>>()?.concat())
+}
+
+/// Parts of a text that end at the ends of lines.
+fn parts(source: &Source, range: Range<usize>) -> impl Iterator<Item = Range<usize>> {
+    const BYTES: usize = 1 << 20;
+    let mut start = range.start;
+    std::iter::from_fn(move || {
+        let rest = source.bytes.get(start..range.end).filter(|rest| !rest.is_empty())?;
+        let line_end = rest.iter().skip(BYTES).position(|&b| b == b'\n');
+        let part = start..line_end.map_or(range.end, |at| start + BYTES + at + 1);
+        start = part.end;
+        Some(part)
+    })
+}
+
+/// The next line that holds something. Spreadsheets leave lines of separators behind.
+fn next_line<'a>(lines: &mut Tokens<'a>) -> Option<(&'a [u8], usize)> {
+    let holds = |line: &[u8]| !line.starts_with(b"#") && line.iter().any(|b| !b";,".contains(b) && !b.is_ascii_whitespace());
+    std::iter::from_fn(|| lines.line()).map(|(line, at)| (line.trim_ascii(), at)).find(|(line, _)| holds(line))
+}
+
+/// Finds the columns by the first lines, and leaves the lines of the points; `None` if there are none.
+fn columns(source: &Source, lines: &mut Tokens<'_>) -> Result<Option<Columns>> {
+    let mut first = lines.clone();
+    let Some((line, at)) = next_line(&mut first) else { return Ok(None) };
+    let separator = separator(line, None);
+    let names: Vec<_> = fields(line, separator).collect();
+    let (width, numbers) = (names.len(), names.iter().filter(|name| number(name).is_some()).count());
+    let named = if numbers == width { None } else { named(&names) };
+    let at = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
+        source.error_line(at, format!("{width} columns; there must be three, or a first line that names x, y and z among them"))
+    })?;
+    // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing error, not a
+    // header.
+    if named.is_none() && numbers > 0 {
+        return Ok(Some(Columns { separator, width, at }));
     }
-    Ok(points)
+    *lines = first.clone();
+    Ok(next_line(&mut first).map(|(line, _)| Columns { separator: self::separator(line, Some(separator)), width, at }))
+}
+
+impl Columns {
+    /// The points of some lines.
+    fn points(&self, source: &Source, mut lines: Tokens<'_>) -> Result<Vec<[f64; 3]>> {
+        let mut points = Vec::new();
+        let mut found = Vec::with_capacity(self.width);
+        while let Some((line, at)) = next_line(&mut lines) {
+            found.clear();
+            found.extend(fields(line, self.separator));
+            if found.len() != self.width {
+                return Err(source.error_line(at, format!("{} columns instead of {}", found.len(), self.width)));
+            }
+            let mut point = [0.0; 3];
+            for (x, column) in point.iter_mut().zip(self.at) {
+                let field = found[column];
+                *x = number(field).ok_or_else(|| source.error_line(at, format!("`{}` is not a number", printable(field))))?;
+            }
+            points.push(point);
+        }
+        Ok(points)
+    }
 }
 
 /// The bytes that may separate columns, the most certain first: a comma may also be a decimal mark, and a space may be
 /// part of a name.
 const SEPARATORS: [&[u8]; 4] = [b";", b"\t", b",", b" \t\x0b\x0c"];
 
-/// The fields of a line, by the first separator that makes all of them numbers, or else by the first one that the line
-/// contains.
-fn split(line: &[u8]) -> Vec<&[u8]> {
-    let mut found = SEPARATORS.iter().map(|separator| fields(line, separator)).filter(|fields| fields.len() > 1).peekable();
-    let first = found.peek().cloned().unwrap_or_else(|| fields(line, b""));
-    found.find(|fields| fields.iter().all(|field| number(field).is_some())).unwrap_or(first)
+/// What separates the fields of a line: the first separator that makes all of them numbers, or else that of the names,
+/// or else the first one that the line contains.
+fn separator(line: &[u8], of_names: Option<&'static [u8]>) -> &'static [u8] {
+    let mut found = SEPARATORS.into_iter().filter(|separator| fields(line, separator).nth(1).is_some());
+    let first = of_names.or_else(|| found.clone().next()).unwrap_or(b"");
+    found.find(|separator| fields(line, separator).all(|field| number(field).is_some())).unwrap_or(first)
 }
 
 /// The fields between separators outside quotation marks. Only commas and semicolons enclose empty fields.
-fn fields<'l>(line: &'l [u8], separator: &[u8]) -> Vec<&'l [u8]> {
+fn fields<'l>(line: &'l [u8], separator: &'static [u8]) -> impl Iterator<Item = &'l [u8]> {
     let mut quoted = false;
-    let ends = |b: &u8| {
+    let ends = move |b: &u8| {
         quoted ^= *b == b'"';
         !quoted && separator.contains(b)
     };
@@ -106,7 +149,7 @@ fn fields<'l>(line: &'l [u8], separator: &[u8]) -> Vec<&'l [u8]> {
         field.strip_prefix(b"\"").and_then(|f| f.strip_suffix(b"\"")).unwrap_or(field).trim_ascii()
     };
     let keep_empty = !separator.contains(&b'\t');
-    line.split(ends).map(unquoted).filter(|field| keep_empty || !field.is_empty()).collect()
+    line.split(ends).map(unquoted).filter(move |field| keep_empty || !field.is_empty())
 }
 
 /// Parses a number, whose decimal mark may be a comma between two digits.
@@ -128,14 +171,4 @@ fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
     };
     // The last two sets of names are those of different ParaView versions.
     [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]].into_iter().find_map(find)
-}
-
-fn point(source: &Source, at: usize, fields: &[&[u8]], columns: [usize; 3]) -> Result<[f64; 3]> {
-    let mut point = [0.0; 3];
-    for (x, column) in point.iter_mut().zip(columns) {
-        let field = fields.get(column).copied().unwrap_or_default();
-        let value = number(field);
-        *x = value.ok_or_else(|| source.error_line(at, format!("`{}` is not a number", printable(field))))?;
-    }
-    Ok(point)
 }

@@ -4,6 +4,7 @@
 use super::buffer_ref::BufferRef;
 use super::constants::Constants;
 use super::foundation::Foundation;
+use super::heap::Heap;
 use super::ledger::Ledger;
 use super::pipelines::Pipelines;
 use super::pool::Pool;
@@ -13,9 +14,8 @@ use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
 use crate::kernels::{ALL, Row, Target};
 use ash::vk;
-use gpu_allocator::vulkan::{Allocator, AllocatorCreateDesc};
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::Arc;
 
 /// How kernels receive their buffers.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
@@ -64,30 +64,15 @@ enum Keep {
 }
 
 struct Inner {
+    // Memory and allocator are declared before `foundation`, so that they are freed before the device is destroyed.
+    constants: Constants,
+    heap: Arc<Heap>,
     foundation: Foundation,
-    // An option, so that it can be dropped before the device.
-    allocator: Option<Arc<Mutex<Allocator>>>,
     pipelines: Pipelines,
     binding: Binding,
     limits: vk::PhysicalDeviceLimits,
     debug_device: Option<ash::ext::debug_utils::Device>,
     acceleration: Option<Acceleration>,
-    constants: Constants,
-}
-
-/// Makes an allocator owned by this crate.
-fn make_allocator(foundation: &Foundation) -> Result<Arc<Mutex<Allocator>>> {
-    let made = Allocator::new(&AllocatorCreateDesc {
-        instance: foundation.instance.clone(),
-        device: foundation.device.clone(),
-        physical_device: foundation.physical,
-        debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
-        buffer_device_address: foundation.report.requirements.buffer_addresses,
-        // Small blocks, since every block counts in full against the device's memory.
-        allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 4 << 20),
-    });
-    let made = made.map_err(|e| Error::Memory { name: "olbvh.allocator".into(), bytes: 0, reason: e.to_string() })?;
-    Ok(Arc::new(Mutex::new(made)))
 }
 
 impl Gpu {
@@ -127,22 +112,13 @@ impl Gpu {
         }
         let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
         target.check(&report.room)?;
-        let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(&foundation), Ok)?;
+        let debug_device = foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device));
+        let heap = Heap::new(&foundation)?;
+        let constants = Constants::new(&heap, debug_device.as_ref())?;
         let pipelines = Pipelines::new(&foundation, options.pipeline_cache.clone())?;
         let traced = requirements.ray_tracing;
-        let mut inner = Inner {
-            allocator: Some(allocator),
-            pipelines,
-            binding,
-            limits,
-            debug_device: foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device)),
-            acceleration: traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines)),
-            constants: Constants::default(),
-            foundation,
-        };
-        if let Some(allocator) = &inner.allocator {
-            inner.constants.make(&inner.foundation, allocator, inner.debug_device.as_ref())?;
-        }
+        let acceleration = traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines));
+        let inner = Inner { constants, heap, pipelines, binding, limits, debug_device, acceleration, foundation };
         let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), memory: Keep::Freely };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
@@ -204,7 +180,7 @@ impl Gpu {
     /// not hold for the new one.
     #[must_use]
     pub fn with_pool(&self, bytes: u64) -> Self {
-        let pool = Pool::new(self.device().clone(), self.allocator().clone(), bytes);
+        let pool = Pool::new(bytes);
         Self { memory: Keep::Pooled(Arc::new(pool)), ..self.clone() }
     }
 
@@ -244,9 +220,8 @@ impl Gpu {
         &self.inner.limits
     }
 
-    /// The device's memory allocator.
-    pub(crate) fn allocator(&self) -> &Arc<Mutex<Allocator>> {
-        self.inner.allocator.as_ref().unwrap_or_else(|| unreachable!("the allocator is taken in drop only"))
+    pub(super) fn heap(&self) -> &Arc<Heap> {
+        &self.inner.heap
     }
 
     /// A report of the memory that the device's allocator holds, be it the host's or this crate's.
@@ -254,7 +229,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::Invalid`] if a panic has left its lock poisoned.
     pub fn allocated(&self) -> Result<gpu_allocator::AllocatorReport> {
-        Ok(self.allocator().lock().map_err(|_| Error::Invalid("the allocator's lock is poisoned".into()))?.generate_report())
+        Ok(self.heap().allocator.lock().map_err(|_| Error::Invalid("the allocator's lock is poisoned".into()))?.generate_report())
     }
 
     /// The logical device.
@@ -287,10 +262,6 @@ impl Gpu {
     pub(crate) fn requires_subgroup_size(&self) -> bool {
         let requirements = &self.report().requirements;
         requirements.subgroup_size_control && requirements.sizes_vary()
-    }
-
-    pub(crate) fn has_addresses(&self) -> bool {
-        self.inner.foundation.report.requirements.buffer_addresses
     }
 
     /// Functions for acceleration structures and rays, if the device supports ray tracing.
@@ -348,9 +319,6 @@ impl Drop for Inner {
                 let _ = device.device_wait_idle();
             }
             self.pipelines.destroy(&self.foundation);
-        }
-        if let Some(allocator) = self.allocator.take() {
-            self.constants.free(device, &allocator);
         }
     }
 }

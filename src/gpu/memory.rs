@@ -1,83 +1,24 @@
-//! Buffers, with memory from gpu-allocator.
+//! Buffers of a device handle, which counts or keeps their memory.
 
 use super::buffer_ref::{BufferRef, USAGE};
 use super::context::Gpu;
-use super::pool::{Kind, Memory, Pool};
-use super::{debug, failed};
+use super::debug;
+use super::heap::{Kind, Memory};
+use super::pool::Pool;
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator};
-use std::sync::Mutex;
+use gpu_allocator::vulkan::Allocation;
 
 /// Offsets of arrays within a buffer are multiples of this, which is enough for every device's storage-buffer offsets
 /// and for 16-byte loads.
 pub const ALIGNMENT: u64 = 256;
 
-/// Addresses of buffers are multiples of this even if the device requires less: kernels load 16 bytes in one access.
-const LEAST_ALIGNMENT: u64 = 16;
-
-/// Makes a buffer of `size` bytes in fresh memory, with an address if the device has `addresses`. `claim` receives the
-/// bytes that it takes.
-pub(super) fn allocate(
-    device: &ash::Device,
-    allocator: &Mutex<Allocator>,
-    addresses: bool,
-    name: &str,
-    kind: Kind,
-    size: u64,
-    claim: &mut dyn FnMut(u64) -> Result<()>,
-) -> Result<Memory> {
-    let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
-    let address = if addresses { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
-    let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage | address);
-    // SAFETY: plain creation; on the error path below the handle is destroyed.
-    let handle = unsafe { device.create_buffer(&info, None) }.map_err(|e| memory_error(format!("vkCreateBuffer: {e:?}")))?;
-    let mut memory = Memory { kind, size, handle, allocation: None, address: 0 };
-    match bind(device, allocator, addresses, name, &mut memory, claim) {
-        Ok(()) => Ok(memory),
-        Err(e) => {
-            memory.free(device, allocator);
-            Err(e)
-        }
-    }
-}
-
-/// Allocates memory for a new buffer and binds it.
-fn bind(
-    device: &ash::Device,
-    allocator: &Mutex<Allocator>,
-    addresses: bool,
-    name: &str,
-    memory: &mut Memory,
-    claim: &mut dyn FnMut(u64) -> Result<()>,
-) -> Result<()> {
-    let (handle, location) = (memory.handle, memory.kind.location);
-    let memory_error = |reason: String| Error::Memory { name: name.into(), bytes: memory.size, reason };
-    // SAFETY: the handle was just made.
-    let mut requirements = unsafe { device.get_buffer_memory_requirements(handle) };
-    requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
-    claim(requirements.size)?;
-    let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
-    let description = AllocationCreateDesc { name, requirements, location, linear: true, allocation_scheme };
-    let mut allocator = allocator.lock().map_err(|_| memory_error("the allocator's lock is poisoned".into()))?;
-    let allocation = allocator.allocate(&description).map_err(|e| memory_error(e.to_string()))?;
-    drop(allocator);
-    // SAFETY: fresh memory that meets the requirements, bound once.
-    let bound = unsafe { device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
-    memory.allocation = Some(allocation);
-    bound.map_err(failed("vkBindBufferMemory"))?;
-    if addresses {
-        // SAFETY: the buffer was made with the address usage and is bound.
-        memory.address = unsafe { device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
-    }
-    Ok(())
-}
-
 /// A buffer and its memory. When dropped, the memory is freed, or kept for another buffer ([`Gpu::with_pool`]).
 pub struct Buffer {
-    pub(super) gpu: Gpu,
+    // Declared before `gpu`, so that it is freed before the device is destroyed.
     memory: Option<Memory>,
+    pub(super) gpu: Gpu,
     /// Bytes counted in the ledger.
     claimed: u64,
     size: u64,
@@ -114,7 +55,7 @@ impl Buffer {
             *claimed = bytes;
             Ok(())
         };
-        let mut fresh = || allocate(gpu.device(), gpu.allocator(), gpu.has_addresses(), name, kind, size.max(16), &mut claim);
+        let mut fresh = || Memory::new(gpu.heap(), name, kind, size.max(16), &mut claim);
         let memory = match gpu.pool().and_then(|pool| pool.take(kind, size)) {
             Some(memory) => memory,
             // Memory kept by the pool may be what the device is short of.
@@ -190,11 +131,8 @@ impl Drop for Buffer {
         if let Some(ledger) = self.gpu.ledger() {
             ledger.release(self.claimed);
         }
-        if let Some(memory) = self.memory.take() {
-            match self.gpu.pool() {
-                Some(pool) => pool.keep(memory),
-                None => memory.free(self.gpu.device(), self.gpu.allocator()),
-            }
+        if let (Some(pool), Some(memory)) = (self.gpu.pool(), self.memory.take()) {
+            pool.keep(memory);
         }
     }
 }

@@ -9,6 +9,7 @@ mod context;
 mod debug;
 mod descriptors;
 mod foundation;
+mod heap;
 mod host;
 mod kernel;
 mod ledger;

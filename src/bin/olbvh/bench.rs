@@ -54,8 +54,10 @@ pub struct Args {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Compare two .json result files instead of measuring.
-    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds"])]
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds", "merge"])]
     compare: Option<Vec<PathBuf>>,
+    #[command(flatten)]
+    read: input::ReadArgs,
 }
 
 /// Kind of output that OUT names.
@@ -92,7 +94,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         args.mesh.iter().map(|path| (path.display().to_string(), path.clone())).collect()
     };
     for (name, path) in meshes {
-        let mesh = input::mesh(&path, common)?.mesh;
+        let mesh = args.read.mesh(&path, common)?.mesh;
         let measured = measure(&gpu, &name, &mesh, &report, &|line| common.remark(line))?;
         report.push(measured);
         // Results are written after every mesh, so that a long run that is stopped leaves those it has.

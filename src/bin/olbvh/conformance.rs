@@ -41,6 +41,8 @@ pub struct Args {
     /// Also write a `JUnit` report (XML) to this file.
     #[arg(long, value_name = "FILE")]
     junit: Option<PathBuf>,
+    #[command(flatten)]
+    read: input::ReadArgs,
 }
 
 /// Ways of binding buffers to test.
@@ -63,7 +65,7 @@ fn name(binding: Binding) -> &'static str {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let all = if args.meshes.is_empty() { cases() } else { cases_of_meshes(&args.meshes, common)? };
+    let all = if args.meshes.is_empty() { cases() } else { cases_of_meshes(args, common)? };
     // A list without filter names all cases, so that one sees what can be run.
     let filter = args.filter.as_deref().or(args.list.then_some(""));
     let chosen: Vec<Case> = all.into_iter().filter(|c| c.matches(filter)).collect();
@@ -87,11 +89,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 }
 
 /// The cases of mesh files; each is named after its file.
-fn cases_of_meshes(meshes: &[PathBuf], common: &Common) -> Outcome<Vec<Case>> {
+fn cases_of_meshes(args: &Args, common: &Common) -> Outcome<Vec<Case>> {
     let mut all = Vec::new();
-    for file in meshes {
+    for file in &args.meshes {
         let stem = file.file_stem().unwrap_or(file.as_os_str()).to_string_lossy();
-        all.extend(cases_of(&stem, input::mesh(file, common)?.mesh));
+        all.extend(cases_of(&stem, args.read.mesh(file, common)?.mesh));
     }
     Ok(all)
 }

@@ -3,7 +3,7 @@
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
 use olbvh::error::Error;
-use olbvh::formats::{LoadOptions, Loaded, load};
+use olbvh::formats::{LoadOptions, Loaded, Merge, load};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::render::TransferFunction;
@@ -45,6 +45,18 @@ pub struct TreeArgs {
     /// along the curve instead of the one with the lowest id.
     #[arg(long)]
     pub reorder: bool,
+    #[command(flatten)]
+    read: ReadArgs,
+}
+
+/// Arguments that say how a mesh file is read.
+#[derive(clap::Args)]
+pub struct ReadArgs {
+    /// Which points that have equal coordinates become one. pieces: those of different pieces of a .vtu file, so that
+    /// no boundary lies between pieces. all: for files in which each cell has points of its own; closes slits as well.
+    /// nothing: none, so that the pieces remain separate parts.
+    #[arg(long, default_value_t = Merge::default(), value_parser = named::<Merge>, value_name = "nothing|pieces|all")]
+    merge: Merge,
 }
 
 /// Arguments that limit how much of a device is used.
@@ -95,7 +107,7 @@ impl TreeArgs {
 
     /// Reads a mesh and reorders it if `--reorder` is given.
     pub fn mesh(&self, path: &Path, common: &Common) -> Outcome<Loaded> {
-        let loaded = mesh(path, common)?;
+        let loaded = self.read.mesh(path, common)?;
         if !self.reorder {
             return Ok(loaded);
         }
@@ -106,14 +118,17 @@ impl TreeArgs {
     }
 }
 
-/// Reads a mesh and prints the warnings of its reader.
-pub fn mesh(path: &Path, common: &Common) -> Outcome<Loaded> {
-    let loaded = load(path, &LoadOptions::default()).map_err(|error| refused(path, error))?;
-    for warning in &loaded.report.warnings {
-        common.remark(format_args!("{}: {warning}", path.display()));
+impl ReadArgs {
+    /// Reads a mesh and prints the warnings of its reader.
+    pub fn mesh(&self, path: &Path, common: &Common) -> Outcome<Loaded> {
+        let options = LoadOptions { merge: self.merge, ..LoadOptions::default() };
+        let loaded = load(path, &options).map_err(|error| refused(path, error))?;
+        for warning in &loaded.report.warnings {
+            common.remark(format_args!("{}: {warning}", path.display()));
+        }
+        log::info!("{}: {} tetrahedra in {:.2} s", path.display(), loaded.mesh.tets.len(), loaded.report.seconds);
+        Ok(loaded)
     }
-    log::info!("{}: {} tetrahedra in {:.2} s", path.display(), loaded.mesh.tets.len(), loaded.report.seconds);
-    Ok(loaded)
 }
 
 /// The failure of a mesh that cannot be read or made. A procedural mesh that cannot be made is wrong usage.

@@ -37,6 +37,8 @@ pub struct Args {
     /// File for the profile (.json). Default: a file in the user's configuration folder, which later runs find.
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
+    #[command(flatten)]
+    read: input::ReadArgs,
 }
 
 /// Runs the subcommand.
@@ -54,7 +56,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
             "there is no home folder, and so no configuration folder; name a file for the profile with -o FILE".into(),
         ));
     };
-    let mesh = input::mesh(&args.mesh, common)?.mesh;
+    let mesh = args.read.mesh(&args.mesh, common)?.mesh;
     if mesh.tets.is_empty() {
         return Err(Failure::Usage(format!("{}: no tetrahedra to tune with", args.mesh.display())));
     }

@@ -1,0 +1,106 @@
+//! Where the memory of buffers comes from: gpu-allocator, the host's or one of this crate.
+
+use super::failed;
+use super::foundation::Foundation;
+use crate::error::{Error, Result};
+use ash::vk;
+use gpu_allocator::MemoryLocation;
+use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
+use std::sync::{Arc, Mutex};
+
+/// Addresses of buffers are multiples of this even if the device requires less: kernels load 16 bytes in one access.
+const LEAST_ALIGNMENT: u64 = 16;
+
+/// A device and its memory allocator.
+pub(super) struct Heap {
+    device: ash::Device,
+    pub allocator: Arc<Mutex<Allocator>>,
+    /// Whether buffers have addresses.
+    addresses: bool,
+}
+
+/// The properties of a buffer; its memory can be reused only by a buffer with the same ones.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Kind {
+    /// Usage flags, but for the one for addresses.
+    pub usage: vk::BufferUsageFlags,
+    pub location: MemoryLocation,
+}
+
+/// A Vulkan buffer and its memory. When dropped, both are returned to the driver.
+pub(super) struct Memory {
+    heap: Arc<Heap>,
+    pub kind: Kind,
+    /// Bytes of the Vulkan buffer.
+    pub size: u64,
+    pub handle: vk::Buffer,
+    pub allocation: Option<Allocation>,
+    pub address: u64,
+}
+
+impl Heap {
+    /// The heap of a device, with the host's allocator if there is one.
+    pub fn new(foundation: &Foundation) -> Result<Arc<Self>> {
+        let addresses = foundation.report.requirements.buffer_addresses;
+        let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(foundation, addresses), Ok)?;
+        Ok(Arc::new(Self { device: foundation.device.clone(), allocator, addresses }))
+    }
+}
+
+/// Makes an allocator owned by this crate.
+fn make_allocator(foundation: &Foundation, addresses: bool) -> Result<Arc<Mutex<Allocator>>> {
+    let made = Allocator::new(&AllocatorCreateDesc {
+        instance: foundation.instance.clone(),
+        device: foundation.device.clone(),
+        physical_device: foundation.physical,
+        debug_settings: gpu_allocator::AllocatorDebugSettings::default(),
+        buffer_device_address: addresses,
+        // Small blocks, since every block counts in full against the device's memory.
+        allocation_sizes: gpu_allocator::AllocationSizes::new(16 << 20, 4 << 20),
+    });
+    let made = made.map_err(|e| Error::Memory { name: "olbvh.allocator".into(), bytes: 0, reason: e.to_string() })?;
+    Ok(Arc::new(Mutex::new(made)))
+}
+
+impl Memory {
+    /// Makes a buffer of `size` bytes in fresh memory. `claim` receives the bytes that it takes.
+    pub fn new(heap: &Arc<Heap>, name: &str, kind: Kind, size: u64, claim: impl FnOnce(u64) -> Result<()>) -> Result<Self> {
+        let error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
+        let address = if heap.addresses { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
+        let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage | address);
+        // SAFETY: plain creation; the handle is destroyed when `memory` is dropped.
+        let handle = unsafe { heap.device.create_buffer(&info, None) }.map_err(|e| error(format!("vkCreateBuffer: {e:?}")))?;
+        let mut memory = Self { heap: heap.clone(), kind, size, handle, allocation: None, address: 0 };
+        // SAFETY: the handle was just made.
+        let mut requirements = unsafe { heap.device.get_buffer_memory_requirements(handle) };
+        requirements.alignment = requirements.alignment.max(LEAST_ALIGNMENT);
+        claim(requirements.size)?;
+        let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
+        let description = AllocationCreateDesc { name, requirements, location: kind.location, linear: true, allocation_scheme };
+        let mut allocator = heap.allocator.lock().map_err(|_| error("the allocator's lock is poisoned".into()))?;
+        let allocation = allocator.allocate(&description).map_err(|e| error(e.to_string()))?;
+        drop(allocator);
+        // SAFETY: fresh memory that meets the requirements, bound once.
+        let bound = unsafe { heap.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };
+        memory.allocation = Some(allocation);
+        bound.map_err(failed("vkBindBufferMemory"))?;
+        if heap.addresses {
+            // SAFETY: the buffer was made with the address usage and is bound.
+            memory.address = unsafe { heap.device.get_buffer_device_address(&vk::BufferDeviceAddressInfo::default().buffer(handle)) };
+        }
+        Ok(memory)
+    }
+}
+
+impl Drop for Memory {
+    fn drop(&mut self) {
+        // SAFETY: work on the buffer has ended, since owning calls wait for their submissions before anything is
+        // dropped, and the device outlives all memory (see `Gpu` and `Inner`).
+        unsafe { self.heap.device.destroy_buffer(self.handle, None) };
+        if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.heap.allocator.lock())
+            && let Err(e) = allocator.free(allocation)
+        {
+            log::error!("freeing {} bytes: {e}", self.size);
+        }
+    }
+}
