@@ -15,18 +15,21 @@ use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{LocateOptions, SILENT, locate, locate_all};
 use submit::submit;
 
-/// A host's kernel, which writes five words per point.
-const KERNEL: &str = r#"
+/// What a host's kernels begin with.
+const HEAD: &str = r#"
 #version 460
 #define OLBVH_TRAVERSE
 #define OLBVH_SET 1
 #define OLBVH_BINDING 3
-#include "olbvh.glsl"
 layout(local_size_x = 64) in;
-layout(push_constant) uniform Push { uvec2 tree; uint count; };
+layout(push_constant) uniform Push { uvec2 tree; uint count, level; };
 layout(set = 0, binding = 0) readonly buffer Points { float points[]; };
 layout(set = 0, binding = 1) writeonly buffer Out { uint found[]; };
+"#;
 
+/// A kernel that writes five words per point.
+const ANSWERS: &str = r#"
+#include "olbvh.glsl"
 // Names that a host may use as well.
 struct Grid { int best; };
 float weights;
@@ -63,7 +66,45 @@ void main() {
 }
 "#;
 
-fn compile(binding: Binding) -> Vec<u32> {
+/// A kernel that writes the distance to the nearest leaf of a random selection, found among all leaves and among nearer
+/// ones only.
+const NEAREST: &str = r#"
+#define OLBVH_STACK 1
+#include "olbvh.glsl"
+vec3 at;
+uint seed;
+bool prunes;
+float nearest;
+float distance_to(olbvh_Node node) {
+    vec3 lo, hi;
+    olbvh_node_box(node, lo, hi);
+    return distance(at, clamp(at, lo, hi));
+}
+bool olbvh_visit_node(olbvh_Node node) {
+    bool selected = node.level < level || (node.code * 31u + seed) * 2654435761u >> 27 == 0u;
+    return selected && (!prunes || distance_to(node) < nearest);
+}
+bool olbvh_visit_leaf(olbvh_Node node) {
+    nearest = min(nearest, distance_to(node));
+    return false;
+}
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    at = vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    seed = i;
+    olbvh_open(tree);
+    for (uint pass = 0; pass < 2; ++pass) {
+        prunes = pass == 1;
+        nearest = 1e30;
+        olbvh_traverse();
+        found[2 * i + pass] = floatBitsToUint(nearest);
+    }
+}
+"#;
+
+fn compile(binding: Binding, kernel: &str) -> Vec<u32> {
     let compiler = shaderc::Compiler::new().unwrap();
     let mut options = shaderc::CompileOptions::new().unwrap();
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
@@ -74,14 +115,15 @@ fn compile(binding: Binding) -> Vec<u32> {
         assert_eq!(name, "olbvh.glsl");
         Ok(shaderc::ResolvedInclude { resolved_name: name.into(), content: OLBVH.into() })
     });
-    compiler.compile_into_spirv(KERNEL, shaderc::ShaderKind::Compute, "host.comp", "main", Some(&options)).unwrap().as_binary().to_vec()
+    let text = [HEAD, kernel].concat();
+    compiler.compile_into_spirv(&text, shaderc::ShaderKind::Compute, "host.comp", "main", Some(&options)).unwrap().as_binary().to_vec()
 }
 
-/// Runs the host's kernel over points.
-fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
+/// Runs a host's kernel, which writes `N` words per point.
+fn run<const N: usize>(gpu: &Gpu, kernel: &str, scene: &SceneBuffers, level: u32, points: &[[f32; 3]]) -> Vec<[u32; N]> {
     let device = gpu.device();
     let input = gpu.upload("olbvh.test.points", points).unwrap();
-    let output = gpu.buffer("olbvh.test.found", 20 * points.len() as u64).unwrap();
+    let output = gpu.buffer("olbvh.test.found", (4 * N * points.len()) as u64).unwrap();
     let addresses = gpu.upload("olbvh.test.scene", &[scene.addresses()]).unwrap();
     let list = scene.list(addresses.all());
     let sets = [[(0, input.all()), (1, output.all())].to_vec(), (3..).zip(list).collect::<Vec<_>>()];
@@ -107,16 +149,16 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
                 device.update_descriptor_sets(&[write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER)], &[]);
             }
         }
-        let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(12)];
+        let ranges = [vk::PushConstantRange::default().stage_flags(vk::ShaderStageFlags::COMPUTE).size(16)];
         let info = vk::PipelineLayoutCreateInfo::default().set_layouts(&layouts).push_constant_ranges(&ranges);
         let layout = device.create_pipeline_layout(&info, None).unwrap();
-        let code = compile(gpu.binding());
+        let code = compile(gpu.binding(), kernel);
         let module = device.create_shader_module(&vk::ShaderModuleCreateInfo::default().code(&code), None).unwrap();
         let stage = vk::PipelineShaderStageCreateInfo::default().stage(vk::ShaderStageFlags::COMPUTE).module(module).name(c"main");
         let info = [vk::ComputePipelineCreateInfo::default().stage(stage).layout(layout)];
         let pipeline = device.create_compute_pipelines(vk::PipelineCache::null(), &info, None).unwrap()[0];
         let address = addresses.all().address();
-        let push = [address as u32, (address >> 32) as u32, points.len() as u32];
+        let push = [address as u32, (address >> 32) as u32, points.len() as u32, level];
         submit(gpu, "olbvh.test.host", |r| {
             let commands = r.commands();
             device.cmd_bind_pipeline(commands, vk::PipelineBindPoint::COMPUTE, pipeline);
@@ -134,7 +176,8 @@ fn run(gpu: &Gpu, scene: &SceneBuffers, points: &[[f32; 3]]) -> Vec<[u32; 5]> {
             device.destroy_descriptor_set_layout(l, None);
         }
     }
-    gpu.download(&output, output.all()).unwrap()
+    let words: Vec<u32> = gpu.download(&output, output.all()).unwrap();
+    words.as_chunks::<N>().0.to_vec()
 }
 
 fn check(binding: Binding) {
@@ -150,7 +193,8 @@ fn check(binding: Binding) {
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
         let view = device.view();
-        let found = run(&gpu, &SceneBuffers::new(&view, tree.memory(), Some(field.all())), &points);
+        let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())));
+        let found = run::<5>(&gpu, ANSWERS, &scene, level, &points);
         let options = LocateOptions::default();
         let expected = locate(&device, &tree, &points, None, &options, SILENT).unwrap();
         let all = locate_all(&device, &tree, &points, options.tolerance, SILENT).unwrap();
@@ -168,8 +212,11 @@ fn check(binding: Binding) {
             assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
         }
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
-        let without = run(&gpu, &SceneBuffers::new(&view, tree.memory(), None), &mesh.points);
+        let without = run::<5>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
+        for (i, [all, nearer]) in run(&gpu, NEAREST, &scene, level, &points).into_iter().enumerate() {
+            assert_eq!(nearer, all, "{binding:?} {lists:?}: the leaf nearest to point {i} is {} away", f32::from_bits(all));
+        }
     }
     assert!(gpu.validation_messages().is_empty(), "{:#?}", gpu.validation_messages());
 }

@@ -81,6 +81,12 @@ fn by_address() {
     let many = Mesh::new(one.points.clone(), vec![one.tets[0]; 20_000]);
     let mut touched =
         check(&gpu, "long lists", &many, &[(0.0, Assign::Aabb)], &[SliceSettings { size: [5, 5], ..SliceSettings::default() }]);
+    // A flat tetrahedron owns the voxels below it; its weights do not extend beyond it.
+    let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [3.0, 3.0, 0.0], [0.0, 0.0, 1.0]];
+    let flat = Mesh::new(points, vec![[0, 1, 2, 3], [0, 1, 2, 4]]);
+    let below =
+        |k: i32| SliceSettings { at: Some(-0.1 - f64::from(k) / 100.0), thickness: Some(1.0), size: [9, 9], ..SliceSettings::default() };
+    touched += check(&gpu, "flat", &flat, &[(0.0, Assign::Exact)], &(0..40).map(below).collect::<Vec<_>>());
     let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/flow_sphere_50k.vtu");
     let loaded = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap();
     touched += check(&gpu, "flow_sphere_50k", &loaded.mesh, &[(0.0, Assign::Aabb), (2.0, Assign::Planes)], &settings());

@@ -47,8 +47,8 @@ bool traverse(uint level) {
         if (n > 0u) {
             uint shift = 3u * node.level;
             if (node.level >= resume) trail |= (n - 1u) << shift;
-            uint digit_left = trail >> shift & 7u, left = min(digit_left, n - 1u);
-            if (left < digit_left) {
+            uint recorded = trail >> shift & 7u, left = min(recorded, n - 1u);
+            if (left < recorded) {
                 // F_N has become stricter, so the path may lead elsewhere, and the trail below it is another node's.
                 trail = (trail & ((1u << shift) - 1u)) | left << shift;
                 resume = node.level;

@@ -92,9 +92,9 @@ pub fn traverse_leaves(tree: &TreeArrays, stack: usize, mut f_n: impl FnMut(Node
             if node.level >= resume {
                 trail |= (n as u32 - 1) << shift;
             }
-            let digit = (trail >> shift & 7) as usize;
-            let left = digit.min(n - 1);
-            if left < digit {
+            let recorded = (trail >> shift & 7) as usize;
+            let left = recorded.min(n - 1);
+            if left < recorded {
                 // F_N has become stricter, so the path may lead elsewhere, and the trail below it is another node's.
                 trail = trail & ((1 << shift) - 1) | (left as u32) << shift;
                 resume = node.level;
