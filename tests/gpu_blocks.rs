@@ -80,6 +80,7 @@ fn answers_are_those_of_the_whole() {
     flat(&gpu);
     overlapped(&gpu, &mesh);
     sliced(&gpu, &mesh);
+    passed_over(&gpu);
     drawn(&gpu, &mesh);
     hidden(&gpu, &mesh);
     let messages = gpu.validation_messages();
@@ -216,6 +217,22 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
         assert!(whole.inside > 100 && whole.touched > 50 && found.answer == whole, "{whole:?}");
         assert!(found.trees > 2 && found.peak <= memory, "{} trees, {} bytes", found.trees, found.peak);
     }
+}
+
+/// Thousands of tetrahedra in one place cannot be cut and do not fit; only slices that meet them are refused.
+fn passed_over(gpu: &Gpu) {
+    let mut mesh = kuhn_jittered([14, 13, 12], 0.15, 5).unwrap();
+    let top = (0..mesh.tets.len()).find(|&t| mesh.tets[t].iter().all(|&v| mesh.points[v as usize][2] > 10.5)).unwrap();
+    mesh.tets.extend(vec![mesh.tets[top]; 20_000]);
+    let ask = |at| {
+        let settings = SliceSettings { at: Some(at), thickness: Some(0.5), size: [20, 20], ..SliceSettings::default() };
+        let voxels = &settings.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
+        let asked = Stack { mesh: &mesh, options: BuildOptions::default(), field: None, voxels, extrapolate: Extrapolate::Nearest };
+        slice(gpu, 1 << 20, &asked, SILENT, &mut |_| Ok(()))
+    };
+    let below = ask(2.0).unwrap();
+    assert!(below.trees > 1 && below.answer.inside > 300, "{below:?}");
+    assert!(matches!(ask(11.5), Err(Error::TooLarge(_))));
 }
 
 /// Parallel and diverging rays from several sides and from within, values that are not shown, and surfaces.

@@ -1,7 +1,7 @@
 //! Cutting a mesh into blocks: boxes of octree cells, and the tetrahedra of each.
 
 use super::size::{Extent, Size};
-use super::{LEAST, pieces, smaller};
+use super::{LEAST, May, pieces, smaller};
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::Gpu;
@@ -107,7 +107,7 @@ impl<'a> Source<'a> {
 
     /// Whether `memory` bytes suffice for blocks that leave `beside` bytes of it unused, with cuts that `may` allows
     /// (see [`Self::cut_in_two`]).
-    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, memory: u64, beside: u64, may: &dyn Fn(usize, u32) -> bool) -> Result<bool> {
+    pub(super) fn fits_in_blocks(&self, gpu: &Gpu, memory: u64, beside: u64, may: May<'_>) -> Result<bool> {
         let (source, most) = (self.within(gpu, memory)?, memory.saturating_sub(beside));
         let mut waiting = vec![source.whole()];
         while let Some(block) = waiting.pop() {
@@ -176,12 +176,18 @@ impl<'a> Source<'a> {
     }
 
     /// Cuts a block, which is finally to become `pieces` blocks, in two: with half of its tetrahedra each, or as near
-    /// to that as whole numbers of pieces allow. `None` unless both are smaller than the block. The cut lies after a
-    /// cell of the finest grid on an axis, both of which `may` must allow.
-    pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: &dyn Fn(usize, u32) -> bool) -> Option<[Block; 2]> {
+    /// to that as whole numbers of pieces allow. `None` unless both are smaller than the block. The cut lies across the
+    /// longest side where that is possible, after a cell of the finest grid on an axis, both of which `may` must allow.
+    pub(super) fn cut_in_two(&self, block: &Block, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
         let span = block.span?;
-        let length = |c: &usize| f64::from(span.size()[*c]) * (f64::from(self.grid.hi[*c]) - f64::from(self.grid.lo[*c]));
-        let axis = (0..3).filter(|&c| span.lo[c] < span.hi[c]).max_by(|a, b| length(a).total_cmp(&length(b)))?;
+        let length = |c: usize| f64::from(span.size()[c]) * (f64::from(self.grid.hi[c]) - f64::from(self.grid.lo[c]));
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|&a, &b| length(b).total_cmp(&length(a)));
+        axes.into_iter().filter(|&c| span.lo[c] < span.hi[c]).find_map(|axis| self.cut_across(block, span, axis, pieces, may))
+    }
+
+    /// Cuts a block across an axis, see [`Self::cut_in_two`].
+    fn cut_across(&self, block: &Block, span: CellRange, axis: usize, pieces: usize, may: May<'_>) -> Option<[Block; 2]> {
         let none = || vec![0usize; span.size()[axis] as usize];
         let count = |mut numbers: Vec<usize>, &t: &u32| {
             if let Some(cells) = span.common(&self.cells_of(t)) {
@@ -199,11 +205,12 @@ impl<'a> Source<'a> {
         });
         let at = (span.lo[axis] + below.count() as u32).min(span.hi[axis] - 1);
         let near = [at, at.saturating_sub(1), at + 1].into_iter().filter(|at| (span.lo[axis]..span.hi[axis]).contains(at));
-        let at = near.into_iter().find(|at| may(axis, ((at + 1) << (MAX_LEVEL - self.level)) - 1))?;
-        let (mut low, mut high) = (block.cells, block.cells);
-        (low.hi[axis], high.lo[axis]) = (at, at + 1);
-        let halves = [low, high].map(|cells| self.block(cells, &block.tets));
-        halves.iter().all(|h| h.tets.len() < block.tets.len()).then_some(halves)
+        near.filter(|at| may(axis, ((at + 1) << (MAX_LEVEL - self.level)) - 1)).find_map(|at| {
+            let (mut low, mut high) = (block.cells, block.cells);
+            (low.hi[axis], high.lo[axis]) = (at, at + 1);
+            let halves = [low, high].map(|cells| self.block(cells, &block.tets));
+            halves.iter().all(|h| h.tets.len() < block.tets.len()).then_some(halves)
+        })
     }
 }
 
