@@ -8,6 +8,8 @@ mod export;
 mod reflect;
 
 use reflect::{Interface, StructLayout};
+use std::cell::RefCell;
+use std::collections::BTreeSet;
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
 use std::{env, fs, process, thread};
@@ -90,9 +92,10 @@ const WIDE: Form = Form { suffix: "wide", macro_name: Some("OLBVH_WIDE") };
 const DESCRIPTOR: Form = Form { suffix: "descriptor", macro_name: Some("OLBVH_DESCRIPTORS") };
 const FORMS: [Form; 3] = [ADDRESS, WIDE, DESCRIPTOR];
 
-/// Compiles one source. Its `#include`s are resolved in `glsl/`.
+/// Compiles one source. Its `#include`s are resolved in `glsl/`, each file once.
 fn compile(source: &str, name: &str, form: &Form, optimise: bool) -> Result<Vec<u32>, String> {
     let stage = stage_of(Path::new(name)).unwrap_or(shaderc::ShaderKind::Compute);
+    let included = RefCell::new(BTreeSet::new());
     let compiler = shaderc::Compiler::new().map_err(|e| format!("shaderc: {e}"))?;
     let mut options = shaderc::CompileOptions::new().map_err(|e| format!("shaderc: {e}"))?;
     options.set_target_env(shaderc::TargetEnv::Vulkan, shaderc::EnvVersion::Vulkan1_2 as u32);
@@ -107,7 +110,8 @@ fn compile(source: &str, name: &str, form: &Form, optimise: bool) -> Result<Vec<
     }
     options.set_include_callback(|file, _, _, _| {
         let path = Path::new(GLSL).join(file);
-        let content = fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+        let again = !included.borrow_mut().insert(file.to_owned());
+        let content = if again { String::new() } else { fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))? };
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
     let artifact = compiler

@@ -142,7 +142,7 @@ float olbvh_value(uint owner, vec4 weights_of_owner) {
 vec3 olbvh_gradient(uint owner) {
     if (scene.at[0].has_field == 0u) return vec3(no_value());
     uvec4 v = words(cells.at[owner]);
-    vec3 a = floats(vertices.at[v.x]).xyz, e1 = floats(vertices.at[v.y]).xyz - a, e2 = floats(vertices.at[v.z]).xyz - a, e3 = floats(vertices.at[v.w]).xyz - a;
+    vec3 a = vertex(v.x), e1 = vertex(v.y) - a, e2 = vertex(v.z) - a, e3 = vertex(v.w) - a;
     // Normalised coordinates lie in [0, 2^41).
     const float UNIT = 1.0 / 1099511627776.0;
     e1 *= UNIT;

@@ -358,8 +358,22 @@ float olbvh_reciprocal(float x) {
 // Orientation, containment and barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of
 // src/reference/tet.rs; the operations and their order are the same.
 
+// The vertices of the face opposite to each vertex.
+const uvec3 olbvh_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
+// Edges, and the two vertices that are not on them.
+const uvec4 olbvh_EDGES[6] =
+    uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
+
 vec3 olbvh_cross_product(vec3 a, vec3 b) {
     precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+    return r;
+}
+
+// What the products in `cross_product` amount to: a bound for its error.
+vec3 olbvh_sum_of_products(vec3 a, vec3 b) {
+    a = abs(a);
+    b = abs(b);
+    precise vec3 r = vec3(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
     return r;
 }
 
@@ -593,12 +607,15 @@ bool olbvh_is_empty_tree(uint level) { return level == 0u ? olbvh_entry_range(0u
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl,
 // and flags, cells, vertices.
 
-// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl and vertices.
+// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl and vertices.
+// Vertices and tetrahedra as 02_normalise_vertices leaves them. The including kernel declares `vertices`: normalised
+// coordinates, and the cell of the finest grid.
 
-olbvh_Tet olbvh_load_tet(uvec4 ids) {
-    return olbvh_make_tet(ids, olbvh_floats(olbvh_vertices.at[ids.x]).xyz, olbvh_floats(olbvh_vertices.at[ids.y]).xyz, olbvh_floats(olbvh_vertices.at[ids.z]).xyz, olbvh_floats(olbvh_vertices.at[ids.w]).xyz);
-}
+vec3 olbvh_vertex(uint v) { return olbvh_floats(olbvh_vertices.at[v]).xyz; }
 
+uvec3 olbvh_vertex_cell(uint v) { return olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[v]).w)); }
+
+olbvh_Tet olbvh_load_tet(uvec4 ids) { return olbvh_make_tet(ids, olbvh_vertex(ids.x), olbvh_vertex(ids.y), olbvh_vertex(ids.z), olbvh_vertex(ids.w)); }
 // The quarters of its leaf's cell that an entry is near, one bit each, axis by axis, in the top bits of its word in P;
 // or the halves, where ids leave fewer bits. Twin of src/reference/quarters.rs, which explains them. Needs grid.glsl.
 const uint olbvh_ALL_OCTANTS = 0xffu;
@@ -675,8 +692,7 @@ olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
 // cell of the finest grid.
 bool olbvh_is_near(uvec4 ids, olbvh_Sought s) {
-    uvec3 a = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.x]).w)), b = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.y]).w));
-    uvec3 c = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.z]).w)), d = olbvh_unpack_cell(floatBitsToUint(olbvh_floats(olbvh_vertices.at[ids.w]).w));
+    uvec3 a = olbvh_vertex_cell(ids.x), b = olbvh_vertex_cell(ids.y), c = olbvh_vertex_cell(ids.z), d = olbvh_vertex_cell(ids.w);
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 
@@ -807,7 +823,7 @@ olbvh_Stand olbvh_stand_in(uint t) {
     s.beside = olbvh_words(olbvh_neighbours.at[t]);
     uvec4 rank = olbvh_ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
-    vec3 a = olbvh_floats(olbvh_vertices.at[s.ids.x]).xyz, b = olbvh_floats(olbvh_vertices.at[s.ids.y]).xyz, c = olbvh_floats(olbvh_vertices.at[s.ids.z]).xyz, d = olbvh_floats(olbvh_vertices.at[s.ids.w]).xyz;
+    vec3 a = olbvh_vertex(s.ids.x), b = olbvh_vertex(s.ids.y), c = olbvh_vertex(s.ids.z), d = olbvh_vertex(s.ids.w);
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
@@ -861,7 +877,7 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     s.cell = olbvh_words(olbvh_cells.at[s.t]);
     s.beside = olbvh_words(olbvh_neighbours.at[s.t]);
     e.fresh = olbvh_xor_of(s.cell) ^ olbvh_xor_of(s.ids) ^ left;
-    vec3 v = olbvh_floats(olbvh_vertices.at[e.fresh]).xyz;
+    vec3 v = olbvh_vertex(e.fresh);
     e.before = lessThan(uvec3(e.fresh), olbvh_kept(s.ids, e.beyond));
     s.ids = olbvh_exchange(s.ids, e, e.fresh);
     s.x = olbvh_exchange(s.x, e, v.x);
@@ -1130,7 +1146,7 @@ float olbvh_value(uint owner, vec4 weights_of_owner) {
 vec3 olbvh_gradient(uint owner) {
     if (olbvh_scene.at[0].has_field == 0u) return vec3(olbvh_no_value());
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
-    vec3 a = olbvh_floats(olbvh_vertices.at[v.x]).xyz, e1 = olbvh_floats(olbvh_vertices.at[v.y]).xyz - a, e2 = olbvh_floats(olbvh_vertices.at[v.z]).xyz - a, e3 = olbvh_floats(olbvh_vertices.at[v.w]).xyz - a;
+    vec3 a = olbvh_vertex(v.x), e1 = olbvh_vertex(v.y) - a, e2 = olbvh_vertex(v.z) - a, e3 = olbvh_vertex(v.w) - a;
     // Normalised coordinates lie in [0, 2^41).
     const float UNIT = 1.0 / 1099511627776.0;
     e1 *= UNIT;

@@ -5,6 +5,7 @@
 // before 3.2 has only control barriers. This loop survives neither, so a workgroup is one subgroup there.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/grid.glsl"
 ARGUMENTS(9)
     uint tets;
 END_ARGUMENTS

@@ -28,6 +28,7 @@ BUFFER16(10, readonly, NodeFrame, frame)
 BUFFER(11, READ_WRITE, uint, places)   // where to resume, zeroed; NONE: done
 BUFFER(12, READ_WRITE, uint, hits)     // one bit per tetrahedron, zeroed
 BUFFER(13, READ_WRITE, OverlapStatus, status)
+#include "shared/bad.glsl"
 #include "shared/overlap_tets.glsl"
 #include "shared/binary_tree.glsl"
 
@@ -51,7 +52,7 @@ void main() {
         joint = g;
         joint.lo = frame.at[0].joint_lo;
         joint.scale = frame.at[0].scale;
-        bool found = false, done = (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+        bool found = false, done = is_bad(t);
         RawTet own;
         if (!done) {
             own = own_tet(t);

@@ -17,20 +17,22 @@ BUFFER(4, READ_WRITE, uint, places)  // FILL 0: faces of each tetrahedron; FILL 
 BUFFER(5, writeonly, uint, indices)  // three vertices per face
 ALIGNED_BUFFER(8, 6, writeonly, uvec2, sides) // tetrahedra in front of and behind each face, or NONE
 BUFFER(7, READ_WRITE, uint, longest) // bits of a length that no edge exceeds, zeroed
+#include "shared/bad.glsl"
+#include "shared/vertices.glsl"
 
 void main() {
     uint t = item_index();
     uint reach = 0u;
     if (t < tets) {
         uint place = FILL != 0u ? places.at[t] : 0u;
-        if ((bad.at[t >> 5u] >> (t & 31u) & 1u) == 0u) {
+        if (!is_bad(t)) {
             uvec4 v = words(cells.at[t]), across = neighbours.at[t];
             for (uint f = 0u; f < 4u; ++f) {
                 if (across[f] != NONE && across[f] < t) continue;
                 if (FILL != 0u) {
                     uvec3 face = f == 0u ? v.yzw : f == 1u ? v.xzw : f == 2u ? v.xyw : v.xyz;
-                    vec3 a = floats(vertices.at[face.x]).xyz, b = floats(vertices.at[face.y]).xyz, c = floats(vertices.at[face.z]).xyz;
-                    bool turned = orient(a, b, c, floats(vertices.at[v[f]]).xyz) < 0.0;
+                    vec3 a = vertex(face.x), b = vertex(face.y), c = vertex(face.z);
+                    bool turned = orient(a, b, c, vertex(v[f])) < 0.0;
                     indices.at[3u * place] = face.x;
                     indices.at[3u * place + 1u] = turned ? face.z : face.y;
                     indices.at[3u * place + 2u] = turned ? face.y : face.z;
@@ -38,7 +40,7 @@ void main() {
                 }
                 ++place;
             }
-            vec3 a = floats(vertices.at[v.x]).xyz, b = floats(vertices.at[v.y]).xyz, c = floats(vertices.at[v.z]).xyz, d = floats(vertices.at[v.w]).xyz;
+            vec3 a = vertex(v.x), b = vertex(v.y), c = vertex(v.z), d = vertex(v.w);
             vec3 size = max(max(a, b), max(c, d)) - min(min(a, b), min(c, d));
             reach = floatBitsToUint(size.x + size.y + size.z);
         }

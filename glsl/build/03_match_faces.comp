@@ -26,6 +26,7 @@ BUFFER(5, READ_WRITE, MeshStatus, status)
 BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
 BUFFER(7, READ_WRITE, uint, thin) // thin corners at every vertex; zeroed
 #include "shared/bad.glsl"
+#include "shared/vertices.glsl"
 
 const uint NEAR_PROBES = 16u;
 const uint MAX_PROBES = 8192u;
@@ -51,7 +52,7 @@ void main() {
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);
-        Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
+        Tet tet = load_tet(ids);
         float vol = volume(tet);
         // The sign of the volume in the caller's order of vertices follows from the parity of the permutation.
         uvec4 r = tet.rank;

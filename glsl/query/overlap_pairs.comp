@@ -33,6 +33,7 @@ BUFFER16(11, READ_WRITE, SearchState, states) // zeroed
 BUFFER(12, READ_WRITE, uint, places) // FILL 0: counts; FILL 1: where the pairs of a tetrahedron start
 BUFFER(13, writeonly, uvec2, found)
 BUFFER(14, READ_WRITE, OverlapStatus, status)
+#include "shared/bad.glsl"
 #include "shared/tree.glsl"
 #include "shared/overlap_tets.glsl"
 
@@ -60,7 +61,7 @@ void main() {
         joint = g;
         joint.lo = frame.at[0].joint_lo;
         joint.scale = frame.at[0].scale;
-        bool done = status.at[0].empty != 0u || (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u;
+        bool done = status.at[0].empty != 0u || is_bad(t);
         RawTet own;
         if (!done) {
             own = own_tet(t);

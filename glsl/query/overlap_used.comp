@@ -7,10 +7,11 @@ END_ARGUMENTS
 BUFFER(0, readonly, uint, bad)
 RECORDS(1, uvec4, cells)
 BUFFER(2, READ_WRITE, uint, used) // one bit per point, zeroed
+#include "shared/bad.glsl"
 
 void main() {
     uint t = item_index();
-    if (t >= tets || (bad.at[t >> 5u] >> (t & 31u) & 1u) != 0u) return;
+    if (t >= tets || is_bad(t)) return;
     uvec4 ids = words(cells.at[t]);
     for (uint i = 0u; i < 4u; ++i) {
         uint bit = 1u << (ids[i] & 31u);

@@ -29,6 +29,7 @@ STRUCTURE(7)
 #ifndef BINARY_TREE
 BUFFER(7 + STRUCTURE_BUFFERS, readonly, uint, boundary)
 #endif
+#include "shared/vertices.glsl"
 
 TouchState state;
 vec3 x;    // centre of the voxel in normalised coordinates
@@ -37,7 +38,7 @@ vec3 h[3]; // half axes of its box
 // Keeps t if it touches the box and is the closest one so far; of two equally close ones, the lower id.
 void measure(uint t) {
     uvec4 ids = words(cells.at[t]);
-    Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
+    Tet tet = load_tet(ids);
     vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
     if (box_square(v) > state.square || !box_touches(v, h, touch_slack(v, h))) return;
     vec4 unused;

@@ -22,12 +22,13 @@ BUFFER(5, readonly, TouchState, states)
 BUFFER(6, readonly, uint, answers)
 BUFFER(7, writeonly, float, values)
 BUFFER(8, READ_WRITE, SliceStatus, status)
+#include "shared/vertices.glsl"
 
 // The value of a voxel with its centre at x that `owner` touches.
 float touched_value(uint owner, vec3 x) {
     if (ON_CELLS != 0u) return field.at[owner];
     uvec4 ids = words(cells.at[owner]);
-    Tet tet = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
+    Tet tet = load_tet(ids);
     vec4 at_vertices = vec4(field.at[ids.x], field.at[ids.y], field.at[ids.z], field.at[ids.w]);
     Weights w = weights(tet, x);
     if (LINEAR != 0u && w.sum > 0.0 && volume(tet) != 0.0) return weighed(barycentric(w, tet.rank), at_vertices);

@@ -2,7 +2,6 @@
 // operations and their order are the same.
 #include "shared/centre.glsl"
 
-const uint PLANES = 1u;
 const uint EXACT = 2u;
 
 struct Filter {
@@ -17,20 +16,8 @@ struct Filter {
     vec3 shadow_hi[6];
 };
 
-const uvec3 FILTER_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
-// Edges, and the two vertices that are not on them.
-const uvec4 FILTER_EDGES[6] =
-    uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
-
 vec3 inflated(Grid g, vec3 h) {
     precise vec3 r = h + (g.extent.xyz * two_to(-20) + two_to(-41));
-    return r;
-}
-
-vec3 cross_bound(vec3 a, vec3 b) {
-    a = abs(a);
-    b = abs(b);
-    precise vec3 r = vec3(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
     return r;
 }
 
@@ -43,12 +30,12 @@ Filter make_filter(Tet t, Grid g, uint level, uint assign) {
     float vol = volume(t);
     float s = vol < 0.0 ? -1.0 : 1.0;
     for (uint i = 0u; i < 4u; ++i) {
-        uvec3 face = FILTER_FACES[i];
+        uvec3 face = FACES[i];
         precise vec3 a = t.v[face.y] - t.v[face.x];
         precise vec3 b = t.v[face.z] - t.v[face.x];
         float outward = (i & 1u) == 0u ? s : -s;
         precise vec3 normal = outward * cross_product(a, b);
-        precise float limit = dot_product(abs(normal), box_half) + dot_product(cross_bound(a, b), slack);
+        precise float limit = dot_product(abs(normal), box_half) + dot_product(sum_of_products(a, b), slack);
         f.normal[i] = normal;
         f.at[i] = t.v[face.x];
         f.limit[i] = limit;
@@ -60,7 +47,7 @@ Filter make_filter(Tet t, Grid g, uint level, uint assign) {
     if (!f.edges) return f;
     precise float spread_by = (room * reciprocal(vol)) * two_to(-16);
     for (uint e = 0u; e < 6u; ++e) {
-        uvec4 edge = FILTER_EDGES[e];
+        uvec4 edge = EDGES[e];
         precise vec3 along = t.v[edge.y] - t.v[edge.x];
         precise vec3 um = t.v[edge.z] - t.v[edge.x];
         precise vec3 un = t.v[edge.w] - t.v[edge.x];

@@ -1,9 +1,5 @@
-// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl, tet.glsl and vertices.
-
-Tet load_tet(uvec4 ids) {
-    return make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
-}
-
+// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl and vertices.
+#include "shared/vertices.glsl"
 #include "shared/quarters.glsl"
 
 // A point whose owner is searched for.
@@ -25,8 +21,7 @@ Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
 // cell of the finest grid.
 bool is_near(uvec4 ids, Sought s) {
-    uvec3 a = unpack_cell(floatBitsToUint(floats(vertices.at[ids.x]).w)), b = unpack_cell(floatBitsToUint(floats(vertices.at[ids.y]).w));
-    uvec3 c = unpack_cell(floatBitsToUint(floats(vertices.at[ids.z]).w)), d = unpack_cell(floatBitsToUint(floats(vertices.at[ids.w]).w));
+    uvec3 a = vertex_cell(ids.x), b = vertex_cell(ids.y), c = vertex_cell(ids.z), d = vertex_cell(ids.w);
     return all(lessThanEqual(min(min(a, b), min(c, d)), s.most)) && all(greaterThanEqual(max(max(a, b), max(c, d)), s.least));
 }
 

@@ -1,19 +1,8 @@
 // Separating axes of tetrahedra and boxes, and closest points (SPEC 3.4, 3.5). Twin of src/reference/separate.rs, which
 // explains the allowance for rounding; the operations and their order are the same. Needs grid.glsl, tet.glsl.
-const uvec3 SEPARATE_FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
-// Edges, and the two vertices that are not on them.
-const uvec4 SEPARATE_EDGES[6] =
-    uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
 
 vec3 difference(vec3 a, vec3 b) {
     precise vec3 r = a - b;
-    return r;
-}
-
-vec3 sum_of_products(vec3 a, vec3 b) {
-    a = abs(a);
-    b = abs(b);
-    precise vec3 r = vec3(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
     return r;
 }
 
@@ -40,12 +29,12 @@ bool box_touches(vec3 v[4], vec3 h[3], vec3 slack) {
         if (axis_apart(v, h, slack, h[i], abs(h[i]))) return false;
     }
     for (uint f = 0u; f < 4u; ++f) {
-        uvec3 face = SEPARATE_FACES[f];
+        uvec3 face = FACES[f];
         vec3 a = difference(v[face.y], v[face.x]), b = difference(v[face.z], v[face.x]);
         if (axis_apart(v, h, slack, cross_product(a, b), sum_of_products(a, b))) return false;
     }
     for (uint e = 0u; e < 6u; ++e) {
-        vec3 along = difference(v[SEPARATE_EDGES[e].y], v[SEPARATE_EDGES[e].x]);
+        vec3 along = difference(v[EDGES[e].y], v[EDGES[e].x]);
         for (uint i = 0u; i < 3u; ++i) {
             if (axis_apart(v, h, slack, cross_product(along, h[i]), sum_of_products(along, h[i]))) return false;
         }
@@ -56,7 +45,7 @@ bool box_touches(vec3 v[4], vec3 h[3], vec3 slack) {
 // Whether a face normal of a separates it from b.
 bool face_separates(vec3 a[4], vec3 b[4]) {
     for (uint i = 0u; i < 4u; ++i) {
-        uvec3 face = SEPARATE_FACES[i];
+        uvec3 face = FACES[i];
         vec3 at = a[face.x];
         vec3 normal = cross_product(difference(a[face.y], at), difference(a[face.z], at));
         float own = dot_product(normal, difference(a[i], at));
@@ -79,11 +68,11 @@ bool tets_touch(vec3 a[4], vec3 b[4]) {
     if (share_vertex(a, b)) return true;
     if (face_separates(a, b) || face_separates(b, a)) return false;
     for (uint e = 0u; e < 6u; ++e) {
-        uvec4 ea = SEPARATE_EDGES[e];
+        uvec4 ea = EDGES[e];
         vec3 pa = a[ea.x];
         vec3 along = difference(a[ea.y], pa), am = difference(a[ea.z], pa), an = difference(a[ea.w], pa);
         for (uint f = 0u; f < 6u; ++f) {
-            uvec4 eb = SEPARATE_EDGES[f];
+            uvec4 eb = EDGES[f];
             vec3 pb = b[eb.x];
             vec3 axis = cross_product(along, difference(b[eb.y], pb));
             float tm = dot_product(axis, am), tn = dot_product(axis, an);
@@ -158,7 +147,7 @@ float closest(vec3 v[4], out vec4 weights_of) {
     float best = 3.40282347e38;
     weights_of = vec4(0.0);
     for (uint f = 0u; f < 4u; ++f) {
-        uvec3 face = SEPARATE_FACES[f];
+        uvec3 face = FACES[f];
         precise vec3 a = v[face.x] * two_to(-21), b = v[face.y] * two_to(-21), c = v[face.z] * two_to(-21);
         vec3 w = closest_in_triangle(a, b, c);
         precise vec3 at = (w.x * a + w.y * b) + w.z * c;

@@ -1,5 +1,6 @@
 // Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
 // vertices and neighbours.
+#include "shared/vertices.glsl"
 
 // The tetrahedron that a stride has reached. Its corners are kept in ascending index, so that what is computed from
 // them does not depend on the path.
@@ -33,7 +34,7 @@ Stand stand_in(uint t) {
     s.beside = words(neighbours.at[t]);
     uvec4 rank = ranks(s.cell);
     for (uint r = 0u; r < 4u; ++r) s.ids[r] = rank.x == r ? s.cell.x : rank.y == r ? s.cell.y : rank.z == r ? s.cell.z : s.cell.w;
-    vec3 a = floats(vertices.at[s.ids.x]).xyz, b = floats(vertices.at[s.ids.y]).xyz, c = floats(vertices.at[s.ids.z]).xyz, d = floats(vertices.at[s.ids.w]).xyz;
+    vec3 a = vertex(s.ids.x), b = vertex(s.ids.y), c = vertex(s.ids.z), d = vertex(s.ids.w);
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
@@ -87,7 +88,7 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     s.cell = words(cells.at[s.t]);
     s.beside = words(neighbours.at[s.t]);
     e.fresh = xor_of(s.cell) ^ xor_of(s.ids) ^ left;
-    vec3 v = floats(vertices.at[e.fresh]).xyz;
+    vec3 v = vertex(e.fresh);
     e.before = lessThan(uvec3(e.fresh), kept(s.ids, e.beyond));
     s.ids = exchange(s.ids, e, e.fresh);
     s.x = exchange(s.x, e, v.x);

@@ -1,8 +1,22 @@
 // Orientation, containment and barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of
 // src/reference/tet.rs; the operations and their order are the same.
 
+// The vertices of the face opposite to each vertex.
+const uvec3 FACES[4] = uvec3[4](uvec3(1, 2, 3), uvec3(0, 2, 3), uvec3(0, 1, 3), uvec3(0, 1, 2));
+// Edges, and the two vertices that are not on them.
+const uvec4 EDGES[6] =
+    uvec4[6](uvec4(0, 1, 2, 3), uvec4(0, 2, 1, 3), uvec4(0, 3, 1, 2), uvec4(1, 2, 0, 3), uvec4(1, 3, 0, 2), uvec4(2, 3, 0, 1));
+
 vec3 cross_product(vec3 a, vec3 b) {
     precise vec3 r = vec3(a.y * b.z - a.z * b.y, a.z * b.x - a.x * b.z, a.x * b.y - a.y * b.x);
+    return r;
+}
+
+// What the products in `cross_product` amount to: a bound for its error.
+vec3 sum_of_products(vec3 a, vec3 b) {
+    a = abs(a);
+    b = abs(b);
+    precise vec3 r = vec3(a.y * b.z + a.z * b.y, a.z * b.x + a.x * b.z, a.x * b.y + a.y * b.x);
     return r;
 }
 

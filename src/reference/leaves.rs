@@ -1,5 +1,5 @@
 //! Stage 4, first part: boundary flags, masks of octants, and boxes of the leaves (the paper's Alg. 1). Twin of
-//! `glsl/build/40_flag_leaves` and `41_finish_leaves`.
+//! `glsl/build/40_flag_leaves` and `42_finish_leaves`.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;

@@ -1,5 +1,5 @@
 //! What every stage needs to know of a vertex, computed once: its finest cell and its normalised coordinates (SPEC
-//! 2.1).
+//! 2.1). Twin of `glsl/build/02_normalise_vertices`.
 
 use super::tet::{Tet, Vec3};
 use crate::grid::{CellRange, Grid, MAX_LEVEL};

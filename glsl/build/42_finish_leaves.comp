@@ -27,6 +27,7 @@ BUFFER(9, readonly, uint, marks)
 BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/marks.glsl"
 #include "shared/quarters.glsl"
+#include "shared/vertices.glsl"
 
 const uint MAX_TOUCH_TESTS = 16u;
 const uint MAX_LIST_FOR_OCTANTS = 16384u;
@@ -37,7 +38,7 @@ bool touched(Grid g, uint begin, uint end, uint code) {
     vec3 axes[3] = vec3[3](vec3(h.x, 0.0, 0.0), vec3(0.0, h.y, 0.0), vec3(0.0, 0.0, h.z));
     for (uint i = begin; i < min(end, begin + MAX_TOUCH_TESTS); ++i) {
         uvec4 ids = words(cells.at[p.at[i]]);
-        Tet t = make_tet(ids, floats(vertices.at[ids.x]).xyz, floats(vertices.at[ids.y]).xyz, floats(vertices.at[ids.z]).xyz, floats(vertices.at[ids.w]).xyz);
+        Tet t = load_tet(ids);
         vec3 v[4];
         for (uint k = 0u; k < 4u; ++k) v[k] = difference(t.v[k], centre);
         if (box_touches(v, axes, vec3(0.0))) return true;
