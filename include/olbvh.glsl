@@ -965,8 +965,9 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
 
 bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.smallest >= olbvh_GAP); }
 
-// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been searched
-// without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
+// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been
+// searched without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the
+// walk.
 bool olbvh_walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout olbvh_Best best) {
     if (arrived) s = max(s, olbvh_STEPS - olbvh_ROUND);
     for (; s < olbvh_STEPS; ++s) {
@@ -1022,8 +1023,8 @@ vec3 olbvh_cell_point(olbvh_LeafCell cell, uint k) {
 }
 
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
-// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second. All
-// of it is one loop, so that a kernel contains each part only once.
+// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second.
+// All of it is one loop, so that a kernel contains each part only once.
 olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
     olbvh_Best best = olbvh_no_best();
     uint t = seed, s = 0u;

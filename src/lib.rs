@@ -82,9 +82,9 @@
 //! # Numerics
 //! Grid cells decide membership, not floating-point boxes: a point is quantized by subtraction, multiplication and
 //! floor, which are correctly rounded and monotone, so a descent never loses a point. Geometry is evaluated in
-//! normalised coordinates `x̂ = floor((x − lo)·2^-e·2^82)·2^-42` (SPEC 2.1). The largest extent lies in [2^40, 2^41), so
-//! products of three differences neither overflow nor become denormal, which devices may flush. Quotients that affect a
-//! result are computed with [`grid::reciprocal`], which uses no division.
+//! normalised coordinates `x̂ = floor((x − lo)·2^-e·2^82)·2^-42` (SPEC 2.1). The largest extent lies in [2^40, 2^41),
+//! so products of three differences neither overflow nor become denormal, which devices may flush. Quotients that
+//! affect a result are computed with [`grid::reciprocal`], which uses no division.
 
 // The tests of the C interface use the same host code as those of `tests/`.
 #[cfg(test)]
@@ -107,6 +107,7 @@ pub mod grid;
 pub mod kernels;
 pub mod layout;
 pub mod mesh;
+mod named;
 pub mod options;
 pub mod primitives;
 pub mod query;

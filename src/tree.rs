@@ -35,11 +35,11 @@ pub struct TreeArrays {
     pub no: Vec<u32>,
     /// Boundary flag per node, bit j % 32 of word j / 32. It is set if the node lists a boundary tetrahedron, and where
     /// a leaf may lie outside of the mesh (see [`crate::reference::leaves::flag`]).
-    pub boundary: Vec<u32>,
+    pub flags: Vec<u32>,
     /// Mask per node, byte i % 4 of word i / 4. For an internal node, bit d says that the child with the 3-bit Morton
     /// digit d exists. For a leaf, bit d says that an entry is near to that octant of its cell (see
     /// [`crate::reference::leaves::octants`]); the other octants contain no part of the mesh.
-    pub mask: Vec<u32>,
+    pub masks: Vec<u32>,
     /// Box per node, `[lo, hi]` in the units of the mesh: the cell's box for a leaf, the union of the children's boxes
     /// for others.
     pub boxes: Option<Vec<Box6>>,
@@ -82,7 +82,7 @@ impl TreeArrays {
 
     /// The mask of a node: of its children, or of the octants of a leaf.
     pub fn mask_of(&self, node: u32) -> u32 {
-        self.mask[node as usize / 4] >> (8 * (node % 4)) & 0xff
+        self.masks[node as usize / 4] >> (8 * (node % 4)) & 0xff
     }
 
     /// Child mask of a node, 0 for leaves.
@@ -122,7 +122,7 @@ impl TreeArrays {
 
     /// Whether the mesh surface may pass through the node. If not, the node's leaves lie entirely within the mesh.
     pub fn is_boundary(&self, node: u32) -> bool {
-        bit(&self.boundary, node)
+        bit(&self.flags, node)
     }
 
     /// The leaf whose cell contains a cell of the finest grid (as returned by [`Grid::quantize`]), found by descent

@@ -289,7 +289,8 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
     assert!(one == 1 && some > 1 && some + 1 < all, "{one}, {some} and {all} trees");
 }
 
-/// A picture of more rays than are drawn at once: its strips are those of the reference's picture, and progress is reported.
+/// A picture of more rays than are drawn at once: its strips are those of the reference's picture, and progress is
+/// reported.
 #[test]
 fn large_pictures_are_drawn_in_strips() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();

@@ -168,8 +168,8 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
         po: words(tree.po, status.leaves + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
-        boundary: words(tree.flags, nodes.div_ceil(32)),
-        mask: words(tree.masks, nodes.div_ceil(4)),
+        flags: words(tree.flags, nodes.div_ceil(32)),
+        masks: words(tree.masks, nodes.div_ceil(4)),
         boxes: None,
     }
 }
@@ -262,7 +262,8 @@ fn every_capacity() {
     assert!(messages.is_empty(), "{messages:#?}");
 }
 
-/// A recorded tree that does not fit its capacity is empty to the queries recorded behind it, whatever lay in its memory.
+/// A recorded tree that does not fit its capacity is empty to the queries recorded behind it, whatever lay in its
+/// memory.
 #[test]
 fn what_does_not_fit_answers_as_empty() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();

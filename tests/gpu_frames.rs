@@ -62,8 +62,8 @@ fn compare(gpu: &Gpu, slot: &Slot, mesh: &Mesh, number: u32) {
     assert_eq!((p, quarters), (expected.p, expected.quarters), "P of frame {number}");
     assert_eq!(words(frame.tree.po, expected.po.len()), expected.po, "PO of frame {number}");
     assert_eq!(words(frame.tree.co, expected.co.len()), expected.co, "CO of frame {number}");
-    assert_eq!(words(frame.tree.flags, expected.boundary.len()), expected.boundary, "flags of frame {number}");
-    assert_eq!(words(frame.tree.masks, expected.mask.len()), expected.mask, "masks of frame {number}");
+    assert_eq!(words(frame.tree.flags, expected.flags.len()), expected.flags, "flags of frame {number}");
+    assert_eq!(words(frame.tree.masks, expected.masks.len()), expected.masks, "masks of frame {number}");
     // Every vertex has an owner.
     for (v, &owner) in words(frame.output.owners, mesh.points.len()).iter().enumerate() {
         assert!(mesh.tets.get(owner as usize).is_some(), "frame {number}: vertex {v} is lost");

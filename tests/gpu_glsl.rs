@@ -16,7 +16,7 @@ use olbvh::query::{LocateOptions, SILENT, locate, locate_all};
 use submit::submit;
 
 /// What a host's kernels begin with.
-const HEAD: &str = r#"
+const HEAD: &str = r"
 #version 460
 #define OLBVH_TRAVERSE
 #define OLBVH_SET 1
@@ -25,7 +25,7 @@ layout(local_size_x = 64) in;
 layout(push_constant) uniform Push { uvec2 tree; uint count, level; };
 layout(set = 0, binding = 0) readonly buffer Points { float points[]; };
 layout(set = 0, binding = 1) writeonly buffer Out { uint found[]; };
-"#;
+";
 
 /// A kernel that writes five words per point.
 const ANSWERS: &str = r#"

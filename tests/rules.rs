@@ -11,17 +11,18 @@ use std::path::{Path, PathBuf};
 #[rustfmt::skip]
 const LAYERS: &[(&str, &[&str])] = &[
     ("error", &[]),
+    ("named", &[]),
     ("layout", &[]),
     ("grid", &["layout"]),
     ("mesh", &["error"]),
-    ("options", &["error"]),
+    ("options", &["error", "named"]),
     ("tree", &["grid", "layout", "options"]),
-    ("slicing", &["error", "grid", "layout", "options"]),
+    ("slicing", &["error", "grid", "layout", "named"]),
     ("render", &["error", "grid", "layout", "mesh"]),
     ("reference", &["error", "grid", "layout", "mesh", "options", "render", "slicing", "tree"]),
-    ("formats", &["error", "grid", "mesh"]),
+    ("formats", &["error", "grid", "mesh", "named"]),
     ("gpu", &["error", "kernels", "primitives"]),
-    ("kernels", &["error", "gpu", "options"]),
+    ("kernels", &["error", "gpu", "named"]),
     ("primitives", &["error", "gpu", "kernels"]),
     ("build", &["error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
     ("glsl", &["build", "gpu", "layout", "options"]),
@@ -30,12 +31,12 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("baseline", &["build", "error", "gpu", "grid", "kernels", "layout", "primitives", "query", "reference"]),
     ("conformance", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "grid", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
-    ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
+    ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("tune", &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "tree"]),
 ];
 
-/// `kernels` contains what is generated for the pipelines of `gpu`, and `gpu` runs the self-test of `primitives` before it
-/// trusts a device, so these three are one layer.
+/// `kernels` contains what is generated for the pipelines of `gpu`, and `gpu` runs the self-test of `primitives` before
+/// it trusts a device, so these three are one layer.
 const ONE_LAYER: &[&str] = &["gpu", "kernels", "primitives"];
 
 fn files(folder: &Path, found: &mut Vec<PathBuf>) {

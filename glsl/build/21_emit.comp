@@ -31,7 +31,8 @@ void main() {
     uvec3 at = candidate(box, first - offsets.at[t]);
     for (uint i = first; i < end; ++i) {
         if (i >= next) {
-            // Most tetrahedra have candidates. A long stretch of bad ones, which have none, must not become a long loop.
+            // Most tetrahedra have candidates. A long stretch of bad ones, which have none, must not become a long
+            // loop.
             t = min(t + 1u, tets - 1u);
             if (offsets.at[t + 1u] <= i) t = owner_of(i, tets);
             next = offsets.at[t + 1u];

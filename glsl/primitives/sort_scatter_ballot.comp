@@ -1,6 +1,7 @@
 #version 460
 // Radix sort, one tile per workgroup, of which every subgroup takes consecutive rows: equal digits of a row find each
-// other by ballots, so the order within a tile is kept. Subgroups count by themselves and meet only once, for the places.
+// other by ballots, so the order within a tile is kept. Subgroups count by themselves and meet only once, for the
+// places.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
 layout(constant_id = 3) const uint MAX_SUBGROUPS = 8; // at least WORKGROUP / subgroup size

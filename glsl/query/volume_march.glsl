@@ -212,9 +212,9 @@ void main() {
         uint known = state.check >> 30u; // flags of the best candidate
         state.check &= 0x3fffffffu;
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
-            // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed. Rays
-            // wait until all of the subgroup stand in the mesh, and then walk together; to iso-surfaces, walks are too
-            // short for that.
+            // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed.
+            // Rays wait until all of the subgroup stand in the mesh, and then walk together; to iso-surfaces, walks are
+            // too short for that.
             bool walks = ISO != 0u || subgroupAll(stands);
             for (uint pass = 0u; pass < BURST && walks && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
                 vec3 x = normalise(g, sample_at(view, origin, direction, state.next));

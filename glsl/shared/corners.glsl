@@ -1,6 +1,6 @@
-// Vertices of so many tetrahedra that a star could not hold them (SPEC 2.3). The tetrahedra of such a crowded vertex count
-// as boundary, so it lies in leaves with whole lists, and no walk ends there. Twin of src/reference/corners.rs, which
-// explains the bounds; the operations and their order are the same. Needs grid.glsl and tet.glsl.
+// Vertices of so many tetrahedra that a star could not hold them (SPEC 2.3). The tetrahedra of such a crowded vertex
+// count as boundary, so it lies in leaves with whole lists, and no walk ends there. Twin of src/reference/corners.rs,
+// which explains the bounds; the operations and their order are the same. Needs grid.glsl and tet.glsl.
 const uint MOST_THIN = 46u; // thin corners at a vertex that is not crowded
 
 float squared_length(vec3 a, vec3 b, int e) {

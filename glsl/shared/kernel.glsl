@@ -54,8 +54,8 @@ uint local_index() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocat
 uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
 
 // The first item of this invocation, and the end, where a workgroup takes `share` items (a multiple of WORKGROUP) of
-// `count`; then every gl_SubgroupSize-th. A subgroup takes consecutive items: processors run the subgroups of a workgroup
-// one after the other, and read memory faster in order.
+// `count`; then every gl_SubgroupSize-th. A subgroup takes consecutive items: processors run the subgroups of a
+// workgroup one after the other, and read memory faster in order.
 uvec2 items_of_share(uint share, uint count) {
     uint each = share / gl_NumSubgroups, begin = group_index() * share + gl_SubgroupID * each;
     return uvec2(begin + gl_SubgroupInvocationID, min(begin + each, count));

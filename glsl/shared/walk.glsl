@@ -54,8 +54,9 @@ void arrive(uint first, vec3 x, inout Best best) {
 
 bool settled(Best best) { return best.inside || (best.in_box && best.smallest >= GAP); }
 
-// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been searched
-// without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the walk.
+// Part 1, from `t`, which step number `s` has reached. Returns whether `t` is now near x or, if one star has been
+// searched without an owner, contains it. A tetrahedron that clearly contains x becomes the best one, and ends the
+// walk.
 bool walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout Best best) {
     if (arrived) s = max(s, STEPS - ROUND);
     for (; s < STEPS; ++s) {
@@ -111,8 +112,8 @@ vec3 cell_point(LeafCell cell, uint k) {
 }
 
 // Walks to a point x of a cell that is full of mesh, from its seed: directly, through up to ARRIVALS stars, then by
-// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second. All
-// of it is one loop, so that a kernel contains each part only once.
+// DETOURS points. The owner may be in another part of the first star, so x counts as in a gap only after the second.
+// All of it is one loop, so that a kernel contains each part only once.
 Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
     Best best = no_best();
     uint t = seed, s = 0u;

@@ -6,7 +6,7 @@ use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateMethod, LocateOptions, Located, OverlapInput, Overlapped, SILENT};
+use crate::query::{self, LocateMethod, LocateOptions, Located, MOST_TRAVERSED, OverlapInput, Overlapped, SILENT};
 
 /// A kind of structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -80,10 +80,10 @@ impl Structure {
         })
     }
 
-    /// Whether points are also located by the paper's own traversal, which cuts off lists longer than 32,000 entries.
+    /// Whether points are also located by the paper's own traversal, which cuts off long lists.
     pub(super) fn traverses(&self, kind: Kind) -> bool {
         let paper = matches!(kind, Kind::Octree { assign: Assign::Aabb, lists: Lists::All, .. });
-        paper && matches!(self, Self::Octree(tree) if tree.status().longest_leaf <= 32_000)
+        paper && matches!(self, Self::Octree(tree) if tree.status().longest_leaf <= MOST_TRAVERSED)
     }
 
     /// Device times of the stages of the construction.

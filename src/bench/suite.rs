@@ -2,7 +2,8 @@
 
 use super::measure::Budget;
 use super::structure::Kind;
-use crate::options::{Assign, Lists, named};
+use crate::named::named;
+use crate::options::{Assign, Lists};
 use serde::Serialize;
 
 /// A choice of meshes and sizes.

@@ -1,71 +1,12 @@
 //! Stage 2, candidates: counts them, decides which are entries, and goes to coarser levels until the entries fit.
 
-use super::mesh::{MeshArrays, MeshInput, MeshView};
-use super::plan::{CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, TreeMemory, filtered};
+use super::mesh::{MeshArrays, MeshInput};
+use super::plan::{Capacity, CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, filtered};
+use super::stages::Build;
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{Count as CountCells, CountSpec, Filter, FilterSpec, Fit, FitSpec, Mark, MarkSpec, SettleSeeds, SettleSeedsSpec};
-use crate::options::BuildOptions;
 use crate::primitives::{Count, cmd_exclusive_scan};
-
-/// Stage 2, first part: the number of candidates of every tetrahedron (or of shares of them, where they are filtered),
-/// and the offset of its first.
-pub(crate) fn cmd_count(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    grid: BufferRef,
-    options: &BuildOptions,
-    scratch: &CountScratch,
-) -> Result<()> {
-    r.stage("build.count", |r| count_candidates(r, mesh, grid, options, scratch, Over::all(scratch)))
-}
-
-/// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`.
-pub(crate) fn cmd_filter(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    grid: BufferRef,
-    options: &BuildOptions,
-    scratch: &CountScratch,
-    filter: &FilterScratch,
-) -> Result<()> {
-    r.stage("build.filter", |r| {
-        if let Some(seeds) = &filter.seeds {
-            r.fill(seeds.marks, 0);
-        }
-        filter_candidates(r, mesh, grid, options, scratch, filter, Over::all(scratch))
-    })
-}
-
-/// Stage 2, where entries may exceed the capacity: counts and filters coarser levels until the entries fit.
-pub(crate) fn cmd_fit(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    tree: &TreeMemory,
-    options: &BuildOptions,
-    scratch: &CountScratch,
-    filter: &FilterScratch,
-) -> Result<()> {
-    let Some(coarser) = filter.coarser else { return Ok(()) };
-    let (TreeMemory { grid, status, capacity, .. }, tets) = (*tree, mesh.input.tets);
-    let CoarserScratch { live, groups, shares: tried_shares, entries: tried_entries } = coarser;
-    let (shares, entries, capacity, levels) = (scratch.total, filter.entries, capacity.entries, capacity.level);
-    let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
-    let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
-    let over = Over { total: tried_shares, coarser: Some(coarser), marks: filter.seeds.map(|seeds| seeds.marks) };
-    r.stage("build.fit", |r| {
-        r.barrier("codes.scan → fit");
-        r.dispatch(&fit, spec, Groups::Count(1))?;
-        for _ in 0..levels {
-            r.barrier("fit → codes.count");
-            count_candidates(r, mesh, grid, options, scratch, over)?;
-            filter_candidates(r, mesh, grid, options, scratch, filter, over)?;
-            r.dispatch(&Fit { first: 0, ..fit }, spec, Groups::Count(1))?;
-        }
-        r.barrier("fit → codes.emit");
-        Ok(())
-    })
-}
 
 /// What is counted and filtered: all tetrahedra, or as many as a word in device memory says.
 #[derive(Clone, Copy)]
@@ -89,97 +30,126 @@ impl Over {
     }
 }
 
-fn count_candidates(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    grid: BufferRef,
-    options: &BuildOptions,
-    scratch: &CountScratch,
-    over: Over,
-) -> Result<()> {
-    let MeshInput { cells, tets, .. } = mesh.input;
-    let (workgroup, offsets) = (r.gpu().target().each, scratch.offsets);
-    let marks = over.marks.unwrap_or_else(|| r.gpu().nothing());
-    let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
-    let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
-    let spec = CountSpec { workgroup, share, clear, ..Default::default() };
-    r.dispatch(&count, spec, over.groups(0, tets + 1, workgroup))?;
-    let all = over.coarser.map_or(Count::host(tets + 1), |coarser| Count::device(tets + 1, coarser.live));
-    cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
-}
+impl Build<'_> {
+    /// Stage 2, first part: the number of candidates of every tetrahedron (or of shares of them, where they are
+    /// filtered), and the offset of its first.
+    pub fn count(&self, r: &mut Recorder<'_>) -> Result<()> {
+        r.stage("build.count", |r| self.count_candidates(r, Over::all(self.counts)))
+    }
 
-fn filter_candidates(
-    r: &mut Recorder<'_>,
-    mesh: &MeshView,
-    grid: BufferRef,
-    options: &BuildOptions,
-    scratch: &CountScratch,
-    filter: &FilterScratch,
-    over: Over,
-) -> Result<()> {
-    let MeshInput { cells, tets, .. } = mesh.input;
-    let workgroup = r.gpu().target().each;
-    if let Some(seeds) = &filter.seeds {
-        r.fill(seeds.doubt_count, 0);
+    /// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`.
+    pub fn filter(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let Some(filter) = self.filter else { return Ok(()) };
+        r.stage("build.filter", |r| {
+            if let Some(seeds) = &filter.seeds {
+                r.fill(seeds.marks, 0);
+            }
+            self.filter_candidates(r, filter, Over::all(self.counts))
+        })
     }
-    let all = Count::device(filter.most, over.total);
-    let later = all.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
-    let nothing = r.gpu().nothing();
-    let SeedScratch { marks, doubts, doubt_count } =
-        filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
-    let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
-    let (quantized, offsets, shares, capacity) = (vertices, scratch.offsets, over.total, filter.most);
-    let (hits, counts) = (filter.hits, filter.counts);
-    if filter.seeds.is_some() {
-        let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
-        let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
-        r.dispatch(&mark, spec, over.groups(1, tets.div_ceil(32), workgroup))?;
-        r.barrier("codes.mark → codes.mark_later");
-        r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
-        r.barrier("codes.mark → codes.filter");
+
+    /// Stage 2, where entries may exceed the capacity: counts and filters coarser levels until the entries fit.
+    pub fn fit(&self, r: &mut Recorder<'_>, capacity: &Capacity) -> Result<()> {
+        let Some((filter, coarser)) = self.filter.and_then(|f| Some((f, f.coarser?))) else { return Ok(()) };
+        let (Self { grid, status, counts, .. }, tets) = (*self, self.mesh.input.tets);
+        let CoarserScratch { live, groups, shares: tried_shares, entries: tried_entries } = coarser;
+        let (shares, entries, capacity, levels) = (counts.total, filter.entries, capacity.entries, capacity.level);
+        let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
+        let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
+        let over = Over { total: tried_shares, coarser: Some(coarser), marks: filter.seeds.map(|seeds| seeds.marks) };
+        r.stage("build.fit", |r| {
+            r.barrier("codes.scan → fit");
+            r.dispatch(&fit, spec, Groups::Count(1))?;
+            for _ in 0..levels {
+                r.barrier("fit → codes.count");
+                self.count_candidates(r, over)?;
+                self.filter_candidates(r, filter, over)?;
+                r.dispatch(&Fit { first: 0, ..fit }, spec, Groups::Count(1))?;
+            }
+            r.barrier("fit → codes.emit");
+            Ok(())
+        })
     }
-    let arguments = Filter {
-        grid,
-        quantized,
-        cells,
-        bad,
-        vertices,
-        offsets,
-        shares,
-        hits,
-        counts,
-        marks,
-        boundary,
-        doubts,
-        doubt_count,
-        tets,
-        capacity,
-    };
-    let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
-    r.dispatch(&arguments, spec, over.groups(2, tets, workgroup))?;
-    r.barrier("codes.filter → codes.filter_later");
-    r.dispatch(&arguments, FilterSpec { later: 1, ..spec }, later)?;
-    if filter.seeds.is_some() {
-        r.barrier("codes.filter → codes.doubts");
-        let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
-        let settle = SettleSeeds {
+
+    fn count_candidates(&self, r: &mut Recorder<'_>, over: Over) -> Result<()> {
+        let Self { mesh, options, grid, counts: scratch, .. } = *self;
+        let MeshInput { cells, tets, .. } = mesh.input;
+        let (workgroup, offsets) = (r.gpu().target().each, scratch.offsets);
+        let marks = over.marks.unwrap_or_else(|| r.gpu().nothing());
+        let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
+        let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
+        let spec = CountSpec { workgroup, share, clear, ..Default::default() };
+        r.dispatch(&count, spec, over.groups(0, tets + 1, workgroup))?;
+        let all = over.coarser.map_or(Count::host(tets + 1), |coarser| Count::device(tets + 1, coarser.live));
+        cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
+    }
+
+    fn filter_candidates(&self, r: &mut Recorder<'_>, filter: &FilterScratch, over: Over) -> Result<()> {
+        let Self { mesh, options, grid, counts: scratch, .. } = *self;
+        let MeshInput { cells, tets, .. } = mesh.input;
+        let workgroup = r.gpu().target().each;
+        if let Some(seeds) = &filter.seeds {
+            r.fill(seeds.doubt_count, 0);
+        }
+        let all = Count::device(filter.most, over.total);
+        let later = all.behind(tets).groups(r, workgroup, filter.arguments, "filter.shares → codes.mark")?;
+        let nothing = r.gpu().nothing();
+        let SeedScratch { marks, doubts, doubt_count } =
+            filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
+        let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
+        let (quantized, offsets, shares, capacity) = (vertices, scratch.offsets, over.total, filter.most);
+        let (hits, counts) = (filter.hits, filter.counts);
+        if filter.seeds.is_some() {
+            let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
+            let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
+            r.dispatch(&mark, spec, over.groups(1, tets.div_ceil(32), workgroup))?;
+            r.barrier("codes.mark → codes.mark_later");
+            r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
+            r.barrier("codes.mark → codes.filter");
+        }
+        let arguments = Filter {
             grid,
             quantized,
             cells,
             bad,
             vertices,
             offsets,
+            shares,
             hits,
             counts,
             marks,
-            neighbours,
+            boundary,
             doubts,
             doubt_count,
             tets,
             capacity,
         };
-        r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
+        let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
+        r.dispatch(&arguments, spec, over.groups(2, tets, workgroup))?;
+        r.barrier("codes.filter → codes.filter_later");
+        r.dispatch(&arguments, FilterSpec { later: 1, ..spec }, later)?;
+        if filter.seeds.is_some() {
+            r.barrier("codes.filter → codes.doubts");
+            let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
+            let settle = SettleSeeds {
+                grid,
+                quantized,
+                cells,
+                bad,
+                vertices,
+                offsets,
+                hits,
+                counts,
+                marks,
+                neighbours,
+                doubts,
+                doubt_count,
+                tets,
+                capacity,
+            };
+            r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
+        }
+        let entries = over.coarser.map_or(filter.entries, |coarser| coarser.entries);
+        cmd_exclusive_scan(r, counts, counts, entries, all, &filter.scan)
     }
-    let entries = over.coarser.map_or(filter.entries, |coarser| coarser.entries);
-    cmd_exclusive_scan(r, counts, counts, entries, all, &filter.scan)
 }

@@ -36,8 +36,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Recorder};
 use crate::options::BuildOptions;
 use crate::primitives::Arena;
-use candidates::{cmd_count, cmd_filter, cmd_fit};
-use stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_levels, cmd_splits, entries};
+use stages::Build;
 
 /// Scratch memory of a whole build.
 #[derive(Clone, Copy, Debug)]
@@ -85,19 +84,17 @@ impl BuildScratch {
 /// [`crate::Error::Invalid`] for α outside 0…10.
 pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, options: &BuildOptions, scratch: &BuildScratch) -> Result<()> {
     let BuildScratch { counts, filter, sorted } = scratch;
-    let Capacity { candidates, entries: room, level, .. } = tree.capacity;
+    let (capacity, filter) = (&tree.capacity, filter.as_ref());
+    let build = Build { mesh, options, status: tree.status, grid: tree.grid, counts, filter };
     // Without a filter, every candidate is an entry.
-    let most = if filter.is_some() { candidates } else { candidates.min(room) };
-    cmd_depth(r, mesh, tree.status, tree.grid, options, (most, level), counts)?;
-    cmd_count(r, mesh, tree.grid, options, counts)?;
-    if let Some(filter) = filter {
-        cmd_filter(r, mesh, tree.grid, options, counts, filter)?;
-        cmd_fit(r, mesh, tree, options, counts, filter)?;
-    }
-    cmd_codes(r, mesh, tree, counts, filter.as_ref(), sorted)?;
-    let entries = entries(tree, counts, filter.as_ref());
-    cmd_count_splits(r, tree, entries, sorted)?;
-    cmd_splits(r, tree, entries, sorted)?;
-    cmd_leaves(r, mesh, tree, entries, filter.as_ref(), sorted)?;
-    cmd_levels(r, tree, sorted)
+    let most = if filter.is_some() { capacity.candidates } else { capacity.candidates.min(capacity.entries) };
+    build.depth(r, most, capacity.level)?;
+    build.count(r)?;
+    build.filter(r)?;
+    build.fit(r, capacity)?;
+    build.codes(r, tree.p, capacity, sorted)?;
+    build.count_splits(r, capacity, sorted)?;
+    build.splits(r, tree, sorted)?;
+    build.leaves(r, tree, sorted)?;
+    build.levels(r, tree, sorted)
 }

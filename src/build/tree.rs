@@ -1,9 +1,8 @@
 //! A tree in device memory owned by this crate.
 
-use super::candidates::{cmd_count, cmd_filter};
 use super::mesh::{DeviceMesh, KeptMesh, MeshView};
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
-use super::stages::{cmd_codes, cmd_count_splits, cmd_depth, cmd_leaves, cmd_levels, cmd_splits, entries};
+use super::stages::Build;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
 use crate::grid::MAX_LEVEL;
@@ -68,15 +67,16 @@ impl Tree {
     fn build_once(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         mesh.check_device(gpu)?;
         let view = mesh.view();
-        let (tets, BuildOptions { assign, lists, .. }) = (view.input.tets, *options);
+        let tets = view.input.tets;
         let mut stages = Vec::new();
 
         // First submission: the level, and the number of candidates.
         let (head, (status, grid)) = Arena::reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
         let (counts_buffer, counts) = Arena::reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
+        let build = Build { mesh: &view, options, status, grid, counts: &counts, filter: None };
         let ((), time) = gpu.submit("olbvh.build.counts", |r| {
-            cmd_depth(r, &view, status, grid, options, (u32::MAX, MAX_LEVEL), &counts)?;
-            cmd_count(r, &view, grid, options, &counts)
+            build.depth(r, u32::MAX, MAX_LEVEL)?;
+            build.count(r)
         })?;
         stages.extend(time.stages);
         let measured: BuildStatus = gpu.download_one(&head, status)?;
@@ -87,8 +87,9 @@ impl Tree {
         // Second submission: which candidates are entries.
         let (filter_buffer, filter) =
             Arena::reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
+        let build = Build { filter: filter.as_ref(), ..build };
         if let Some(filter) = &filter {
-            let ((), time) = gpu.submit("olbvh.build.filter", |r| cmd_filter(r, &view, grid, options, &counts, filter))?;
+            let ((), time) = gpu.submit("olbvh.build.filter", |r| build.filter(r))?;
             stages.extend(time.stages);
             capacity.entries = gpu.download_one(&filter_buffer, filter.entries)?;
         }
@@ -97,24 +98,9 @@ impl Tree {
         capacity.nodes = Capacity::for_entries(capacity.entries, level).nodes;
         let entry_buffer = gpu.buffer("olbvh.tree.p", 4 * u64::from(capacity.entries.max(4)))?;
         let (sorted_buffer, sorted) = Arena::reserve(gpu, "olbvh.build.scratch", |a| SortedScratch::carve(gpu, a, &capacity))?;
-        let nothing = gpu.nothing();
-        let head_memory = TreeMemory {
-            assign,
-            capacity,
-            lists,
-            status,
-            grid,
-            p: entry_buffer.all(),
-            po: nothing,
-            co: nothing,
-            flags: nothing,
-            masks: nothing,
-            boxes: None,
-        };
-        let entries = entries(&head_memory, &counts, filter.as_ref());
         let ((), time) = gpu.submit("olbvh.build.codes", |r| {
-            cmd_codes(r, &view, &head_memory, &counts, filter.as_ref(), &sorted)?;
-            cmd_count_splits(r, &head_memory, entries, &sorted)
+            build.codes(r, entry_buffer.all(), &capacity, &sorted)?;
+            build.count_splits(r, &capacity, &sorted)
         })?;
         stages.extend(time.stages);
         let planned: BuildStatus = gpu.download_one(&head, status)?;
@@ -132,9 +118,10 @@ impl Tree {
             r.copy(status.part(0, size_of::<BuildStatus>() as u64), memory.status);
             r.copy(grid.part(0, size_of::<Grid>() as u64), memory.grid);
             r.barrier("head → splits");
-            cmd_splits(r, &memory, entries, &sorted)?;
-            cmd_leaves(r, &view, &memory, entries, filter.as_ref(), &sorted)?;
-            cmd_levels(r, &memory, &sorted)
+            let build = Build { status: memory.status, grid: memory.grid, ..build };
+            build.splits(r, &memory, &sorted)?;
+            build.leaves(r, &memory, &sorted)?;
+            build.levels(r, &memory, &sorted)
         })?;
         stages.extend(time.stages);
         let status: BuildStatus = gpu.download_one(&node_buffer, memory.status)?;
@@ -177,8 +164,8 @@ impl Tree {
             po: words(self.memory.po, u64::from(self.status.leaves) + 1)?,
             co: words(self.memory.co, internal + 1)?,
             no: self.status.levels[..=self.status.level as usize].to_vec(),
-            boundary: words(self.memory.flags, nodes.div_ceil(32))?,
-            mask: words(self.memory.masks, nodes.div_ceil(4))?,
+            flags: words(self.memory.flags, nodes.div_ceil(32))?,
+            masks: words(self.memory.masks, nodes.div_ceil(4))?,
             boxes,
         })
     }

@@ -169,8 +169,8 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
         po: words(tree.po, nodes - internal + 1),
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
-        boundary: words(tree.flags, nodes.div_ceil(32)),
-        mask: words(tree.masks, nodes.div_ceil(4)),
+        flags: words(tree.flags, nodes.div_ceil(32)),
+        masks: words(tree.masks, nodes.div_ceil(4)),
         boxes,
     };
     compare_arrays(expected, &found)
@@ -213,8 +213,8 @@ fn compare_arrays(expected: &Expected, f: &TreeArrays) -> Verdict {
     compare("build.flag_leaves", "boundary of the leaves (node, flag)", &flags(e), &flags(f))?;
     let octants = |t: &TreeArrays| t.leaves().map(|j| (j, t.mask_of(j))).collect::<Vec<_>>();
     compare("build.finish_leaves", "masks of the leaves (node, octants)", &octants(e), &octants(f))?;
-    compare("build.merge_level", "boundary", &e.boundary, &f.boundary)?;
-    compare("build.merge_level", "masks", &e.mask, &f.mask)?;
+    compare("build.merge_level", "flags", &e.flags, &f.flags)?;
+    compare("build.merge_level", "masks", &e.masks, &f.masks)?;
     compare_one("build.finish_leaves", "boxes.is_some()", &expected.boxes, &f.boxes.is_some())?;
     if let (Some(a), Some(b)) = (&e.boxes, &f.boxes) {
         let bits = |b: &[[f32; 6]]| b.iter().map(|b| b.map(f32::to_bits)).collect::<Vec<_>>();

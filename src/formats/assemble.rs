@@ -342,9 +342,9 @@ impl Assembly<'_> {
         });
     }
 
-    /// Sets the points of all pieces; `starts` holds the first point of each. A cell that is pushed later uses the first
-    /// of several points with equal coordinates, within the limits of the option, so that cells which share a face cut it
-    /// in the same way.
+    /// Sets the points of all pieces; `starts` holds the first point of each. A cell that is pushed later uses the
+    /// first of several points with equal coordinates, within the limits of the option, so that cells which share a
+    /// face cut it in the same way.
     pub fn set_points(&mut self, points: Vec<[f64; 3]>, starts: &[usize]) {
         self.points = points;
         if self.merge == Merge::Nothing || (self.merge == Merge::Pieces && starts.len() < 2) {

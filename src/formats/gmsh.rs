@@ -220,8 +220,8 @@ impl Reader<'_> {
         Ok(())
     }
 
-    /// Reads the first physical group of each volume entity. In a mesh that is partitioned, the elements belong to parts of
-    /// entities; a part without a group belongs to the group of its parent.
+    /// Reads the first physical group of each volume entity. In a mesh that is partitioned, the elements belong to
+    /// parts of entities; a part without a group belongs to the group of its parent.
     fn entities(&mut self, version: Version, partitioned: bool, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
             self.tokens.line();

@@ -47,7 +47,7 @@ use std::time::Instant;
 
 use crate::error::Result;
 use crate::mesh::Mesh;
-use crate::options::named;
+use crate::named::named;
 use detect::Format;
 pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};

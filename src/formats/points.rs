@@ -11,10 +11,10 @@ use super::source::{Source, Tokens, parse_float, printable};
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
-/// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may be
-/// in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table may
-/// name the columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns. Lines
-/// that start with `#` are comments. A table without points is valid, even an empty file.
+/// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may
+/// be in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table
+/// may name the columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns.
+/// Lines that start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
@@ -94,8 +94,8 @@ fn columns(source: &Source, lines: &mut Tokens<'_>) -> Result<Option<Columns>> {
     let at = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
         source.error_line(at, format!("{width} columns; there must be three, or a first line that names x, y and z among them"))
     })?;
-    // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing error, not a
-    // header.
+    // A line of column names contains no numbers. If some fields are numbers, this is a point with a typing error, not
+    // a header.
     if named.is_none() && numbers > 0 {
         return Ok(Some(Columns { separator, width, at }));
     }

@@ -103,7 +103,8 @@ impl Source {
         self.error_in(format_args!("line {}", self.line(at)), message)
     }
 
-    /// An error about something that starts at byte `at`. Lines are counted here and not in advance, as that takes time.
+    /// An error about something that starts at byte `at`. Lines are counted here and not in advance, as that takes
+    /// time.
     pub fn error_at(&self, what: &str, at: usize, message: impl Into<String>) -> Error {
         self.error_in(format_args!("{what} (line {})", self.line(at)), message)
     }

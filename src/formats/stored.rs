@@ -47,7 +47,8 @@ impl<'a> Stored<'a> {
         Self { source, what, at, content, blocks }
     }
 
-    /// The array with all its blocks unpacked, if they are larger than a window, so that none is unpacked for every window.
+    /// The array with all its blocks unpacked, if they are larger than a window, so that none is unpacked for every
+    /// window.
     pub fn ready(mut self, scalar: Scalar) -> Result<Self> {
         if self.blocks.as_ref().is_some_and(|blocks| blocks.block > WINDOW * scalar.size()) {
             self.content = Content::Decoded(self.read(0..self.len())?.into_owned());

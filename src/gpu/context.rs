@@ -118,7 +118,7 @@ impl Gpu {
         let pipelines = Pipelines::new(&foundation, options.pipeline_cache.clone())?;
         let traced = requirements.ray_tracing;
         let acceleration = traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines));
-        let inner = Inner { constants, heap, pipelines, binding, limits, debug_device, acceleration, foundation };
+        let inner = Inner { constants, heap, foundation, pipelines, binding, limits, debug_device, acceleration };
         let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), memory: Keep::Freely };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
@@ -176,8 +176,8 @@ impl Gpu {
     /// The same device with a memory pool: when large buffers made from this handle and its clones are dropped, up to
     /// `bytes` of their memory is kept for buffers of nearly the same size. It is freed when this handle, its clones
     /// and everything made from them are gone, or when the device is full. Use it for repeated work: drivers clear
-    /// fresh memory, which may take as long as the work on it. A memory limit of this handle ([`Gpu::with_memory`]) does
-    /// not hold for the new one.
+    /// fresh memory, which may take as long as the work on it. A memory limit of this handle ([`Gpu::with_memory`])
+    /// does not hold for the new one.
     #[must_use]
     pub fn with_pool(&self, bytes: u64) -> Self {
         let pool = Pool::new(bytes);

@@ -207,7 +207,8 @@ impl Gpu {
     /// Writes by a command buffer of the host must be available to `HOST_READ`: mapped memory is read without a copy.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a part that does not lie in the buffer, a failed Vulkan call, or no memory for the transfer.
+    /// [`Error::Invalid`] for a part that does not lie in the buffer, a failed Vulkan call, or no memory for the
+    /// transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
         // The range is checked as well: the part may be of an earlier buffer whose handle the driver gave out again.
         let within = part.offset.checked_add(part.size).is_some_and(|end| end <= buffer.size());

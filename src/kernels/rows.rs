@@ -8,7 +8,7 @@
 
 use super::target::{SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::gpu::DeviceReport;
-use crate::options::named;
+use crate::named::named;
 use ash::vk::DriverId;
 use std::borrow::Cow;
 

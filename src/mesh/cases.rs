@@ -26,8 +26,8 @@ pub fn cases() -> Result<Vec<Case>> {
     Ok(cases)
 }
 
-/// A solid cylinder of three rings of this many sectors and eight layers, with its cells in no order. Four tetrahedra per
-/// sector meet at each vertex inside the axis: vertices 4·(`sectors` + 1), 8·(`sectors` + 1), and so on.
+/// A solid cylinder of three rings of this many sectors and eight layers, with its cells in no order. Four tetrahedra
+/// per sector meet at each vertex inside the axis: vertices 4·(`sectors` + 1), 8·(`sectors` + 1), and so on.
 ///
 /// # Errors
 /// Those of [`kuhn`].

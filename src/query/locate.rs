@@ -11,9 +11,12 @@ use crate::mesh::On;
 use crate::options::{POINT_RUN, TOLERANCE};
 use crate::primitives::Arena;
 use crate::reference::locate::CHUNK;
+use crate::reference::traverse::full_stack;
 
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
-const MAX_STACK: u32 = 7 * MAX_LEVEL + 1;
+const MAX_STACK: u32 = full_stack(MAX_LEVEL) as u32;
+/// Entries of a list that [`LocateMethod::Traversal`] searches: so many that no loop gets too long for a driver.
+pub const MOST_TRAVERSED: u32 = 32_000;
 
 /// How the owner of a point is searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -28,8 +31,8 @@ pub enum LocateMethod {
     /// As [`LocateMethod::Runs`], but in the order given by [`PointInput::order`], for example that of
     /// [`super::cmd_sort_points`]; [`locate`] computes this order itself. Suits points in no particular order.
     Sorted,
-    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (brought into 1…71). Only the
-    /// first 32,000 entries of a list are searched.
+    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (brought into 1…78). Only the
+    /// first [`MOST_TRAVERSED`] entries of a list are searched.
     Traversal(u32),
 }
 
@@ -149,7 +152,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             };
             return r.dispatch(
                 &arguments,
-                LocateByTraversalSpec { workgroup, stack: stack.clamp(1, MAX_STACK), lists, ..Default::default() },
+                LocateByTraversalSpec { workgroup, stack: stack.clamp(1, MAX_STACK), lists, most: MOST_TRAVERSED, ..Default::default() },
                 groups(1),
             );
         }

@@ -9,7 +9,7 @@ mod visible;
 mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
-pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, PointInput, cmd_interpolate, cmd_locate, locate};
+pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
 pub use order::{PointOrder, cmd_sort_points};
 pub use overlap::{OverlapInput, OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;

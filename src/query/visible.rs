@@ -10,9 +10,9 @@ pub fn visible_bytes(nodes: u32) -> u64 {
     4 * u64::from(nodes.div_ceil(32))
 }
 
-/// Records into `marks` which nodes of a tree have a value within one of the ranges `values` (two floats each, ascending
-/// and disjoint, as in [`crate::render::Plan::visible_values`]). `values` consists of the ranges and their number.
-/// `marks` has [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are the nodes' ranges as
+/// Records into `marks` which nodes of a tree have a value within one of the ranges `values` (two floats each,
+/// ascending and disjoint, as in [`crate::render::Plan::visible_values`]). `values` consists of the ranges and their
+/// number. `marks` has [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are the nodes' ranges as
 /// [`crate::build::cmd_ranges`] records them. Compute shaders read and write everything; there is no barrier before or
 /// after.
 ///

@@ -66,14 +66,14 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let splits = super::splits::splits(&entries.codes, level);
 
     // Stage 4: construct the nodes bottom-up.
-    let flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
+    let leaf_flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
     let quarters = quarters::quarters(&entries.codes, &entries.primitives, &grid, mesh, vertices);
-    let octants = leaves::masks(&splits, &flags, &quarters, &grid);
-    let boundary = levels::flags(flags, &splits);
+    let octants = leaves::masks(&splits, &leaf_flags, &quarters, &grid);
+    let flags = levels::flags(leaf_flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
-    let mask = levels::masks(&octants, &splits);
+    let masks = levels::masks(&octants, &splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
     let grid = Grid { first_leaf: co.len() as u32 - 1, ..grid };
-    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, co, no, boundary, mask, boxes };
+    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, co, no, flags, masks, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

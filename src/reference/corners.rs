@@ -1,16 +1,16 @@
-//! Crowded vertices (SPEC 2.3): those at which more tetrahedra may meet than a star can hold, such as the vertices on the
-//! axis of a swept mesh. Their tetrahedra count as boundary, so such a vertex lies in leaves with whole lists, and no walk
-//! ends there. Twin of `glsl/shared/corners.glsl`.
+//! Crowded vertices (SPEC 2.3): those at which more tetrahedra may meet than a star can hold, such as the vertices on
+//! the axis of a swept mesh. Their tetrahedra count as boundary, so such a vertex lies in leaves with whole lists, and
+//! no walk ends there. Twin of `glsl/shared/corners.glsl`.
 //!
 //! Counting the tetrahedra at every vertex would take an atomic operation for each of their corners. Only thin corners
-//! are counted instead, of which most meshes have few. A corner with edges a, b, c has the solid angle ω with
-//! tan(ω/2) = |det(a, b, c)| / D, where D ≤ 4 |a| |b| |c|. So where ω < 0.152, det² ≤ 3/32 a² b² c²; such a corner is
-//! called thin, as are some others. The solid angles round a vertex sum to 4π at most where tetrahedra do not overlap, so
-//! at most 82 of them are 0.152 or more: of more than [`STAR`](super::walk::STAR) = 128 corners, more than 46 are thin.
+//! are counted instead, of which most meshes have few. A corner with edges a, b, c has the solid angle ω with tan(ω/2)
+//! = |det(a, b, c)| / D, where D ≤ 4 |a| |b| |c|. So where ω < 0.152, det² ≤ 3/32 a² b² c²; such a corner is called
+//! thin, as are some others. The solid angles round a vertex sum to 4π at most where tetrahedra do not overlap, so at
+//! most 82 of them are 0.152 or more: of more than [`STAR`](super::walk::STAR) = 128 corners, more than 46 are thin.
 //!
-//! Everything is scaled by a power of two, so that the largest edge is about 1, and edges are rounded up to multiples of
-//! 2^-20. So lengths are never too small, and their products are never denormal, since one of the edges of a corner is at
-//! least half as long as the longest.
+//! Everything is scaled by a power of two, so that the largest edge is about 1, and edges are rounded up to multiples
+//! of 2^-20. So lengths are never too small, and their products are never denormal, since one of the edges of a corner
+//! is at least half as long as the longest.
 
 use super::tet::{Bounds, Tet, Vec3, dot};
 use crate::grid::{canonical, two_to};

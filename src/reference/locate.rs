@@ -170,9 +170,8 @@ impl<'a> Locator<'a> {
         points.par_iter().map(|&p| self.locate(p)).collect()
     }
 
-    /// The field's value at a location: `(b0·v0 + b1·v1) + (b2·v2 + b3·v3)` over the owner's vertices in the caller's
-    /// order, or the owner's value if the field has values per tetrahedron. NaN without an owner, or if the field is
-    /// too short.
+    /// The field's value at a location: interpolated by [`weighed`] over the owner's vertices in the caller's order, or
+    /// the owner's value if the field has values per tetrahedron. NaN without an owner, or if the field is too short.
     pub fn value(&self, field: &Field, location: &Location) -> f32 {
         let at = |i: u32| field.values.get(i as usize).copied().unwrap_or(f32::NAN);
         let Some(&ids) = self.mesh.tets.get(location.owner as usize) else { return f32::NAN };

@@ -9,9 +9,9 @@
 //! the lengths in it, is at least twice the sum of all rounding errors. So a tetrahedron that touches the box is never
 //! called separate, and one that is called touching is at most about 2^-19 of the size of box and tetrahedron away.
 //!
-//! **Two tetrahedra**, [`tets_touch`]: two with an equal vertex touch; of others, 8 face normals and 36 crosses of edges
-//! are tried as axes, with no allowance, and touching counts as intersection. The answer for (a, b) equals that for
-//! (b, a) bit for bit, because every difference and cross product changes only its sign.
+//! **Two tetrahedra**, [`tets_touch`]: two with an equal vertex touch; of others, 8 face normals and 36 crosses of
+//! edges are tried as axes, with no allowance, and touching counts as intersection. The answer for (a, b) equals that
+//! for (b, a) bit for bit, because every difference and cross product changes only its sign.
 
 use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
 use crate::grid::{canonical, reciprocal, two_to};

@@ -72,12 +72,12 @@ impl TreeArrays {
         length("quarters", self.quarters.len(), quarters)?;
         length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
         length("CO", self.co.len(), internal + 1)?;
-        length("BF", self.boundary.len(), nodes.div_ceil(32))?;
-        length("mask", self.mask.len(), nodes.div_ceil(4))?;
+        length("BF", self.flags.len(), nodes.div_ceil(32))?;
+        length("mask", self.masks.len(), nodes.div_ceil(4))?;
         length("BV", self.boxes.as_ref().map_or(nodes, Vec::len), nodes)?;
         let tail = |words: &[u32], used: usize| used == 0 || words.last().is_none_or(|w| w >> used == 0);
-        rule(tail(&self.boundary, nodes % 32), || format!("BF has bits past node {nodes}"))?;
-        rule(tail(&self.mask, nodes % 4 * 8), || format!("mask has bits past node {nodes}"))
+        rule(tail(&self.flags, nodes % 32), || format!("BF has bits past node {nodes}"))?;
+        rule(tail(&self.masks, nodes % 4 * 8), || format!("mask has bits past node {nodes}"))
     }
 
     /// NO: there is one root; every level has at least one node, and at most 8 per node of the level above.

@@ -34,8 +34,9 @@ pub const STRIDE: u32 = 64;
 pub const LEG: u32 = 1024;
 /// Points of the cell to go by in parts 2 and 3; the first one is the centre.
 pub const DETOURS: u32 = 8;
-/// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to its
-/// star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if there is one.
+/// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to
+/// its star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if
+/// there is one.
 const ROUND: u32 = STAR as u32;
 /// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap between tetrahedra that is due to
 /// rounding, and the nearest tetrahedron owns it.

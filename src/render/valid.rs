@@ -8,8 +8,8 @@ use crate::mesh::Mesh;
 pub struct ValidTets<'a> {
     /// Their bounds.
     pub bounds: Bounds,
-    /// Four entries per tetrahedron of the mesh, [`u32::MAX`] if the face opposite to that vertex is on the surface. They
-    /// may be missing if only iso-surfaces are drawn.
+    /// Four entries per tetrahedron of the mesh, [`u32::MAX`] if the face opposite to that vertex is on the surface.
+    /// They may be missing if only iso-surfaces are drawn.
     pub neighbours: &'a [[u32; 4]],
     /// Whether the tetrahedron of this number is valid.
     pub is_valid: &'a dyn Fn(u32) -> bool,

@@ -21,7 +21,7 @@ pub use settings::{Plane, SliceSettings};
 use crate::error::{Error, Result};
 use crate::grid::{CellRange, canonical, two_to};
 use crate::layout::{Grid, SlicePlan};
-use crate::options::named;
+use crate::named::named;
 use glam::DVec3;
 use std::ops::Range;
 

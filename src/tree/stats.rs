@@ -107,7 +107,7 @@ impl TreeArrays {
             nodes: u64::from(self.nodes()),
             internal_nodes: u64::from(self.internal_nodes()),
             leaves,
-            boundary_nodes: self.boundary.iter().map(|w| u64::from(w.count_ones())).sum(),
+            boundary_nodes: self.flags.iter().map(|w| u64::from(w.count_ones())).sum(),
             boundary_leaves: boundary().count() as u64,
             boundary_entries: boundary().map(|(_, n)| n).sum(),
             longest_leaf: lengths().map(|(_, n)| n).max().unwrap_or(0),

@@ -119,9 +119,9 @@ fn an_empty_mesh_is_one_empty_leaf() {
     for name in ["empty", "points-only", "bad-all"] {
         let (mesh, topology) = prepared(cases().unwrap().into_iter().find(|c| c.name == name).unwrap().mesh);
         let tree = tree(&mesh, &topology, 0.0, Assign::Exact);
-        let TreeArrays { p, po, co, no, boundary, mask, .. } = &tree;
+        let TreeArrays { p, po, co, no, flags, masks, .. } = &tree;
         assert_eq!(
-            (&p[..], &po[..], &co[..], &no[..], &boundary[..], &mask[..]),
+            (&p[..], &po[..], &co[..], &no[..], &flags[..], &masks[..]),
             (&[][..], &[0, 0][..], &[0][..], &[1][..], &[0][..], &[0][..])
         );
         assert_eq!(tree.validate(&mesh, &topology).unwrap().leaves, 1);

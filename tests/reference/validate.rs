@@ -40,13 +40,13 @@ fn grid() {
 fn lengths() {
     breaks(Assign::Aabb, "PO has", |t| t.po.truncate(5));
     breaks(Assign::Aabb, "CO has", |t| t.co.push(0));
-    breaks(Assign::Aabb, "BF has", |t| t.boundary.push(0));
-    breaks(Assign::Aabb, "mask has", |t| t.mask.clear());
+    breaks(Assign::Aabb, "BF has", |t| t.flags.push(0));
+    breaks(Assign::Aabb, "mask has", |t| t.masks.clear());
     breaks(Assign::Aabb, "BV has", |t| t.boxes = Some(Vec::new()));
     breaks(Assign::Aabb, "NO has 0 levels", |t| t.no.clear());
     breaks(Assign::Aabb, "elements", |t| t.no[3] = u32::MAX);
-    breaks(Assign::Aabb, "BF has bits past", |t| *t.boundary.last_mut().unwrap() |= 1 << 31);
-    breaks(Assign::Aabb, "mask has bits past", |t| *t.mask.last_mut().unwrap() |= 1 << 31);
+    breaks(Assign::Aabb, "BF has bits past", |t| *t.flags.last_mut().unwrap() |= 1 << 31);
+    breaks(Assign::Aabb, "mask has bits past", |t| *t.masks.last_mut().unwrap() |= 1 << 31);
 }
 
 #[test]
@@ -67,9 +67,9 @@ fn children() {
 
 #[test]
 fn masks() {
-    breaks(Assign::Aabb, "mask of node 0", |t| t.mask[0] &= !1);
-    breaks(Assign::Aabb, "mask of node 5", |t| t.mask[1] &= !(1 << 8));
-    breaks(Assign::Aabb, "mask of leaf", |t| *t.mask.last_mut().unwrap() &= !1);
+    breaks(Assign::Aabb, "mask of node 0", |t| t.masks[0] &= !1);
+    breaks(Assign::Aabb, "mask of node 5", |t| t.masks[1] &= !(1 << 8));
+    breaks(Assign::Aabb, "mask of leaf", |t| *t.masks.last_mut().unwrap() &= !1);
 }
 
 #[test]
@@ -126,14 +126,14 @@ fn lists() {
 
 #[test]
 fn flags() {
-    breaks(Assign::Aabb, "BF[0]", |t| t.boundary[0] &= !1);
+    breaks(Assign::Aabb, "BF[0]", |t| t.flags[0] &= !1);
     breaks(Assign::Aabb, "BF[", |t| {
         let j = t.leaves().find(|&j| !t.is_boundary(j)).unwrap();
-        t.boundary[j as usize / 32] |= 1 << (j % 32);
+        t.flags[j as usize / 32] |= 1 << (j % 32);
     });
     breaks(Assign::Aabb, "its primitives say true", |t| {
         let j = t.leaves().find(|&j| t.is_boundary(j)).unwrap();
-        t.boundary[j as usize / 32] &= !(1 << (j % 32));
+        t.flags[j as usize / 32] &= !(1 << (j % 32));
     });
 }
 
@@ -159,7 +159,7 @@ fn no_change_of_a_word_goes_unnoticed() {
     for alpha in [0.0, 2.0, 10.0] {
         for assign in Assign::EVERY {
             let tree = tree(&mesh, &topology, alpha, assign);
-            let arrays: [Pick; 6] = [|t| &mut t.p, |t| &mut t.po, |t| &mut t.co, |t| &mut t.no, |t| &mut t.boundary, |t| &mut t.mask];
+            let arrays: [Pick; 6] = [|t| &mut t.p, |t| &mut t.po, |t| &mut t.co, |t| &mut t.no, |t| &mut t.flags, |t| &mut t.masks];
             for pick in arrays {
                 let mut broken = tree.clone();
                 let n = pick(&mut broken).len();

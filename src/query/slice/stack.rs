@@ -123,8 +123,8 @@ impl<'a> Slicing<'a> {
 /// to points or tetrahedra. `report` receives the number of voxels done and their total.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for a field of the wrong length, for voxels that [`VoxelGrid::plan`] refuses, or for a structure
-/// over another mesh; [`crate::Error::Memory`]; a failed Vulkan call; errors of `sink`.
+/// [`crate::Error::Invalid`] for a field of the wrong length, for voxels that [`VoxelGrid::plan`] refuses, or for a
+/// structure over another mesh; [`crate::Error::Memory`]; a failed Vulkan call; errors of `sink`.
 pub fn slice(
     mesh: &DeviceMesh,
     built: &dyn Built,

@@ -26,7 +26,7 @@ type Node = (u32, u32, u32);
 impl<'a> Intervals<'a> {
     /// Prepares the rays of `plan`. `visible` has one bit per node, set if something is visible there.
     pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &'a Plan) -> Self {
-        Self { tree, nodes: visible.unwrap_or(&tree.boundary), plan, part: CellRange::WHOLE, slack: interval_slack(&tree.grid) }
+        Self { tree, nodes: visible.unwrap_or(&tree.flags), plan, part: CellRange::WHOLE, slack: interval_slack(&tree.grid) }
     }
 
     /// Restricts samples to these cells of the finest grid.
