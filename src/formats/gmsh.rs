@@ -9,6 +9,7 @@ use super::assemble::Assembly;
 use super::gmsh_data::View;
 use super::gmsh_elements::Elements;
 use super::gmsh_reader::{Reader, Version, old};
+use super::scalar::Scalar;
 use super::source::{Source, printable};
 use super::tags::Tags;
 use crate::error::Result;
@@ -102,9 +103,10 @@ impl Content {
         assembly.set_points(std::mem::take(&mut self.points), &[0]);
         assembly.point_tags = std::mem::take(&mut self.tags);
         let elements = &mut self.elements;
-        assembly.reserve(elements.kinds.len());
-        let mut rest = elements.nodes.as_mut_slice();
-        for (i, &kind) in elements.kinds.iter().enumerate() {
+        assembly.reserve(elements.types.len());
+        let mut stored = std::mem::take(&mut elements.nodes);
+        let mut rest = stored.as_mut_slice();
+        for (i, kind) in elements.kinds().enumerate() {
             let (nodes, after) = rest.split_at_mut(kind.nodes.unwrap_or(0));
             rest = after;
             for node in &mut *nodes {
@@ -116,6 +118,7 @@ impl Content {
             }
             assembly.push(kind, nodes)?;
         }
+        elements.nodes = stored;
         let repeated = self.elements.repeated();
         if repeated > 0 {
             let why = "their volume belongs to several physical groups, so all of them count as boundary";
@@ -125,7 +128,7 @@ impl Content {
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
         let mut seen = HashSet::new();
         for view in std::mem::take(&mut self.views) {
-            let (tags, count) = if view.on == On::Points { (&points, assembly.n_points()) } else { (&cells, self.elements.kinds.len()) };
+            let (tags, count) = if view.on == On::Points { (&points, assembly.n_points()) } else { (&cells, self.elements.types.len()) };
             match view.array(tags, count, &mut assembly.padding) {
                 Ok(mut array) => {
                     if !seen.insert((view.on, view.name)) {
@@ -148,7 +151,7 @@ impl Content {
             self.elements.entities.iter().map(group).collect()
         };
         for (name, marks) in [("gmsh:physical", &physical), ("gmsh:geometrical", &self.elements.entities)] {
-            if marks.len() == self.elements.kinds.len() && marks.iter().any(|m| *m != 0) {
+            if marks.len() == self.elements.types.len() && marks.iter().any(|m| *m != 0) {
                 let values = marks.iter().map(|&m| m as f32).collect();
                 assembly.arrays.push(Array { name: name.into(), on: On::Cells, components: 1, values });
             }
@@ -199,6 +202,12 @@ impl Reader<'_> {
             let in_block =
                 in_block.ok_or_else(|| self.source.error_byte(at, format!("a block of nodes goes past the {n} that are announced")))?;
             if version == Version::V41 {
+                if self.binary {
+                    self.rows(Scalar::U64, [in_block, 1], "the numbers of nodes", |row| content.tags.push(row[0]))?;
+                    let width = 3 + extra as usize;
+                    self.rows(Scalar::F64, [in_block, width], "nodes", |row| content.points.push([row[0], row[1], row[2]]))?;
+                    continue;
+                }
                 for _ in 0..in_block {
                     content.tags.push(self.long("the number of a node")?);
                 }

@@ -4,6 +4,7 @@ use std::collections::{HashMap, HashSet};
 
 use super::cells::{self, CellType};
 use super::gmsh_reader::{Reader, Version};
+use super::scalar::Scalar;
 use super::source::{Source, Tokens, parse_integer, printable};
 use crate::error::Result;
 
@@ -11,7 +12,8 @@ use crate::error::Result;
 #[derive(Default)]
 pub(crate) struct Elements {
     pub tags: Vec<i64>,
-    pub kinds: Vec<CellType>,
+    /// Number of the type of each element.
+    pub types: Vec<u8>,
     /// Node tags of all elements, one after the other.
     pub nodes: Vec<i64>,
     pub physical: Vec<i64>,
@@ -19,8 +21,9 @@ pub(crate) struct Elements {
 }
 
 impl<'a> Reader<'a> {
-    fn kind(&self, number: i64, at: usize) -> Result<CellType> {
-        cells::gmsh(number).ok_or_else(|| {
+    /// An element type, and its number.
+    fn kind(&self, number: i64, at: usize) -> Result<(CellType, u8)> {
+        cells::gmsh(number).zip(u8::try_from(number).ok()).ok_or_else(|| {
             let message = format!("unknown element type {number}");
             if self.binary { self.source.error_byte(at, message) } else { self.source.error_line(at, message) }
         })
@@ -54,46 +57,44 @@ impl<'a> Reader<'a> {
                     *slot = mark;
                 }
             }
-            let mut nodes = Vec::new();
-            while let Some((token, at)) = line.next_token() {
-                let node = parse_integer(token);
-                nodes.push(node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", printable(token))))?);
-            }
-            let kind = self.kind(number, at)?;
-            elements.push(self.source, at, kind, tag, two, &nodes)?;
+            let first = elements.nodes.len();
+            self.line_of_nodes(&mut line, elements)?;
+            let (kind, number) = self.kind(number, at)?;
+            elements.check(self.source, at, kind, tag, first)?;
+            elements.mark(number, tag, two);
+        }
+        Ok(())
+    }
+
+    /// Reads the nodes in the rest of a line.
+    fn line_of_nodes(&self, line: &mut Tokens<'_>, elements: &mut Elements) -> Result<()> {
+        while let Some((token, at)) = line.next_token() {
+            let node = parse_integer(token);
+            let node = node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", printable(token))))?;
+            elements.nodes.push(node);
         }
         Ok(())
     }
 
     fn elements_2_binary(&mut self, n: usize, elements: &mut Elements) -> Result<()> {
-        while elements.kinds.len() < n {
+        while elements.types.len() < n {
             let at = self.tokens.at;
             let number = self.int("the type of elements")?;
             let follow = self.int("the number of elements in a block")?;
             let marks = self.int("the number of tags of elements")?;
-            let kind = self.kind(number, at)?;
-            let width = kind.nodes.unwrap_or(0);
+            let (kind, number) = self.kind(number, at)?;
             let fail = |message: String| self.source.error_byte(at, message);
-            let follow = usize::try_from(follow).ok().filter(|&f| f > 0 && f <= n - elements.kinds.len());
+            let follow = usize::try_from(follow).ok().filter(|&f| f > 0 && f <= n - elements.types.len());
             let follow =
                 follow.ok_or_else(|| fail(format!("a block of elements that goes past the {n} that are announced, or is empty")))?;
             let marks = usize::try_from(marks).ok().filter(|&m| m <= self.tokens.left() / 4);
             let marks = marks.ok_or_else(|| fail("more tags than the rest of the file can hold".into()))?;
-            for _ in 0..follow {
-                let tag = self.int("the number of an element")?;
-                let mut two = [0; 2];
-                for i in 0..marks {
-                    let mark = self.int("a tag of an element")?;
-                    if let Some(slot) = two.get_mut(i) {
-                        *slot = mark;
-                    }
-                }
-                for _ in 0..width {
-                    let node = self.int("a node of an element")?;
-                    elements.nodes.push(node);
-                }
-                elements.mark(kind, tag, two);
-            }
+            let width = 1 + marks + kind.nodes.unwrap_or(0);
+            self.rows(Scalar::I32, [follow, width], "elements", |row| {
+                let (tag, nodes) = (row[0], &row[1 + marks..]);
+                elements.nodes.extend_from_slice(nodes);
+                elements.mark(number, tag, [0, 1].map(|i| if i < marks { row[1 + i] } else { 0 }));
+            })?;
         }
         Ok(())
     }
@@ -115,33 +116,30 @@ impl<'a> Reader<'a> {
             let (dimension, entity) = if version == Version::V41 { (first, second) } else { (second, first) };
             let number = self.int("the type of elements")?;
             let in_block = self.long("the number of elements in a block")?;
-            let kind = self.kind(number, at)?;
-            let in_block = usize::try_from(in_block).ok().filter(|&b| b <= n - elements.kinds.len());
+            let (kind, number) = self.kind(number, at)?;
+            let in_block = usize::try_from(in_block).ok().filter(|&b| b <= n - elements.types.len());
             let in_block =
                 in_block.ok_or_else(|| self.source.error_byte(at, format!("a block of elements goes past the {n} that are announced")))?;
             let two = [0, if dimension == 3 { entity } else { 0 }];
+            if self.binary {
+                let scalar = if version == Version::V41 { Scalar::U64 } else { Scalar::I32 };
+                self.rows(scalar, [in_block, 1 + kind.nodes.unwrap_or(0)], "elements", |row| {
+                    elements.nodes.extend_from_slice(&row[1..]);
+                    elements.mark(number, row[0], two);
+                })?;
+                continue;
+            }
             for _ in 0..in_block {
-                if !self.binary {
-                    let (mut line, at) = self.line("an element")?;
-                    let tag = line.integer("the number of an element")?;
-                    let mut nodes = Vec::with_capacity(kind.nodes.unwrap_or(0));
-                    while line.peek().is_some() {
-                        nodes.push(line.integer("a node of an element")?);
-                    }
-                    elements.push(self.source, at, kind, tag, two, &nodes)?;
-                    continue;
-                }
-                let wide = version == Version::V41;
-                let tag = if wide { self.long("the number of an element")? } else { self.int("the number of an element")? };
-                for _ in 0..kind.nodes.unwrap_or(0) {
-                    let node = if wide { self.long("a node of an element")? } else { self.int("a node of an element")? };
-                    elements.nodes.push(node);
-                }
-                elements.mark(kind, tag, two);
+                let (mut line, at) = self.line("an element")?;
+                let tag = line.integer("the number of an element")?;
+                let first = elements.nodes.len();
+                self.line_of_nodes(&mut line, elements)?;
+                elements.check(self.source, at, kind, tag, first)?;
+                elements.mark(number, tag, two);
             }
         }
-        if elements.kinds.len() != n {
-            let message = format!("$Elements: {n} elements are announced, {} are there", elements.kinds.len());
+        if elements.types.len() != n {
+            let message = format!("$Elements: {n} elements are announced, {} are there", elements.types.len());
             return Err(self.source.error_byte(self.tokens.at, message));
         }
         Ok(())
@@ -149,27 +147,30 @@ impl<'a> Reader<'a> {
 }
 
 impl Elements {
-    fn push(&mut self, source: &Source, at: usize, kind: CellType, tag: i64, marks: [i64; 2], nodes: &[i64]) -> Result<()> {
-        let wanted = kind.nodes.unwrap_or(0);
-        if nodes.len() != wanted {
-            let message = format!("element {tag} ({}) has {} nodes instead of {wanted}", kind.name, nodes.len());
-            return Err(source.error_line(at, message));
+    /// The type of each element.
+    pub fn kinds(&self) -> impl Iterator<Item = CellType> {
+        self.types.iter().filter_map(|&number| cells::gmsh(number.into()))
+    }
+
+    /// Checks the number of nodes of the next element, of which `first` is the first.
+    fn check(&self, source: &Source, at: usize, kind: CellType, tag: i64, first: usize) -> Result<()> {
+        let (found, wanted) = (self.nodes.len() - first, kind.nodes.unwrap_or(0));
+        if found == wanted {
+            return Ok(());
         }
-        self.nodes.extend_from_slice(nodes);
-        self.mark(kind, tag, marks);
-        Ok(())
+        Err(source.error_line(at, format!("element {tag} ({}) has {found} nodes instead of {wanted}", kind.name)))
     }
 
     /// The number of volume cells that are repeats: version 2 has the cells of a volume once for each physical group.
     pub fn repeated(&self) -> usize {
         let mut groups = HashMap::new();
-        let marks = self.kinds.iter().zip(&self.entities).zip(&self.physical).filter(|((kind, _), _)| kind.shape.corners() > 0);
+        let marks = self.kinds().zip(&self.entities).zip(&self.physical).filter(|((kind, _), _)| kind.shape.corners() > 0);
         if marks.into_iter().all(|((_, entity), group)| *groups.entry(entity).or_insert(group) == group) {
             return 0;
         }
         let mut rest = self.nodes.as_slice();
         let mut seen = HashSet::new();
-        let again = |kind: &&CellType| {
+        let again = |kind: &CellType| {
             let (nodes, after) = rest.split_at(kind.nodes.unwrap_or(0));
             rest = after;
             let mut corners = [i64::MAX; 8];
@@ -178,11 +179,11 @@ impl Elements {
             corners.sort_unstable();
             n > 0 && !seen.insert(corners)
         };
-        self.kinds.iter().filter(again).count()
+        self.kinds().filter(again).count()
     }
 
-    fn mark(&mut self, kind: CellType, tag: i64, marks: [i64; 2]) {
-        self.kinds.push(kind);
+    fn mark(&mut self, number: u8, tag: i64, marks: [i64; 2]) {
+        self.types.push(number);
         self.tags.push(tag);
         self.physical.push(marks[0]);
         self.entities.push(marks[1]);

@@ -85,7 +85,7 @@ impl<'a> Reader<'a> {
     pub fn skip(&mut self, name: &[u8], at: usize) -> Result<()> {
         let end = [b"$End", name].concat();
         let rest = &self.source.bytes[self.tokens.at..];
-        let found = rest.windows(end.len()).position(|w| w == end);
+        let found = memchr::memmem::find(rest, &end);
         let found = found.ok_or_else(|| self.source.error_line(at, format!("section ${0} without $End{0}", printable(name))))?;
         self.tokens.at += found + end.len();
         Ok(())
@@ -102,8 +102,20 @@ impl<'a> Reader<'a> {
 
     fn number<T: Number + Default>(&mut self, scalar: Scalar, what: &str) -> Result<T> {
         let big = self.big_endian;
-        let bytes = self.bytes(scalar.size(), what)?;
-        Ok(scalar.convert(bytes, big).first().copied().unwrap_or_default())
+        Ok(scalar.one(self.bytes(scalar.size(), what)?, big).unwrap_or_default())
+    }
+
+    /// Reads `rows` rows of `width` binary numbers, a part of them at a time.
+    pub fn rows<T: Number>(&mut self, scalar: Scalar, [rows, width]: [usize; 2], what: &str, mut take: impl FnMut(&[T])) -> Result<()> {
+        const PART: usize = 4096;
+        let (mut left, big) = (rows, self.big_endian);
+        while left > 0 && width > 0 {
+            let n = left.min(PART);
+            let bytes = self.bytes((n * scalar.size()).saturating_mul(width), what)?;
+            scalar.convert(bytes, big).chunks_exact(width).for_each(&mut take);
+            left -= n;
+        }
+        Ok(())
     }
 
     /// Reads an integer, of 4 bytes in binary files.

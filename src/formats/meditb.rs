@@ -87,7 +87,7 @@ impl Reader<'_> {
 
     fn number<T: Number>(&mut self, scalar: Scalar) -> Result<T> {
         let bytes = self.source.bytes.get(self.at..self.at.saturating_add(scalar.size()));
-        let value = bytes.and_then(|b| scalar.convert(b, self.big_endian).first().copied());
+        let value = bytes.and_then(|b| scalar.one(b, self.big_endian));
         let value = value.ok_or_else(|| self.source.error_byte(self.at, "the file ends here, without a section End"))?;
         self.at += scalar.size();
         Ok(value)

@@ -117,8 +117,19 @@ impl Scalar {
         values
     }
 
+    /// Converts a stored number; `None` if there are too few bytes.
+    pub fn one<T: Number>(self, bytes: &[u8], big: bool) -> Option<T> {
+        let mut last = Last(None);
+        self.extend::<T, _>(&mut last, bytes, big);
+        last.0
+    }
+
     /// Converts stored numbers as [`Self::convert`] does, and appends them to `values`.
     pub fn convert_to<T: Number>(self, values: &mut Vec<T>, bytes: &[u8], big: bool) {
+        self.extend::<T, _>(values, bytes, big);
+    }
+
+    fn extend<T: Number, E: Extend<T>>(self, values: &mut E, bytes: &[u8], big: bool) {
         macro_rules! numbers {
             ($type:ty, $from:ident, $wide:ty) => {{
                 const SIZE: usize = size_of::<$type>();
@@ -146,5 +157,14 @@ impl Scalar {
             Scalar::F32 => numbers!(f32, from_f64, f64),
             Scalar::F64 => numbers!(f64, from_f64, f64),
         }
+    }
+}
+
+/// Keeps the last of the values that it is extended by.
+struct Last<T>(Option<T>);
+
+impl<T> Extend<T> for Last<T> {
+    fn extend<I: IntoIterator<Item = T>>(&mut self, values: I) {
+        self.0 = values.into_iter().last().or(self.0.take());
     }
 }

@@ -7,6 +7,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use crate::error::{Error, Result};
+use memchr::memmem;
 
 /// Bytes read at a time while searching for the start of raw data in a file.
 const PIECE: u64 = 1 << 14;
@@ -141,7 +142,7 @@ impl RawData {
         self.failed = !text.trim_ascii_start().starts_with(b"<");
         let from = self.done.saturating_sub(TAG.len());
         self.done = bytes.len();
-        self.tag = self.tag.or_else(|| bytes[from..].windows(TAG.len()).position(|w| w == TAG).map(|at| from + at));
+        self.tag = self.tag.or_else(|| memmem::find(&bytes[from..], TAG).map(|at| from + at));
         let Some(tag) = self.tag.filter(|_| !self.failed) else { return false };
         let Some(end) = bytes[tag..].iter().position(|&b| b == b'>') else { return false };
         self.failed = !bytes[tag..tag + end].windows(3).any(|w| w == b"raw");

@@ -66,7 +66,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 fn head(source: &Source) -> Cow<'_, str> {
     const APPENDED: &[u8] = b"<AppendedData";
     let bytes = &source.bytes;
-    let tag = bytes.windows(APPENDED.len()).position(|w| w == APPENDED);
+    let tag = memchr::memmem::find(bytes, APPENDED);
     let end = tag.and_then(|at| bytes[at..].iter().position(|&b| b == b'>').map(|close| at + close + 1)).unwrap_or(bytes.len());
     match std::str::from_utf8(&bytes[..end]) {
         Ok(text) => Cow::Borrowed(text),

@@ -294,29 +294,59 @@ fn decode_base64(parts: &[&[u8]], n: usize) -> Result<Vec<u8>, String> {
     const CONFIG: GeneralPurposeConfig =
         GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true);
     const ENGINE: GeneralPurpose = GeneralPurpose::new(&base64::alphabet::STANDARD, CONFIG);
-    fn flush(out: &mut Vec<u8>, text: &mut Vec<u8>) -> Result<(), String> {
-        ENGINE.decode_vec(&*text, out).map_err(|e| format!("bad base64 after {} bytes: {e}", out.len()))?;
-        text.clear();
-        Ok(())
-    }
-    let mut out = Vec::with_capacity(n + 3072);
-    let mut text = Vec::with_capacity(4096);
-    let mut padded = false;
-    for &b in parts.iter().copied().flatten().filter(|b| !b.is_ascii_whitespace()) {
-        text.push(b);
-        padded |= b == b'=';
-        if text.len() % 4 == 0 && (padded || text.len() == 4096 || out.len() + text.len() / 4 * 3 >= n) {
-            flush(&mut out, &mut text)?;
-            padded = false;
-            if out.len() >= n {
-                break;
+    let decode = |out: &mut Vec<u8>, text: &[u8]| {
+        let done = out.len();
+        ENGINE.decode_vec(text, out).map_err(|e| format!("bad base64 after {done} bytes: {e}"))
+    };
+    let mut out = Vec::with_capacity(n + 3);
+    let mut group = Vec::with_capacity(4); // that white space has cut
+    for mut run in parts.iter().flat_map(|part| part.split(u8::is_ascii_whitespace)) {
+        while !run.is_empty() && out.len() < n {
+            // Padding ends a group; what follows it is encoded separately.
+            let most = if group.is_empty() { (n - out.len()).div_ceil(3) * 4 } else { 4 - group.len() };
+            let most = most.min(run.len());
+            let padding = run[..most].iter().position(|&b| b == b'=').filter(|_| group.is_empty());
+            let end = padding.map_or(most, |at| (at / 4 + 1) * 4).min(run.len());
+            let whole = if group.is_empty() { end / 4 * 4 } else { 0 };
+            decode(&mut out, &run[..whole])?;
+            group.extend_from_slice(&run[whole..end]);
+            if group.len() == 4 {
+                decode(&mut out, &group)?;
+                group.clear();
             }
+            run = &run[end..];
         }
     }
-    flush(&mut out, &mut text)?;
+    decode(&mut out, &group)?;
     if out.len() < n {
         return Err(format!("its base64 data end after {} of {n} bytes", out.len()));
     }
     out.truncate(n);
     Ok(out)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two texts that are encoded separately, cut by white space at any places and into any parts.
+    #[test]
+    fn white_space_and_padding_may_be_anywhere() {
+        let coded = |bytes: &[u8]| base64::engine::general_purpose::STANDARD.encode(bytes);
+        let data: Vec<u8> = (0..60).map(|i| (i * 37) as u8).collect();
+        for first in [1, 2, 3, 8, 16] {
+            let text = coded(&data[..first]) + &coded(&data[first..]);
+            for width in 1..12 {
+                for parts in [1, 3, 20] {
+                    let lines: Vec<u8> = text.as_bytes().chunks(width).flat_map(|line| [line, b"\r\n "].concat()).collect();
+                    let parts: Vec<&[u8]> = lines.chunks(lines.len().div_ceil(parts)).collect();
+                    for n in [0, 1, first, first + 1, 59, 60] {
+                        assert_eq!(decode_base64(&parts, n).as_deref(), Ok(&data[..n]), "{first} {width} {n}");
+                    }
+                    assert!(decode_base64(&parts, 61).unwrap_err().starts_with("its base64 data end after 60 of 61 bytes"));
+                }
+            }
+        }
+        assert!(decode_base64(&[b"AAAA", b"A*AA"], 6).unwrap_err().starts_with("bad base64 after 3 bytes"));
+    }
 }
