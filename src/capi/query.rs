@@ -10,6 +10,8 @@ use crate::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
+use std::mem::MaybeUninit;
+use std::slice::IterMut;
 
 /// What a picture shows. `olbvh_default_picture_settings` returns the defaults.
 #[repr(C)]
@@ -125,13 +127,23 @@ impl HeldMesh {
     }
 }
 
-/// The caller's array that a call fills. A null pointer is allowed for an array without elements.
-fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [T]> {
+/// The caller's array that a call fills, and which may hold nothing yet. A null pointer is allowed for an array without
+/// elements.
+fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>]> {
     match (pointer.is_null(), count) {
         (_, 0) => Ok(&mut []),
         (true, _) => Err(missing(what)),
-        // SAFETY: the caller vouches for `count` elements that nothing else uses during the call (see each function).
-        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(pointer, count) }),
+        // SAFETY: the caller vouches for memory of `count` elements that nothing else uses during the call (see each
+        // function).
+        (false, _) => Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) }),
+    }
+}
+
+/// Writes values to the places that are next, as long as there are any.
+fn put<T>(places: &mut IterMut<'_, MaybeUninit<T>>, values: impl IntoIterator<Item = T>) {
+    // In this order: the first iterator of a pair may be asked once more than the second.
+    for (value, place) in values.into_iter().zip(places) {
+        place.write(value);
     }
 }
 
@@ -151,13 +163,13 @@ pub extern "C" fn olbvh_locate(
     border(|| {
         let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
         let points = array(points.cast::<[f32; 3]>(), count, "points")?;
-        let owners = array_mut(owners, count, "owners")?;
+        let mut owners = array_mut(owners, count, "owners")?.iter_mut();
         let method = LocateMethod::suited(count, mesh.device.input().tets as usize, false);
         let options = LocateOptions { tolerance: self::tolerance(tolerance), method };
         let found = locate(&mesh.device, tree, points, None, &options, SILENT)?;
-        owners.iter_mut().zip(found.owners).for_each(|(to, owner)| *to = mesh.cell(owner));
+        put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
         if !barycentrics.is_null() {
-            array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.copy_from_slice(&found.barycentrics);
+            put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);
         }
         Ok(())
     })
@@ -203,7 +215,7 @@ pub extern "C" fn olbvh_render(
         let settings = handle(settings, "settings")?.read()?;
         settings.check()?;
         let [width, height] = settings.size.map(|n| n as usize);
-        let pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?;
+        let mut pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?.iter_mut();
         let (values, on) = mesh.field(values, on_cells)?;
         let field = Field { name: "values".into(), on, values };
         let device = &mesh.device;
@@ -212,7 +224,7 @@ pub extern "C" fn olbvh_render(
         let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
         let prepared = Prepared::new(&settings, &mesh.download()?, &valid, &field)?;
         let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
-        pixels.copy_from_slice(&render(device, tree, &prepared.plan, (&field.values, on), normals, SILENT)?.colors);
+        put(&mut pixels, render(device, tree, &prepared.plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())
     })
 }
@@ -245,8 +257,8 @@ pub extern "C" fn olbvh_slice(
         let mut sink = |band: Band| {
             let touched = |kind: u8| if kind == TOUCHED { 1 << 31 } else { 0 };
             let owners = band.owners.iter().zip(&band.kinds).map(|(&owner, &kind)| mesh.cell(owner) | touched(kind));
-            answers.by_ref().zip(owners).for_each(|(to, answer)| *to = answer);
-            results.by_ref().zip(&band.values).for_each(|(to, value)| *to = *value);
+            put(&mut answers, owners);
+            put(&mut results, band.values);
             Ok(())
         };
         let field = field.as_ref().map(|(values, on)| (&values[..], *on));
@@ -263,14 +275,15 @@ pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a
     border(|| {
         let [a, b] = [handle(a, "a")?, handle(b, "b")?];
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
-        let hits = [array_mut(hits_a, words(a), "hits_a")?, array_mut(hits_b, words(b), "hits_b")?];
+        let hits = [array_mut(hits_a, words(a), "hits_a")?.iter_mut(), array_mut(hits_b, words(b), "hits_b")?.iter_mut()];
         let [one, other] = [a, b].map(|t| OverlapInput { mesh: &t.mesh.device, tree: &t.tree });
         let found = overlap(one, other, false, SILENT)?.overlap;
-        for ((bits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
-            bits.fill(0);
+        for ((mut hits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
+            let mut bits = vec![0; words(tree)];
             for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {
                 bits[(cell / 32) as usize] |= 1 << (cell % 32);
             }
+            put(&mut hits, bits);
         }
         Ok(())
     })
