@@ -484,3 +484,15 @@ fn two_sections_of_vertices_are_refused() {
         assert!(error.contains("a second section Vertices"), "{error}");
     }
 }
+
+/// A block of a binary Gmsh file that is cut off is refused with what was announced and what there is room for.
+#[test]
+fn cut_blocks_say_how_much_is_there() {
+    for (name, cells) in [("v22b.msh", 5 * 4 + 4), ("v41b.msh", 5 * 8)] {
+        let whole = all().into_iter().find(|file| file.0 == name).unwrap().1;
+        let end = whole.windows(13).position(|w| w == b"\n$EndElements").unwrap();
+        let error = load_bytes(name, whole[..end - cells].to_vec(), &LoadOptions::default()).unwrap_err().to_string();
+        assert!(error.contains("elements, but the rest of the file has room for "), "{name}: {error}");
+        println!("{error}");
+    }
+}

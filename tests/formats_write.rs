@@ -169,7 +169,7 @@ fn large_tables_of_points() {
         assert_eq!(load_points(&path).unwrap(), wanted);
         std::fs::write(&path, format!("{text}{end}1,2{end}{text}{end}1,two,3")).unwrap();
         let error = load_points(&path).unwrap_err().to_string();
-        assert!(error.contains("line 200001: 2 columns instead of 3"), "{error}");
+        assert!(error.contains("line 200001: 2 instead of 3 columns, separated by commas"), "{error}");
     }
 }
 

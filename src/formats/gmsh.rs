@@ -7,7 +7,7 @@ use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::gmsh_data::View;
-use super::gmsh_elements::Elements;
+use super::gmsh_elements::{Elements, kinds};
 use super::gmsh_reader::{Reader, Version, old};
 use super::scalar::Scalar;
 use super::source::{Source, printable};
@@ -104,9 +104,8 @@ impl Content {
         assembly.point_tags = std::mem::take(&mut self.tags);
         let elements = &mut self.elements;
         assembly.reserve(elements.types.len());
-        let mut stored = std::mem::take(&mut elements.nodes);
-        let mut rest = stored.as_mut_slice();
-        for (i, kind) in elements.kinds().enumerate() {
+        let mut rest = elements.nodes.as_mut_slice();
+        for (i, kind) in kinds(&elements.types).enumerate() {
             let (nodes, after) = rest.split_at_mut(kind.nodes.unwrap_or(0));
             rest = after;
             for node in &mut *nodes {
@@ -118,7 +117,6 @@ impl Content {
             }
             assembly.push(kind, nodes)?;
         }
-        elements.nodes = stored;
         let repeated = self.elements.repeated();
         if repeated > 0 {
             let why = "their volume belongs to several physical groups, so all of them count as boundary";
@@ -203,7 +201,7 @@ impl Reader<'_> {
                 in_block.ok_or_else(|| self.source.error_byte(at, format!("a block of nodes goes past the {n} that are announced")))?;
             if version == Version::V41 {
                 if self.binary {
-                    self.rows(Scalar::U64, [in_block, 1], "the numbers of nodes", |row| content.tags.push(row[0]))?;
+                    self.rows(Scalar::U64, [in_block, 1], "numbers of nodes", |row| content.tags.push(row[0]))?;
                     let width = 3 + extra as usize;
                     self.rows(Scalar::F64, [in_block, width], "nodes", |row| content.points.push([row[0], row[1], row[2]]))?;
                     continue;

@@ -20,6 +20,11 @@ pub(crate) struct Elements {
     pub entities: Vec<i64>,
 }
 
+/// The element types with these numbers, which are known to exist.
+pub(crate) fn kinds(types: &[u8]) -> impl Iterator<Item = CellType> {
+    types.iter().filter_map(|&number| cells::gmsh(number.into()))
+}
+
 impl<'a> Reader<'a> {
     /// An element type, and its number.
     fn kind(&self, number: i64, at: usize) -> Result<(CellType, u8)> {
@@ -147,11 +152,6 @@ impl<'a> Reader<'a> {
 }
 
 impl Elements {
-    /// The type of each element.
-    pub fn kinds(&self) -> impl Iterator<Item = CellType> {
-        self.types.iter().filter_map(|&number| cells::gmsh(number.into()))
-    }
-
     /// Checks the number of nodes of the next element, of which `first` is the first.
     fn check(&self, source: &Source, at: usize, kind: CellType, tag: i64, first: usize) -> Result<()> {
         let (found, wanted) = (self.nodes.len() - first, kind.nodes.unwrap_or(0));
@@ -164,7 +164,7 @@ impl Elements {
     /// The number of volume cells that are repeats: version 2 has the cells of a volume once for each physical group.
     pub fn repeated(&self) -> usize {
         let mut groups = HashMap::new();
-        let marks = self.kinds().zip(&self.entities).zip(&self.physical).filter(|((kind, _), _)| kind.shape.corners() > 0);
+        let marks = kinds(&self.types).zip(&self.entities).zip(&self.physical).filter(|((kind, _), _)| kind.shape.corners() > 0);
         if marks.into_iter().all(|((_, entity), group)| *groups.entry(entity).or_insert(group) == group) {
             return 0;
         }
@@ -179,7 +179,7 @@ impl Elements {
             corners.sort_unstable();
             n > 0 && !seen.insert(corners)
         };
-        self.kinds().filter(again).count()
+        kinds(&self.types).filter(again).count()
     }
 
     fn mark(&mut self, number: u8, tag: i64, marks: [i64; 2]) {

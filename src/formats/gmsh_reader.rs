@@ -105,15 +105,18 @@ impl<'a> Reader<'a> {
         Ok(scalar.one(self.bytes(scalar.size(), what)?, big).unwrap_or_default())
     }
 
-    /// Reads `rows` rows of `width` binary numbers, a part of them at a time.
+    /// Reads a block of binary numbers: `rows` rows of `width`, a part of them at a time.
     pub fn rows<T: Number>(&mut self, scalar: Scalar, [rows, width]: [usize; 2], what: &str, mut take: impl FnMut(&[T])) -> Result<()> {
         const PART: usize = 4096;
-        let (mut left, big) = (rows, self.big_endian);
-        while left > 0 && width > 0 {
-            let n = left.min(PART);
-            let bytes = self.bytes((n * scalar.size()).saturating_mul(width), what)?;
-            scalar.convert(bytes, big).chunks_exact(width).for_each(&mut take);
-            left -= n;
+        let (at, each, big) = (self.tokens.at, scalar.size().saturating_mul(width).max(1), self.big_endian);
+        let room = self.tokens.left() / each;
+        if rows > room {
+            let message = format!("a block of {rows} {what}, but the rest of the file has room for {room}");
+            return Err(self.source.error_byte(at, message));
+        }
+        for part in (0..rows).step_by(PART) {
+            let bytes = self.bytes(each * PART.min(rows - part), what)?;
+            scalar.convert(bytes, big).chunks_exact(width.max(1)).for_each(&mut take);
         }
         Ok(())
     }

@@ -112,7 +112,8 @@ impl Columns {
             found.clear();
             found.extend(fields(line, self.separator));
             if found.len() != self.width {
-                return Err(source.error_line(at, format!("{} columns instead of {}", found.len(), self.width)));
+                let by = separated_by(self.separator);
+                return Err(source.error_line(at, format!("{} instead of {} columns, separated by {by}", found.len(), self.width)));
             }
             let mut point = [0.0; 3];
             for (x, column) in point.iter_mut().zip(self.at) {
@@ -128,6 +129,15 @@ impl Columns {
 /// The bytes that may separate columns, the most certain first: a comma may also be a decimal mark, and a space may be
 /// part of a name.
 const SEPARATORS: [&[u8]; 4] = [b";", b"\t", b",", b" \t\x0b\x0c"];
+
+fn separated_by(separator: &[u8]) -> &'static str {
+    match separator {
+        b";" => "semicolons",
+        b"\t" => "tabs",
+        b"," => "commas",
+        _ => "spaces",
+    }
+}
 
 /// What separates the fields of a line: the first separator that makes all of them numbers, or else that of the names,
 /// or else the first one that the line contains.
