@@ -125,7 +125,8 @@ struct olbvh_RayState {
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
     uint best;      // Best candidate owner among them, or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
-    uint last;      // Bits of the value at the last sample, for iso-surfaces; `NONE` if it has none.
+    uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
+    float last_at;  // Distance of that place from the ray's origin in steps.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };
 
@@ -890,6 +891,20 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
 bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at) {
     olbvh_Exchange e;
     return olbvh_step_on(s, at, e);
+}
+
+// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
+// weights are `here`, to one whose weights are `there`.
+float olbvh_way_within(vec4 here, vec4 there) {
+    float least = 1.0;
+    for (uint f = 0u; f < 4u; ++f) {
+        if (!(there[f] < 0.0)) continue;
+        float from = max(here[f], 0.0);
+        precise float length = from - there[f];
+        precise float part = from * olbvh_reciprocal(length);
+        if (part < least) least = part;
+    }
+    return least;
 }
 
 // The owner of x, where x is near one face of the stand and far from all other faces of the two tetrahedra that share

@@ -190,13 +190,14 @@ fn surfaces_of_a_linear_field_are_planes() {
         for (i, pixel) in picture.pixels.chunks(4).enumerate() {
             let (origin, direction) = plan.rays.ray(i as u32 % plan.size[0], i as u32 / plan.size[0]);
             let rise: f32 = (0..3).map(|c| gradient[c] * direction[c]).sum();
-            // The planes that the ray meets, by distance. Pixels with one near the surface of the mesh are left out.
+            // The planes that the ray meets, by distance. Pixels with one right on the surface of the mesh are left out,
+            // but none beside it: a surface reaches that of the mesh.
             let mut hits: Vec<(f32, f32)> = isos.iter().map(|&iso| ((iso - value(origin)) / rise, iso)).collect();
             hits.sort_by(|a, b| a.0.total_cmp(&b.0));
             let depth = |t: f32| {
                 (0..3).map(|c| origin[c] + t * direction[c]).enumerate().map(|(c, x)| (x - lo[c]).min(hi[c] - x)).fold(f32::MAX, f32::min)
             };
-            if hits.iter().any(|&(t, _)| depth(t).abs() < 0.06) {
+            if hits.iter().any(|&(t, _)| depth(t).abs() < 1e-4) {
                 continue;
             }
             let what = format!(

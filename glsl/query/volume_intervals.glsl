@@ -182,6 +182,7 @@ RayState go_on(RayState state, RayState before, vec3 direction) {
     bool met = state.next < state.end;
     if (!met) state.next = state.end = before.next;
     state.last = state.next == before.next ? before.last : NONE;
+    state.last_at = before.last_at;
     return state;
 }
 
@@ -191,7 +192,7 @@ void main() {
     view = frames.at[0].view;
     plan = frames.at[0].plan;
     uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
-    RayState state = RayState(0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, NONE, 0u);
+    RayState state = RayState(0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, NONE, 0.0, 0u);
     if (pixel_of(i, size, pixel)) {
         uint place = pixel.y * size.x + pixel.x;
         bool opaque = PART != 0u && colors.at[place].w >= view.termination;

@@ -118,16 +118,53 @@ void add(vec4 color, vec4 b) {
     if (sum.w >= view.termination) state.end = state.next;
 }
 
-// Adds the surfaces between sample k, which lies in the stand, and the one before.
-void add_surfaces(uint k, float before, float value) {
+// A place of the ray: its distance from the origin in steps, the field's value there, and the number of iso-values that
+// the value is not below.
+struct Place {
+    float at;
+    float value;
+    uint rank;
+};
+
+Place place_at(float at, float value) {
+    uint rank = 0u;
+    for (uint i = 0u; i < 8u; ++i) rank += uint(i < view.isos && !(value < view.iso[i]));
+    return Place(at, value, rank);
+}
+
+Place place_beside(Place p, float steps, float rise) {
+    precise float at = p.at + steps;
+    precise float value = p.value + rise * steps;
+    return place_at(at, value);
+}
+
+// The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther than to
+// the samples beside k: where it begins and ends, and the values there. If the sample before has a value, that stretch
+// begins at the sample, for the sample before has one that ends where this tetrahedron begins.
+void find_ends(uint k, Sides here, float value, bool joins, out Place from, out Place to) {
+    precise float at = float(k) + 0.5;
+    from = to = place_at(at, value);
+    Sides next = sides_of(stand, normalise(grid.at[0], sample_at(view, origin, direction, k + 1u)));
+    precise float rise = value_of(held_values, barycentric(next)) - value;
+    if (!(abs(rise) < 1e37)) return;
+    if (!joins) {
+        precise vec4 change = next.w - here.w;
+        precise vec4 behind = here.w - change;
+        from = place_beside(from, -min(way_within(here.w, behind), at), rise);
+    }
+    to = place_beside(to, way_within(here.w, next.w), rise);
+}
+
+// Adds the surfaces between two places of the ray, between which the value is linear. Light takes them to lie in the
+// stand.
+void add_surfaces(Place from, Place to) {
     Grid g = grid.at[0];
-    uint isos = min(view.isos, 8u);
-    for (uint i = 0u; i < isos && sum.w < view.termination; ++i) {
-        float iso = view.iso[before < value ? i : isos - 1u - i];
-        if ((before < iso) == (value < iso)) continue;
-        precise float rise = clamp(value - before, -1e37, 1e37);
-        precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - before) * reciprocal(rise), 0.0, 1.0);
-        precise float s = ((float(k) - 0.5) + part) * view.step_size;
+    bool rises = from.rank < to.rank;
+    for (uint i = from.rank; i != to.rank && sum.w < view.termination; i += rises ? 1u : ~0u) {
+        float iso = view.iso[rises ? i : i - 1u];
+        precise float rise = clamp(to.value - from.value, -1e37, 1e37);
+        precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - from.value) * reciprocal(rise), 0.0, 1.0);
+        precise float s = (from.at + (to.at - from.at) * part) * view.step_size;
         precise vec3 at = origin + direction * s;
         vec4 b = max(barycentric(sides_of(stand, normalise(g, at))), vec4(0.0));
         precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
@@ -166,15 +203,19 @@ void pass_empty(Grid g, inout uint work) {
 
 // Adds the next sample, which lies in the tetrahedron of the stand.
 void take(Sides sides) {
-    uint k = state.next, before = state.last;
+    uint k = state.next, last = state.last;
     pass_by();
     ++found;
     vec4 b = barycentric(sides);
     float value = value_of(held_values, b);
     if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
     if (ISO != 0u) {
-        state.last = floatBitsToUint(value);
-        if (before != NONE) add_surfaces(k, uintBitsToFloat(before), value);
+        Place from, to;
+        find_ends(k, sides, value, last != NONE, from, to);
+        if (last != NONE) add_surfaces(place_at(state.last_at, uintBitsToFloat(last)), from);
+        state.last = floatBitsToUint(to.value);
+        state.last_at = to.at;
+        add_surfaces(from, to);
         return;
     }
     vec4 color = lookup(value);

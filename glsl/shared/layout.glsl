@@ -81,7 +81,8 @@ struct RayState {
     uint cursor;    // Entries of the leaf's list already searched for the next sample.
     uint best;      // Best candidate owner among them, or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
-    uint last;      // Bits of the value at the last sample, for iso-surfaces; `NONE` if it has none.
+    uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
+    float last_at;  // Distance of that place from the ray's origin in steps.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };
 

@@ -103,6 +103,20 @@ bool step_on(inout Stand s, Sides at) {
     return step_on(s, at, e);
 }
 
+// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
+// weights are `here`, to one whose weights are `there`.
+float way_within(vec4 here, vec4 there) {
+    float least = 1.0;
+    for (uint f = 0u; f < 4u; ++f) {
+        if (!(there[f] < 0.0)) continue;
+        float from = max(here[f], 0.0);
+        precise float length = from - there[f];
+        precise float part = from * reciprocal(length);
+        if (part < least) least = part;
+    }
+    return least;
+}
+
 // The owner of x, where x is near one face of the stand and far from all other faces of the two tetrahedra that share
 // it; else NONE.
 uint owner_at_face(Stand s, vec3 x) {

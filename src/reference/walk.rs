@@ -101,6 +101,16 @@ pub fn outermost(own: [f32; 4]) -> usize {
     (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face })
 }
 
+/// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
+/// weights are `here`, to one whose weights are `there`.
+pub fn way_within(here: [f32; 4], there: [f32; 4]) -> f32 {
+    (0..4).filter(|&f| there[f] < 0.0).fold(1.0, |least, f| {
+        let from = here[f].max(0.0);
+        let part = from * reciprocal(from - there[f]);
+        if part < least { part } else { least }
+    })
+}
+
 /// Walks through one mesh.
 #[derive(Clone, Copy, Debug)]
 pub struct Walker<'a> {

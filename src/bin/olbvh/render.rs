@@ -49,8 +49,8 @@ pub struct Args {
     #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size, allow_negative_numbers = true)]
     size: [u32; 2],
     /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
-    /// bounds, or less where the mesh or its layers are thinner than that, down to 1/8192. An iso-surface nearer to the
-    /// surface of the mesh than a step may have gaps.
+    /// bounds, or less where the mesh or its layers are thinner than that, down to 1/8192. An iso-surface may have
+    /// gaps where cells are thinner than a step.
     #[arg(long, allow_negative_numbers = true)]
     step: Option<f64>,
     /// View and settings, separated by commas, for example `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (angles in

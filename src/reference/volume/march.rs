@@ -3,7 +3,8 @@
 use super::Scene;
 use super::skip::{Skips, inverse_of};
 use crate::grid::{canonical, reciprocal};
-use crate::reference::walk::{Stand, weighed};
+use crate::reference::tet::Sides;
+use crate::reference::walk::{Stand, way_within, weighed};
 use crate::render::{Lighting, Plan};
 
 /// Most tetrahedra of a walk across faces before the tree is searched.
@@ -29,6 +30,13 @@ struct Gathered<'a> {
     direction: [f32; 3],
     light: Option<(Lighting, [f32; 3])>,
     normals: &'a [[f32; 3]],
+}
+
+/// A place of a ray: its distance from the origin in steps, and the field's value there.
+#[derive(Clone, Copy)]
+struct Place {
+    at: f32,
+    value: f32,
 }
 
 impl Gathered<'_> {
@@ -61,7 +69,7 @@ impl<'a> Marcher<'a> {
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
         let mut gathered = Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals };
-        let mut last: Option<f32> = None;
+        let mut last: Option<Place> = None;
         // Each ray starts without a hint, so that no pixel depends on another one.
         self.cell = None;
         let skips = self.scene.visible.as_deref().map(|visible| Skips { tree: self.scene.tree, visible, plan });
@@ -87,17 +95,20 @@ impl<'a> Marcher<'a> {
             next += ahead;
             self.skipped_samples += u64::from(ahead - 1);
             self.samples += 1;
-            let Some((stand, b)) = self.locate(plan.sample(ray, k)) else { continue };
+            let Some((stand, sides)) = self.locate(plan.sample(ray, k)) else { continue };
             self.found_samples += 1;
+            let b = sides.barycentric();
             let value = stand.value(self.scene.field, b);
             if !value.is_finite() {
                 continue;
             }
             if !plan.iso.is_empty() {
-                last = Some(value);
+                let [from, to] = self.ends(ray, k, &stand, &sides, value, before.is_some());
                 if let Some(before) = before {
-                    self.add_surfaces(&mut gathered, ray, k, [before, value], &stand);
+                    self.add_surfaces(&mut gathered, ray, [before, from], &stand);
                 }
+                self.add_surfaces(&mut gathered, ray, [from, to], &stand);
+                last = Some(to);
                 continue;
             }
             let color = plan.lookup(value);
@@ -109,18 +120,36 @@ impl<'a> Marcher<'a> {
         gathered.sum
     }
 
-    /// Adds the surfaces between sample k, which lies in `stand`, and the sample before it.
-    fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), k: u32, [before, value]: [f32; 2], stand: &Stand) {
+    /// The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther
+    /// than to the samples beside k: where it begins and ends, and the values there. If the sample before has a value,
+    /// that stretch begins at the sample, for the sample before has one that ends where this tetrahedron begins.
+    fn ends(&self, ray: ([f32; 3], [f32; 3]), k: u32, stand: &Stand, here: &Sides, value: f32, joins: bool) -> [Place; 2] {
+        let at = k as f32 + 0.5;
+        let next = stand.sides(self.scene.tree.grid.normalise(self.plan.sample(ray, k + 1)));
+        let rise = stand.value(self.scene.field, next.barycentric()) - value;
+        let sample = Place { at, value };
+        if rise.abs() >= 1e37 || rise.is_nan() {
+            return [sample; 2];
+        }
+        let place = |part: f32| Place { at: at + part, value: value + rise * part };
+        let behind = [0, 1, 2, 3].map(|f| here.w[f] - (next.w[f] - here.w[f]));
+        let begin = if joins { sample } else { place(-way_within(here.w, behind).min(at)) };
+        [begin, place(way_within(here.w, next.w))]
+    }
+
+    /// Adds the surfaces between two places of the ray, between which the value is linear. Light takes them to lie in
+    /// `stand`.
+    fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), [from, to]: [Place; 2], stand: &Stand) {
         let plan = self.plan;
         let n = plan.iso.len();
-        let in_order = (0..n).map(|i| plan.iso[if before < value { i } else { n - 1 - i }]);
-        for iso in in_order.filter(|&iso| (before < iso) != (value < iso)) {
+        let in_order = (0..n).map(|i| plan.iso[if from.value < to.value { i } else { n - 1 - i }]);
+        for iso in in_order.filter(|&iso| (from.value < iso) != (to.value < iso)) {
             if gathered.sum[3] >= plan.termination {
                 break;
             }
-            let rise = (value - before).clamp(-1e37, 1e37);
-            let part = if canonical(rise) == 0.0 { 1.0 } else { ((iso - before) * reciprocal(rise)).clamp(0.0, 1.0) };
-            let s = ((k as f32 - 0.5) + part) * plan.step;
+            let rise = (to.value - from.value).clamp(-1e37, 1e37);
+            let part = if canonical(rise) == 0.0 { 1.0 } else { ((iso - from.value) * reciprocal(rise)).clamp(0.0, 1.0) };
+            let s = (from.at + (to.at - from.at) * part) * plan.step;
             let at = [0, 1, 2].map(|c| ray.0[c] + ray.1[c] * s);
             let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
             let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));
@@ -131,10 +160,10 @@ impl<'a> Marcher<'a> {
         }
     }
 
-    /// The tetrahedron of a point, and its barycentric coordinates there. A walk across faces from the last tetrahedron
+    /// The tetrahedron of a point, and the point's weights there. A walk across faces from the last tetrahedron
     /// is tried first. A tetrahedron that contains the point clearly is the owner in a mesh whose tetrahedra do not
     /// overlap. If the walk does not find one, the tree is searched, except outside of the bounds.
-    fn locate(&mut self, p: [f32; 3]) -> Option<(Stand, [f32; 4])> {
+    fn locate(&mut self, p: [f32; 3]) -> Option<(Stand, Sides)> {
         let (walker, grid) = (self.scene.locator.walker(), &self.scene.tree.grid);
         let x = grid.normalise(p);
         let found = self.cell.and_then(|cell| walker.stride(cell, x, WALK)).or_else(|| {
@@ -143,6 +172,6 @@ impl<'a> Marcher<'a> {
             Some((stand, stand.sides(x)))
         });
         self.cell = found.map(|(stand, _)| stand.t);
-        found.map(|(stand, sides)| (stand, sides.barycentric()))
+        found
     }
 }
