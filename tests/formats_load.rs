@@ -129,6 +129,74 @@ fn what_stays_on_the_disk_is_read_as_from_memory() {
     }
 }
 
+/// The content of a small file with `n` bytes that mean nothing before its data, if the format has a place for them.
+fn padded(name: &str, bytes: &[u8], n: usize) -> Option<Vec<u8>> {
+    let n = n.max(16);
+    let filler = match name.rsplit('.').next()? {
+        "msh" => format!("$Comments\n{}\n$EndComments\n", ".".repeat(n)).into_bytes(),
+        "mesh" | "ele" | "node" | "tet" => format!("#{}\n", ".".repeat(n)).into_bytes(),
+        "vtk" => {
+            let title = bytes.iter().position(|&b| b == b'\n')? + 1;
+            return Some([&bytes[..title], &vec![b'.'; n], &bytes[title..]].concat());
+        }
+        "meshb" => {
+            let mut padded = bytes.to_vec();
+            let int = |bytes: &[u8], at: usize| i32::from_le_bytes(bytes[at..at + 4].try_into().unwrap());
+            let mut next = 24; // of the section that comes after those of 8 and 12 bytes
+            while int(&padded, next) != 0 {
+                let moved = int(bytes, next) + n as i32;
+                padded[next..next + 4].copy_from_slice(&moved.to_le_bytes());
+                next = int(bytes, next) as usize + 4;
+            }
+            let section = [99, 20 + n as i32].into_iter().flat_map(i32::to_le_bytes).chain(vec![0; n - 8]);
+            padded.splice(20..20, section);
+            return Some(padded);
+        }
+        _ => return None,
+    };
+    Some([filler, bytes.to_vec()].concat())
+}
+
+/// Large files are read a chunk at a time. Wherever a chunk ends in the data, the mesh is the same, and so is the error
+/// of a file that is cut.
+#[test]
+fn chunks_may_end_anywhere() {
+    const CHUNK: usize = 1 << 18;
+    let folder = tempfile::tempdir().unwrap();
+    let options = LoadOptions::default();
+    let mut formats = std::collections::BTreeSet::new();
+    for (name, bytes) in all() {
+        write(&folder, name, &bytes); // companions are read, too
+    }
+    for (name, small) in all() {
+        let ends: Vec<_> = (1..=small.len()).step_by(37).collect();
+        for (i, end) in ends.into_iter().enumerate() {
+            let Some(mut bytes) = padded(name, &small, CHUNK - end) else { continue };
+            formats.insert(name);
+            if i % 4 == 3 {
+                bytes.truncate(bytes.len() - end % 50);
+            }
+            let path = write(&folder, name, &bytes);
+            match (load(&path, &options), load_bytes(&path, bytes, &options)) {
+                (Ok(disk), Ok(memory)) => {
+                    assert_eq!((disk.mesh.tets.len(), disk.report.bytes), (6, memory.report.bytes), "{name} {end}");
+                    assert_eq!((&disk.mesh.tets, &disk.mesh.points), (&memory.mesh.tets, &memory.mesh.points), "{name} {end}");
+                    let fields =
+                        |mesh: &olbvh::mesh::Mesh| mesh.fields.iter().map(|f| (f.name.clone(), f.values.clone())).collect::<Vec<_>>();
+                    assert_eq!(fields(&disk.mesh), fields(&memory.mesh), "{name} {end}");
+                    assert_eq!(disk.report.warnings, memory.report.warnings, "{name} {end}");
+                }
+                (disk, memory) => {
+                    assert!(i % 4 == 3, "{name} {end}: {:?}", disk.err());
+                    assert_eq!(disk.unwrap_err().to_string(), memory.unwrap_err().to_string(), "{name} {end}");
+                }
+            }
+        }
+        write(&folder, name, &small);
+    }
+    assert_eq!(formats.len(), all().len() - 4, "{formats:?}");
+}
+
 #[test]
 fn pieces_are_joined_or_not() {
     let Some(folder) = shared("formats") else { return };

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use super::isaac;
-use super::source::Source;
+use super::source::{Source, skip_comments};
 use crate::error::Result;
 
 /// A format that can be read.
@@ -24,7 +24,7 @@ const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio conv
 
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
 pub(crate) fn detect(source: &Source) -> Result<Format> {
-    let bytes = source.bytes.as_slice();
+    let bytes = source.start();
     let ending = ending(&source.path);
     if bytes.iter().all(u8::is_ascii_whitespace) {
         return Err(source.error(if bytes.is_empty() { "the file is empty" } else { "the file has nothing but white space" }));
@@ -46,7 +46,7 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     if is(b"MeshVersionFormatted") {
         return Ok(Format::Medit);
     }
-    if is(b"v ") && isaac::has_tetrahedra(bytes) {
+    if is(b"v ") && isaac::has_tetrahedra(source)? {
         return Ok(Format::Isaac);
     }
     if let Some(found) = foreign_text(&is, &ending) {
@@ -69,19 +69,6 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
 /// The extension of a path in lower case, without the dot.
 pub(crate) fn ending(path: &Path) -> String {
     path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
-}
-
-/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus files).
-fn skip_comments(bytes: &[u8]) -> usize {
-    let mut at = 0;
-    loop {
-        at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
-        let rest = &bytes[at..];
-        if !(rest.starts_with(b"#") || rest.starts_with(b"**")) {
-            return at;
-        }
-        at += rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
-    }
 }
 
 fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {

@@ -32,10 +32,11 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let mut reader = Reader::new(source);
     let mut version = None;
     let mut content = Content::default();
-    while let Some((token, at)) = reader.tokens.next_token() {
-        let Some(name) = token.strip_prefix(b"$") else {
+    while let Some((token, at)) = reader.tokens.next_token()? {
+        let Some(name) = token.strip_prefix(b"$").map(<[u8]>::to_vec) else {
             return Err(source.error_line(at, format!("`{}` where a section ($…) should be", printable(token))));
         };
+        let name = name.as_slice();
         match (name, version) {
             (b"MeshFormat", None) => version = Some(reader.format()?),
             (b"NOD" | b"ELM", _) => return Err(old(source, at, "1.0")),
@@ -77,7 +78,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let Some(version) = version else { return Err(source.error("no section $MeshFormat")) };
     for (has, name) in content.has.iter().zip(["$Nodes", "$Elements"]) {
         if !has {
-            return Err(source.error_line(source.bytes.len(), format!("the file ends, and there was no {name}")));
+            return Err(source.error_line(source.len(), format!("the file ends, and there was no {name}")));
         }
     }
     let name = match version {
@@ -162,7 +163,7 @@ impl Reader<'_> {
         if version == Version::V2 {
             let n = self.tokens.integer("the number of nodes")?;
             if self.binary {
-                self.tokens.line();
+                self.tokens.line()?;
             }
             let n = self.bounded(n, 28, "nodes")?;
             content.tags.reserve(n);
@@ -174,7 +175,7 @@ impl Reader<'_> {
             return Ok(());
         }
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
         }
         let blocks = self.long("the number of blocks")?;
         let n = self.long("the number of nodes")?;
@@ -231,7 +232,7 @@ impl Reader<'_> {
     /// parts of entities; a part without a group belongs to the group of its parent.
     fn entities(&mut self, version: Version, partitioned: bool, groups: &mut HashMap<i64, i64>) -> Result<()> {
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
         }
         if partitioned {
             self.long("the number of partitions")?;

@@ -49,8 +49,8 @@ impl Reader<'_> {
         let strings = self.tokens.count("the number of texts")?;
         let mut name = None;
         for _ in 0..strings {
-            self.tokens.skip_space();
-            let (line, _) = self.tokens.line().unwrap_or_default();
+            self.tokens.skip_space()?;
+            let (line, _) = self.tokens.line()?.unwrap_or_default();
             let text = line.trim_ascii();
             let text = text.strip_prefix(b"\"").unwrap_or(text);
             let text = text.strip_suffix(b"\"").unwrap_or(text);
@@ -67,7 +67,7 @@ impl Reader<'_> {
             }
         }
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
         }
         let [step, components, count] = numbers;
         let components = usize::try_from(components).ok().filter(|n| (1..=9).contains(n));

@@ -5,7 +5,8 @@ use std::collections::{HashMap, HashSet};
 use super::cells::{self, CellType};
 use super::gmsh_reader::{Reader, Version};
 use super::scalar::Scalar;
-use super::source::{Source, Tokens, parse_integer, printable};
+use super::source::{Source, printable};
+use super::tokens::parse_integer;
 use crate::error::Result;
 
 /// The elements as stored in the file.
@@ -25,7 +26,7 @@ pub(crate) fn kinds(types: &[u8]) -> impl Iterator<Item = CellType> {
     types.iter().filter_map(|&number| cells::gmsh(number.into()))
 }
 
-impl<'a> Reader<'a> {
+impl Reader<'_> {
     /// An element type, and its number.
     fn kind(&self, number: i64, at: usize) -> Result<(CellType, u8)> {
         cells::gmsh(number).zip(u8::try_from(number).ok()).ok_or_else(|| {
@@ -34,36 +35,40 @@ impl<'a> Reader<'a> {
         })
     }
 
-    /// The tokens of the next line that is not empty; reading line by line reports a short line at its own position.
-    fn line(&mut self, what: &str) -> Result<(Tokens<'a>, usize)> {
-        self.tokens.skip_space();
-        let (line, at) =
-            self.tokens.line().ok_or_else(|| self.source.error_line(self.tokens.at, format!("the file ends where {what} should be")))?;
-        Ok((Tokens::new(self.source, at..at + line.len(), None), at))
+    /// Limits the reader to the next line that is not empty, so that a short line is reported at its own position.
+    /// Returns the position of the line, and what undoes that.
+    fn line(&mut self, what: &str) -> Result<(usize, usize)> {
+        self.tokens.skip_space()?;
+        let at = self.tokens.at;
+        if self.tokens.left() == 0 {
+            return Err(self.source.error_line(at, format!("the file ends where {what} should be")));
+        }
+        Ok((at, self.tokens.narrow()?))
     }
 
     pub(crate) fn elements_2(&mut self, elements: &mut Elements) -> Result<()> {
         let n = self.tokens.integer("the number of elements")?;
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
             let n = self.bounded(n, 8, "elements")?;
             return self.elements_2_binary(n, elements);
         }
         let n = self.bounded(n, 8, "elements")?;
         for _ in 0..n {
-            let (mut line, at) = self.line("an element")?;
-            let tag = line.integer("the number of an element")?;
-            let number = line.integer("the type of an element")?;
-            let marks = line.count("the number of tags of an element")?;
+            let (at, end) = self.line("an element")?;
+            let tag = self.tokens.integer("the number of an element")?;
+            let number = self.tokens.integer("the type of an element")?;
+            let marks = self.tokens.count("the number of tags of an element")?;
             let mut two = [0; 2];
             for i in 0..marks {
-                let mark = line.integer("a tag of an element")?;
+                let mark = self.tokens.integer("a tag of an element")?;
                 if let Some(slot) = two.get_mut(i) {
                     *slot = mark;
                 }
             }
             let first = elements.nodes.len();
-            self.line_of_nodes(&mut line, elements)?;
+            self.line_of_nodes(elements)?;
+            self.tokens.widen(end);
             let (kind, number) = self.kind(number, at)?;
             elements.check(self.source, at, kind, tag, first)?;
             elements.mark(number, tag, two);
@@ -72,8 +77,8 @@ impl<'a> Reader<'a> {
     }
 
     /// Reads the nodes in the rest of a line.
-    fn line_of_nodes(&self, line: &mut Tokens<'_>, elements: &mut Elements) -> Result<()> {
-        while let Some((token, at)) = line.next_token() {
+    fn line_of_nodes(&mut self, elements: &mut Elements) -> Result<()> {
+        while let Some((token, at)) = self.tokens.next_token()? {
             let node = parse_integer(token);
             let node = node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", printable(token))))?;
             elements.nodes.push(node);
@@ -106,7 +111,7 @@ impl<'a> Reader<'a> {
 
     pub(crate) fn elements_4(&mut self, version: Version, elements: &mut Elements) -> Result<()> {
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
         }
         let blocks = self.long("the number of blocks")?;
         let n = self.long("the number of elements")?;
@@ -135,10 +140,11 @@ impl<'a> Reader<'a> {
                 continue;
             }
             for _ in 0..in_block {
-                let (mut line, at) = self.line("an element")?;
-                let tag = line.integer("the number of an element")?;
+                let (at, end) = self.line("an element")?;
+                let tag = self.tokens.integer("the number of an element")?;
                 let first = elements.nodes.len();
-                self.line_of_nodes(&mut line, elements)?;
+                self.line_of_nodes(elements)?;
+                self.tokens.widen(end);
                 elements.check(self.source, at, kind, tag, first)?;
                 elements.mark(number, tag, two);
             }

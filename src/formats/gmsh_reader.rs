@@ -2,7 +2,8 @@
 //! first section states.
 
 use super::scalar::{Number, Scalar};
-use super::source::{Source, Tokens, printable};
+use super::source::{Source, printable};
+use super::tokens::Tokens;
 use crate::error::{Error, Result};
 
 /// A version of the format.
@@ -23,8 +24,7 @@ pub(crate) struct Reader<'a> {
 
 impl<'a> Reader<'a> {
     pub fn new(source: &'a Source) -> Self {
-        let tokens = Tokens::new(source, 0..source.bytes.len(), None);
-        Self { source, tokens, binary: false, big_endian: false }
+        Self { source, tokens: Tokens::new(source, None), binary: false, big_endian: false }
     }
 
     /// Refuses a second section of the same kind.
@@ -54,18 +54,15 @@ impl<'a> Reader<'a> {
             if size != 8 {
                 return Err(self.source.error_line(at, format!("binary data of size {size}; 8 is the only one that can be read")));
             }
-            self.tokens.line();
-            let probe = self.source.bytes.get(self.tokens.at..self.tokens.at + 4).unwrap_or_default();
-            self.big_endian = match probe {
+            self.tokens.line()?;
+            let at = self.tokens.at;
+            self.big_endian = match self.tokens.bytes(4)?.unwrap_or_default() {
                 [1, 0, 0, 0] => false,
                 [0, 0, 0, 1] => true,
                 other => {
-                    return Err(self
-                        .source
-                        .error_byte(self.tokens.at, format!("{other:?} where the integer 1 should tell the byte order")));
+                    return Err(self.source.error_byte(at, format!("{other:?} where the integer 1 should tell the byte order")));
                 }
             };
-            self.tokens.at += 4;
         }
         self.end(b"$EndMeshFormat")?;
         Ok(version)
@@ -84,20 +81,16 @@ impl<'a> Reader<'a> {
     /// Skips a section by searching for its end.
     pub fn skip(&mut self, name: &[u8], at: usize) -> Result<()> {
         let end = [b"$End", name].concat();
-        let rest = &self.source.bytes[self.tokens.at..];
-        let found = memchr::memmem::find(rest, &end);
-        let found = found.ok_or_else(|| self.source.error_line(at, format!("section ${0} without $End{0}", printable(name))))?;
-        self.tokens.at += found + end.len();
+        if !self.tokens.skip_past(&end)? {
+            return Err(self.source.error_line(at, format!("section ${0} without $End{0}", printable(name))));
+        }
         Ok(())
     }
 
     /// Reads `n` bytes of binary data.
     fn bytes(&mut self, n: usize, what: &str) -> Result<&[u8]> {
-        let at = self.tokens.at;
-        let end = at.checked_add(n).filter(|&end| end <= self.source.bytes.len());
-        let end = end.ok_or_else(|| self.source.error_byte(at, format!("the file ends where {what} should be")))?;
-        self.tokens.at = end;
-        Ok(&self.source.bytes[at..end])
+        let (source, at) = (self.source, self.tokens.at);
+        self.tokens.bytes(n)?.ok_or_else(|| source.error_byte(at, format!("the file ends where {what} should be")))
     }
 
     fn number<T: Number + Default>(&mut self, scalar: Scalar, what: &str) -> Result<T> {

@@ -4,27 +4,33 @@
 use super::LoadOptions;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
-use super::source::{Source, parse_float, parse_integer, printable};
-use super::tetgen::Lines;
+use super::source::{Source, printable};
+use super::tetgen::{Line, Lines};
+use super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
 
 const TETRAHEDRON: CellType = CellType { name: "tetrahedron", shape: Shape::Tetrahedron, nodes: Some(4) };
 
 /// Whether a file that starts with a point has tetrahedra, unlike a surface in the format of Wavefront.
-pub(crate) fn has_tetrahedra(bytes: &[u8]) -> bool {
-    let is_tetrahedron = |line: &[u8]| matches!(line.trim_ascii_start(), [b't', after, ..] if after.is_ascii_whitespace());
-    bytes.split(|&b| b == b'\n' || b == b'\r').any(is_tetrahedron)
+pub(crate) fn has_tetrahedra(source: &Source) -> Result<bool> {
+    let mut lines = Tokens::new(source, None);
+    while let Some((line, _)) = lines.line()? {
+        if matches!(line.trim_ascii_start(), [b't', after, ..] if after.is_ascii_whitespace()) {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let mut assembly = Assembly::new(source, options, "Isaac Gym .tet".into());
-    let (mut lines, mut words) = (Lines::new(source), Vec::new());
+    let mut lines = Lines::new(source);
     let (mut points, mut tets) = (Vec::new(), Vec::<[i64; 4]>::new());
     let mut skipped: Vec<String> = Vec::new();
-    while let Some(at) = lines.next(&mut words) {
-        match words[0] {
-            b"v" => points.push(numbers(source, at, &words, parse_float)?),
-            b"t" => tets.push(numbers(source, at, &words, parse_integer)?),
+    while let Some(line) = lines.next()? {
+        match line.word(0) {
+            b"v" => points.push(numbers(source, &line, parse_float)?),
+            b"t" => tets.push(numbers(source, &line, parse_integer)?),
             other => {
                 let shown = printable(other);
                 if skipped.len() < 12 && !skipped.contains(&shown) {
@@ -43,19 +49,14 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 }
 
 /// The numbers that follow the first word of a line, which must be `N`.
-fn numbers<T: Copy + Default, const N: usize>(
-    source: &Source,
-    at: usize,
-    words: &[&[u8]],
-    parse: fn(&[u8]) -> Option<T>,
-) -> Result<[T; N]> {
-    if words.len() != N + 1 {
-        let (word, found) = (printable(words[0]), words.len() - 1);
-        return Err(source.error_line(at, format!("{found} numbers after `{word}` instead of {N}")));
+fn numbers<T: Copy + Default, const N: usize>(source: &Source, line: &Line<'_>, parse: fn(&[u8]) -> Option<T>) -> Result<[T; N]> {
+    if line.len() != N + 1 {
+        let (word, found) = (printable(line.word(0)), line.len() - 1);
+        return Err(source.error_line(line.at, format!("{found} numbers after `{word}` instead of {N}")));
     }
     let mut numbers = [T::default(); N];
-    for (number, word) in numbers.iter_mut().zip(&words[1..]) {
-        *number = parse(word).ok_or_else(|| source.error_line(at, format!("`{}` where a number should be", printable(word))))?;
+    for (number, word) in numbers.iter_mut().zip((1..=N).map(|i| line.word(i))) {
+        *number = parse(word).ok_or_else(|| source.error_line(line.at, format!("`{}` where a number should be", printable(word))))?;
     }
     Ok(numbers)
 }

@@ -4,7 +4,8 @@ use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
-use super::source::{Source, Tokens, printable};
+use super::source::{Source, printable};
+use super::tokens::Tokens;
 use crate::error::Result;
 use crate::mesh::On;
 
@@ -52,7 +53,7 @@ pub(crate) struct Content {
 impl Content {
     /// Builds the mesh; points are numbered from 1.
     pub fn assemble(self, source: &Source, assembly: &mut Assembly<'_>) -> Result<()> {
-        let missing = || source.error_line(source.bytes.len(), "the file ends, and there was no section Vertices");
+        let missing = || source.error_line(source.len(), "the file ends, and there was no section Vertices");
         assembly.set_points(self.points.ok_or_else(missing)?, &[0]);
         assembly.first_point = 1;
         for (kind, mut nodes) in self.cells {
@@ -81,11 +82,12 @@ impl Content {
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
-    let mut tokens = Tokens::new(source, 0..source.bytes.len(), Some(b'#'));
+    let mut tokens = Tokens::new(source, Some(b'#'));
     let mut content = Content::default();
     let mut version = None;
     let mut dimension = None;
-    while let Some((token, at)) = tokens.next_token() {
+    while let Some((token, at)) = tokens.next_token()? {
+        let token = token.to_vec();
         let is = |name: &str| token.eq_ignore_ascii_case(name.as_bytes());
         if is("MeshVersionFormatted") {
             version = Some(tokens.integer("the version")?);
@@ -102,11 +104,11 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         } else if is("End") {
             break;
         } else if token[0].is_ascii_alphabetic() {
-            content.skipped.push(printable(token));
-            skip(&mut tokens);
+            content.skipped.push(printable(&token));
+            skip(&mut tokens)?;
         } else {
             return Err(
-                source.error_line(at, format!("`{}` where a keyword should be; is the count of the section right?", printable(token)))
+                source.error_line(at, format!("`{}` where a keyword should be; is the count of the section right?", printable(&token)))
             );
         }
     }
@@ -119,7 +121,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         assembly.warnings.push("there is no keyword Dimension; 3 is assumed".into());
     }
     content.assemble(source, &mut assembly)?;
-    if let Some((token, at)) = tokens.next_token() {
+    if let Some((token, at)) = tokens.next_token()? {
         assembly.warnings.push(format!("line {}: `{}` and what follows after End is not read", source.line(at), printable(token)));
     }
     Ok(assembly)
@@ -155,8 +157,9 @@ fn cells(tokens: &mut Tokens<'_>, content: &mut Content, name: &str, kind: CellT
 }
 
 /// Skips the numbers of a section that is not used.
-fn skip(tokens: &mut Tokens<'_>) {
-    while tokens.peek().is_some_and(|t| !t[0].is_ascii_alphabetic()) {
-        tokens.next_token();
+fn skip(tokens: &mut Tokens<'_>) -> Result<()> {
+    while tokens.peek()?.is_some_and(|t| !t[0].is_ascii_alphabetic()) {
+        tokens.next_token()?;
     }
+    Ok(())
 }

@@ -5,6 +5,7 @@ use super::assemble::Assembly;
 use super::medit::{Content, SECTIONS};
 use super::scalar::{Number, Scalar};
 use super::source::Source;
+use super::tokens::Tokens;
 use crate::error::Result;
 
 const DIMENSION: i64 = 3;
@@ -13,27 +14,28 @@ const END: i64 = 54;
 
 struct Reader<'a> {
     source: &'a Source,
-    at: usize,
+    tokens: Tokens<'a>,
     big_endian: bool,
     version: i64,
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
-    let big_endian = source.bytes.first() == Some(&0);
-    let mut reader = Reader { source, at: 4, big_endian, version: 1 };
+    let mut tokens = Tokens::new(source, None);
+    let big_endian = tokens.bytes(4)?.is_some_and(|code| code[0] == 0);
+    let mut reader = Reader { source, tokens, big_endian, version: 1 };
     reader.version = reader.number(Scalar::I32)?;
     if !(1..=4).contains(&reader.version) {
         return Err(source.error_byte(4, format!("version {}; 1 to 4 can be read", reader.version)));
     }
     let mut content = Content::default();
     loop {
-        let start = reader.at;
+        let start = reader.tokens.at;
         let keyword: i64 = reader.number(Scalar::I32)?;
         let next: i64 = reader.number(reader.position())?;
         if keyword == END {
             break;
         }
-        let past = usize::try_from(next).ok().filter(|&n| n > start && n <= source.bytes.len());
+        let past = usize::try_from(next).ok().filter(|&n| n > start && n <= source.len());
         let past = past.ok_or_else(|| source.error_byte(start, format!("section {keyword} is said to end at byte {next}")))?;
         if keyword == DIMENSION {
             let n: i64 = reader.number(Scalar::I32)?;
@@ -66,10 +68,10 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         } else {
             content.skipped.push(format!("number {keyword}"));
         }
-        if reader.at > past {
+        if reader.tokens.at > past {
             return Err(source.error_byte(start, format!("section {keyword} is longer than the {} bytes it is said to have", past - start)));
         }
-        reader.at = past;
+        reader.tokens.at = past;
     }
     let mut assembly = Assembly::new(source, options, format!("Medit binary, version {}", reader.version));
     content.assemble(source, &mut assembly)?;
@@ -86,18 +88,16 @@ impl Reader<'_> {
     }
 
     fn number<T: Number>(&mut self, scalar: Scalar) -> Result<T> {
-        let bytes = self.source.bytes.get(self.at..self.at.saturating_add(scalar.size()));
-        let value = bytes.and_then(|b| scalar.one(b, self.big_endian));
-        let value = value.ok_or_else(|| self.source.error_byte(self.at, "the file ends here, without a section End"))?;
-        self.at += scalar.size();
-        Ok(value)
+        let at = self.tokens.at;
+        let value = self.tokens.bytes(scalar.size())?.and_then(|bytes| scalar.one(bytes, self.big_endian));
+        value.ok_or_else(|| self.source.error_byte(at, "the file ends here, without a section End"))
     }
 
     /// Reads a count of things that take `each` bytes in the rest of the file.
     fn count(&mut self, each: usize) -> Result<usize> {
-        let at = self.at;
+        let at = self.tokens.at;
         let n: i64 = self.number(self.int())?;
-        let room = self.source.bytes.len().saturating_sub(self.at) / each;
+        let room = self.tokens.left() / each;
         let fits = usize::try_from(n).ok().filter(|&n| n <= room);
         fits.ok_or_else(|| self.source.error_byte(at, format!("a count of {n}, but the rest of the file has room for {room} at most")))
     }

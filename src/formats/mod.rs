@@ -34,6 +34,7 @@ mod source;
 mod stored;
 mod tags;
 mod tetgen;
+mod tokens;
 mod unpack;
 mod vtk;
 mod vtk_attributes;
@@ -112,7 +113,7 @@ pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
     if let Some(made) = path.to_str().and_then(procedural::make) {
         return made.map(|(format, mesh)| procedural::loaded(format, mesh, start));
     }
-    read(&Source::read(path, detect::READABLE)?, options, start)
+    read(&Source::open(path, detect::READABLE)?, options, start)
 }
 
 /// Reads a mesh from the content of a file. `name` is the path used in messages, and its extension helps to recognise

@@ -27,7 +27,7 @@ pub(crate) fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
 
 /// Reads points from an array of shape (n, 3), or of shape (3,) for a single point.
 pub(crate) fn read_points(source: &Source) -> Result<Vec<[f64; 3]>> {
-    let bytes = &source.bytes;
+    let bytes = source.start();
     let short = || source.error_byte(bytes.len(), "the file ends inside the header");
     let (size, start) = match bytes.get(6) {
         Some(1) => (2, 10),

@@ -7,7 +7,8 @@ use std::path::Path;
 
 use super::detect::ending;
 use super::npy;
-use super::source::{Source, Tokens, parse_float, printable};
+use super::source::{Source, printable};
+use super::tokens::parse_float;
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
@@ -33,13 +34,13 @@ pub fn read_points(mut stream: impl Read) -> Result<Vec<[f64; 3]>> {
 }
 
 fn points(source: &Source) -> Result<Vec<[f64; 3]>> {
-    if source.bytes.starts_with(npy::MAGIC) || ending(&source.path) == "npy" && source.bytes.is_empty() {
+    if source.start().starts_with(npy::MAGIC) || ending(&source.path) == "npy" && source.start().is_empty() {
         return npy::read_points(source);
     }
-    if source.bytes.starts_with(b"PK\x03\x04") {
+    if source.start().starts_with(b"PK\x03\x04") {
         return Err(source.error("an archive (.npz?); save the array of points as .npy"));
     }
-    if let Some(at) = source.bytes.iter().position(|&b| b == 0) {
+    if let Some(at) = source.start().iter().position(|&b| b == 0) {
         return Err(source.error_byte(at, "a byte 0: neither a .npy file nor a table of text"));
     }
     table(source)
@@ -56,11 +57,10 @@ struct Columns {
 }
 
 fn table(source: &Source) -> Result<Vec<[f64; 3]>> {
-    let mut lines = Tokens::new(source, 0..source.bytes.len(), None);
-    let Some(columns) = columns(source, &mut lines)? else { return Ok(Vec::new()) };
-    let parts: Vec<_> = parts(source, lines.at..source.bytes.len()).collect();
-    let read = |part: Range<usize>| columns.points(source, Tokens::new(source, part, None));
-    let points: Vec<Result<Vec<_>>> = parts.into_par_iter().map(read).collect();
+    let mut rest = 0..source.len();
+    let Some(columns) = columns(source, &mut rest)? else { return Ok(Vec::new()) };
+    let parts: Vec<_> = parts(source, rest).collect();
+    let points: Vec<Result<Vec<_>>> = parts.into_par_iter().map(|part| columns.points(source, part)).collect();
     Ok(points.into_iter().collect::<Result<Vec<_>>>()?.concat())
 }
 
@@ -69,7 +69,7 @@ fn parts(source: &Source, range: Range<usize>) -> impl Iterator<Item = Range<usi
     const BYTES: usize = 1 << 20;
     let mut start = range.start;
     std::iter::from_fn(move || {
-        let rest = source.bytes.get(start..range.end).filter(|rest| !rest.is_empty())?;
+        let rest = source.start().get(start..range.end).filter(|rest| !rest.is_empty())?;
         let line_end = rest.iter().skip(BYTES).position(|&b| b == b'\n');
         let part = start..line_end.map_or(range.end, |at| start + BYTES + at + 1);
         start = part.end;
@@ -77,16 +77,24 @@ fn parts(source: &Source, range: Range<usize>) -> impl Iterator<Item = Range<usi
     })
 }
 
-/// The next line that holds something. Spreadsheets leave lines of separators behind.
-fn next_line<'a>(lines: &mut Tokens<'a>) -> Option<(&'a [u8], usize)> {
+/// The next line of `rest` that holds something, and its position. Spreadsheets leave lines of separators behind.
+fn next_line<'s>(source: &'s Source, rest: &mut Range<usize>) -> Option<(&'s [u8], usize)> {
     let holds = |line: &[u8]| !line.starts_with(b"#") && line.iter().any(|b| !b";,".contains(b) && !b.is_ascii_whitespace());
-    std::iter::from_fn(|| lines.line()).map(|(line, at)| (line.trim_ascii(), at)).find(|(line, _)| holds(line))
+    while let Some(bytes) = source.start().get(rest.clone()).filter(|bytes| !bytes.is_empty()) {
+        let length = memchr::memchr2(b'\n', b'\r', bytes).unwrap_or(bytes.len());
+        let (line, at) = (bytes[..length].trim_ascii(), rest.start);
+        rest.start = rest.end.min(at + length + 1);
+        if holds(line) {
+            return Some((line, at));
+        }
+    }
+    None
 }
 
-/// Finds the columns by the first lines, and leaves the lines of the points; `None` if there are none.
-fn columns(source: &Source, lines: &mut Tokens<'_>) -> Result<Option<Columns>> {
-    let mut first = lines.clone();
-    let Some((line, at)) = next_line(&mut first) else { return Ok(None) };
+/// Finds the columns by the first lines, and leaves those of the points in `rest`; `None` if there are none.
+fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> {
+    let mut first = rest.clone();
+    let Some((line, at)) = next_line(source, &mut first) else { return Ok(None) };
     let separator = separator(line, None);
     let names: Vec<_> = fields(line, separator).collect();
     let (width, numbers) = (names.len(), names.iter().filter(|name| number(name).is_some()).count());
@@ -99,16 +107,16 @@ fn columns(source: &Source, lines: &mut Tokens<'_>) -> Result<Option<Columns>> {
     if named.is_none() && numbers > 0 {
         return Ok(Some(Columns { separator, width, at }));
     }
-    *lines = first.clone();
-    Ok(next_line(&mut first).map(|(line, _)| Columns { separator: self::separator(line, Some(separator)), width, at }))
+    *rest = first.clone();
+    Ok(next_line(source, &mut first).map(|(line, _)| Columns { separator: self::separator(line, Some(separator)), width, at }))
 }
 
 impl Columns {
     /// The points of some lines.
-    fn points(&self, source: &Source, mut lines: Tokens<'_>) -> Result<Vec<[f64; 3]>> {
+    fn points(&self, source: &Source, mut part: Range<usize>) -> Result<Vec<[f64; 3]>> {
         let mut points = Vec::new();
         let mut found = Vec::with_capacity(self.width);
-        while let Some((line, at)) = next_line(&mut lines) {
+        while let Some((line, at)) = next_line(source, &mut part) {
             found.clear();
             found.extend(fields(line, self.separator));
             if found.len() != self.width {

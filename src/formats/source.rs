@@ -5,21 +5,26 @@ use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 use crate::error::{Error, Result};
 use memchr::memmem;
 
-/// Bytes read at a time while searching for the start of raw data in a file.
-const PIECE: u64 = 1 << 14;
+/// Bytes that are read at a time.
+const CHUNK: usize = 1 << 18;
+
+/// Bytes after comments by which formats are told apart.
+const TOLD_BY: usize = 256;
 
 const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The content of a file.
+/// The content of a file, without a UTF-8 byte-order mark. Large files stay on disk and are read a window at a time. (A
+/// memory map would do that, too, but if another process truncates a mapped file, this process is killed.)
 pub(crate) struct Source {
     /// Path of the file, for messages.
     pub path: PathBuf,
-    /// Contents without a UTF-8 byte-order mark: the whole file, or only its start if `rest` remains on disk.
-    pub bytes: Vec<u8>,
+    /// All contents, or, if `rest` remains on disk, their start.
+    start: Arc<Vec<u8>>,
     rest: Option<Rest>,
 }
 
@@ -33,35 +38,46 @@ struct Rest {
 }
 
 impl Source {
-    /// Reads a file; `kinds` names the readable formats for messages. The whole file is read, except raw data appended
-    /// to XML, which are read on demand. (A memory map would do that for all files, but if another process truncates a
-    /// mapped file, this process is killed.)
+    /// Opens a file; `kinds` names the readable formats for messages. Of XML, all is read but raw data that are
+    /// appended; of other files, some chunks, in which something follows after comments.
+    pub fn open(path: &Path, kinds: &str) -> Result<Self> {
+        Self::opened(path, kinds, |file, bytes, length| {
+            let mut search = RawData::default();
+            while read_chunk(file, bytes)? > 0 && !search.ends_in(bytes) {
+                bytes.try_reserve_exact(length.saturating_sub(bytes.len()))?;
+            }
+            if bytes.len() >= length {
+                file.read_to_end(bytes)?; // of a pipe
+            }
+            Ok(bytes.len() < length)
+        })
+    }
+
+    /// Reads a file as a whole; `kinds` names the readable formats for messages.
     pub fn read(path: &Path, kinds: &str) -> Result<Self> {
-        match Self::open(path) {
+        Self::opened(path, kinds, |file, bytes, length| {
+            bytes.try_reserve_exact(length)?;
+            file.read_to_end(bytes).map(|_| false)
+        })
+    }
+
+    /// Opens a file, of which `read` reads the start and returns whether a rest remains.
+    fn opened(path: &Path, kinds: &str, read: impl FnOnce(&mut File, &mut Vec<u8>, usize) -> std::io::Result<bool>) -> Result<Self> {
+        let open = || {
+            let mut file = File::open(path)?;
+            let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
+            let mut bytes = Vec::new();
+            let remains = read(&mut file, &mut bytes, length)?;
+            bytes.shrink_to_fit();
+            let (read, source) = (bytes.len(), Self::new(path, bytes));
+            let mark = read - source.start.len();
+            Ok(Self { rest: remains.then_some(Rest { file, mark, length: length - mark }), ..source })
+        };
+        match open() {
             Ok(source) => Ok(source),
             Err(_) if path.is_dir() => Err(Self::new(path, Vec::new()).error(format!("a folder; name a file in it ({kinds})"))),
             Err(source) => Err(Error::Io { path: path.into(), source }),
         }
-    }
-
-    fn open(path: &Path) -> std::io::Result<Self> {
-        let mut file = File::open(path)?;
-        let about = file.metadata()?;
-        let length = usize::try_from(about.len()).unwrap_or(usize::MAX);
-        let mut bytes = Vec::new();
-        bytes.try_reserve_exact(length.saturating_add(1))?;
-        let mut search = RawData::default();
-        while !search.failed && Read::take(&mut file, PIECE).read_to_end(&mut bytes)? > 0 {
-            if search.found_in(&bytes) && bytes.len() < length {
-                let read = bytes.len();
-                let mut source = Self::new(path, bytes);
-                source.bytes.shrink_to_fit();
-                let mark = read - source.bytes.len();
-                return Ok(Self { rest: Some(Rest { file, mark, length: length - mark }), ..source });
-            }
-        }
-        file.read_to_end(&mut bytes)?;
-        Ok(Self::new(path, bytes))
     }
 
     /// The contents of a file that are already in memory.
@@ -69,18 +85,36 @@ impl Source {
         if bytes.starts_with(BYTE_ORDER_MARK) {
             bytes.drain(..BYTE_ORDER_MARK.len());
         }
-        Self { path: path.into(), bytes, rest: None }
+        Self { path: path.into(), start: Arc::new(bytes), rest: None }
     }
 
     /// Length of the contents in bytes.
     pub fn len(&self) -> usize {
-        self.rest.as_ref().map_or(self.bytes.len(), |rest| rest.length)
+        self.rest.as_ref().map_or(self.start.len(), |rest| rest.length)
+    }
+
+    /// The start of the contents: all of them if the file was read as a whole; of XML, all but raw data that are
+    /// appended.
+    pub fn start(&self) -> &[u8] {
+        &self.start
+    }
+
+    /// Contents around byte `at`, at least `least` bytes from there on or all that there are, and the position where
+    /// they begin.
+    pub fn chunk(&self, at: usize, least: usize) -> Result<(usize, Arc<Vec<u8>>)> {
+        let wanted = at.saturating_add(least).min(self.len());
+        if wanted <= self.start.len() {
+            return Ok((0, self.start.clone()));
+        }
+        let end = at.saturating_add(least.saturating_mul(2).max(CHUNK)).min(self.len()); // for long lines, twice what is needed
+        let bytes = self.window(at..end).map_err(|why| self.error_byte(at, why))?;
+        Ok((at, Arc::new(bytes.into_owned())))
     }
 
     /// A range of the contents, read from disk if it is not in memory.
     pub fn window(&self, range: Range<usize>) -> Result<Cow<'_, [u8]>, String> {
-        let Some(rest) = self.rest.as_ref().filter(|_| range.end > self.bytes.len()) else {
-            return self.bytes.get(range).map(Cow::Borrowed).ok_or_else(|| "it lies beyond the end of the file".into());
+        let Some(rest) = self.rest.as_ref().filter(|_| range.end > self.start.len()) else {
+            return self.start.get(range).map(Cow::Borrowed).ok_or_else(|| "it lies beyond the end of the file".into());
         };
         let mut file = &rest.file;
         let mut bytes = vec![0; range.len()];
@@ -117,36 +151,62 @@ impl Source {
 
     /// Number, counted from 1, of the line that contains byte `at`; a lone carriage return also ends a line.
     pub fn line(&self, at: usize) -> usize {
-        let before = &self.bytes[..at.min(self.bytes.len())];
-        let feed_follows = |i: usize| self.bytes.get(i + 1) == Some(&b'\n');
-        1 + before.iter().enumerate().filter(|&(i, &b)| b == b'\n' || (b == b'\r' && !feed_follows(i))).count()
+        let (mut line, mut before) = (1, 0);
+        for begin in (0..at.min(self.len())).step_by(CHUNK) {
+            let Ok(bytes) = self.window(begin..at.min(self.len()).min(begin + CHUNK)) else { break };
+            for &byte in bytes.iter() {
+                line += usize::from(byte == b'\r' || (byte == b'\n' && before != b'\r'));
+                before = byte;
+            }
+        }
+        line
     }
 }
 
-/// Search for raw data appended to XML, in contents that are still being read.
+/// Reads the next bytes of a file.
+fn read_chunk(file: &mut File, bytes: &mut Vec<u8>) -> std::io::Result<usize> {
+    Read::take(file, CHUNK as u64).read_to_end(bytes)
+}
+
+/// Search for the place up to which a file that is being read belongs in memory.
 #[derive(Default)]
 struct RawData {
     /// Bytes searched so far.
     done: usize,
     /// Position where the element `AppendedData` starts.
     tag: Option<usize>,
-    /// Whether it is certain that there are no raw data.
-    failed: bool,
 }
 
 impl RawData {
-    /// Whether raw data have started, that is whether something follows the start tag of the element.
-    fn found_in(&mut self, bytes: &[u8]) -> bool {
+    /// Whether the file is known not to be XML, or raw data have started, that is something follows the start tag of
+    /// their element.
+    fn ends_in(&mut self, bytes: &[u8]) -> bool {
         const TAG: &[u8] = b"<AppendedData";
         let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-        self.failed = !text.trim_ascii_start().starts_with(b"<");
+        let content = &text[skip_comments(text)..];
+        if !content.starts_with(b"<") {
+            return content.len() >= TOLD_BY;
+        }
         let from = self.done.saturating_sub(TAG.len());
         self.done = bytes.len();
         self.tag = self.tag.or_else(|| memmem::find(&bytes[from..], TAG).map(|at| from + at));
-        let Some(tag) = self.tag.filter(|_| !self.failed) else { return false };
+        let Some(tag) = self.tag else { return false };
         let Some(end) = bytes[tag..].iter().position(|&b| b == b'>') else { return false };
-        self.failed = !bytes[tag..tag + end].windows(3).any(|w| w == b"raw");
-        !self.failed && !bytes[tag + end + 1..].trim_ascii_start().is_empty()
+        let is_raw = bytes[tag..tag + end].windows(3).any(|w| w == b"raw");
+        is_raw && !bytes[tag + end + 1..].trim_ascii_start().is_empty()
+    }
+}
+
+/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus files).
+pub(crate) fn skip_comments(bytes: &[u8]) -> usize {
+    let mut at = 0;
+    loop {
+        at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
+        let rest = &bytes[at..];
+        if !(rest.starts_with(b"#") || rest.starts_with(b"**")) {
+            return at;
+        }
+        at += rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
     }
 }
 
@@ -159,143 +219,4 @@ pub(crate) fn printable(word: &[u8]) -> String {
         text.push('…');
     }
     text
-}
-
-/// The tokens (numbers and words) of a text, separated by white space.
-#[derive(Clone)]
-pub(crate) struct Tokens<'a> {
-    source: &'a Source,
-    /// Position of the next unread byte of the source.
-    pub at: usize,
-    end: usize,
-    /// The character that starts a comment, which extends to the end of the line.
-    comment: Option<u8>,
-}
-
-impl<'a> Tokens<'a> {
-    pub fn new(source: &'a Source, range: std::ops::Range<usize>, comment: Option<u8>) -> Self {
-        Self { source, at: range.start, end: range.end.min(source.bytes.len()), comment }
-    }
-
-    /// Skips white space and comments.
-    pub fn skip_space(&mut self) {
-        let bytes = &self.source.bytes[..self.end];
-        while let Some(&b) = bytes.get(self.at) {
-            if b.is_ascii_whitespace() || b == 0x0b {
-                self.at += 1;
-            } else if Some(b) == self.comment {
-                self.at += bytes[self.at..].iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(self.end - self.at);
-            } else {
-                return;
-            }
-        }
-    }
-
-    /// The next token and its position; `None` at the end.
-    pub fn next_token(&mut self) -> Option<(&'a [u8], usize)> {
-        self.skip_space();
-        let start = self.at.min(self.end);
-        let rest = &self.source.bytes[start..self.end];
-        let stop = |b: u8| b.is_ascii_whitespace() || b == 0x0b || Some(b) == self.comment;
-        let length = rest.iter().position(|&b| stop(b)).unwrap_or(rest.len());
-        self.at += length;
-        (length > 0).then(|| (&rest[..length], start))
-    }
-
-    /// The next token without consuming it.
-    pub fn peek(&self) -> Option<&'a [u8]> {
-        self.clone().next_token().map(|(token, _)| token)
-    }
-
-    /// The next token; at the end of the text an error that says what was expected.
-    pub fn word(&mut self, what: &str) -> Result<(&'a [u8], usize)> {
-        self.next_token().ok_or_else(|| self.source.error_line(self.end, format!("the {} ends where {what} should be", self.unit())))
-    }
-
-    /// The next token as an integer.
-    pub fn integer(&mut self, what: &str) -> Result<i64> {
-        let (token, at) = self.word(what)?;
-        parse_integer(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
-    }
-
-    /// The next token as a count of things that take at least two bytes each in the rest of the text, so that a wrong
-    /// count is refused before memory is allocated for it.
-    pub fn count(&mut self, what: &str) -> Result<usize> {
-        let (token, at) = self.word(what)?;
-        let fail = |why: &str| self.source.error_line(at, format!("`{}` as {what}: {why}", printable(token)));
-        let n = parse_integer(token).ok_or_else(|| fail("not an integer in range"))?;
-        let n = usize::try_from(n).map_err(|_| fail("negative"))?;
-        let room = self.left() / 2 + 1;
-        if n > room { Err(fail(&format!("more than the rest of the {} can hold", self.unit()))) } else { Ok(n) }
-    }
-
-    /// The next token as a floating-point number.
-    pub fn float(&mut self, what: &str) -> Result<f64> {
-        let (token, at) = self.word(what)?;
-        parse_float(token).ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))
-    }
-
-    /// The rest of the current line, consuming the line end; `None` at the end of the text.
-    pub fn line(&mut self) -> Option<(&'a [u8], usize)> {
-        if self.at >= self.end {
-            return None;
-        }
-        let start = self.at;
-        let rest = &self.source.bytes[start..self.end];
-        let length = rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
-        let feed = if rest[length..].starts_with(b"\r\n") { 2 } else { usize::from(length < rest.len()) };
-        self.at += length + feed;
-        Some((&rest[..length], start))
-    }
-
-    /// What the text is, for messages.
-    fn unit(&self) -> &'static str {
-        if self.end < self.source.bytes.len() { "line" } else { "file" }
-    }
-
-    /// Number of bytes that have not been read.
-    pub fn left(&self) -> usize {
-        self.end.saturating_sub(self.at)
-    }
-}
-
-/// Parses a decimal integer; `None` if the token is not an integer or does not fit.
-pub(crate) fn parse_integer(token: &[u8]) -> Option<i64> {
-    let (negative, digits) = match token {
-        [b'-', rest @ ..] => (true, rest),
-        [b'+', rest @ ..] | rest => (false, rest),
-    };
-    if digits.is_empty() {
-        return None;
-    }
-    let mut value = 0i64;
-    for &b in digits {
-        let digit = i64::from(b.wrapping_sub(b'0'));
-        if digit > 9 {
-            return None;
-        }
-        value = value.checked_mul(10)?.checked_sub(digit)?;
-    }
-    if negative { Some(value) } else { value.checked_neg() }
-}
-
-/// Parses a floating-point number; Fortran's exponent letter D is accepted, and what C libraries write for NaN and
-/// infinity.
-pub(crate) fn parse_float(token: &[u8]) -> Option<f64> {
-    let text = std::str::from_utf8(token).ok()?;
-    text.parse().ok().or_else(|| {
-        let text = Some(text).filter(|text| text.len() <= 64)?.to_ascii_lowercase();
-        let looks_fortran = text.bytes().all(|b| b.is_ascii_digit() || b"+-.d".contains(&b));
-        if looks_fortran { text.replace('d', "e").parse().ok() } else { parse_special(&text) }
-    })
-}
-
-/// Parses `nan(…)`, and the older spellings `1.#QNAN` and the like, which may be filled up with zeros.
-fn parse_special(text: &str) -> Option<f64> {
-    let size = text.trim_start_matches(['+', '-']);
-    match size.trim_end_matches('0') {
-        "1.#inf" => Some(if text.starts_with('-') { f64::NEG_INFINITY } else { f64::INFINITY }),
-        "1.#ind" | "1.#nan" | "1.#qnan" | "1.#snan" => Some(f64::NAN),
-        _ => (size.starts_with("nan(") && size.ends_with(')')).then_some(f64::NAN),
-    }
 }

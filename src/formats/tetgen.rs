@@ -1,12 +1,15 @@
 //! Reader for TetGen's pairs of `.node` and `.ele` files, numbered from 0, from 1, or in any way.
 
+use std::ops::Range;
+
 use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
 use super::detect::ending;
-use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::source::{Source, printable};
 use super::tags::Tags;
+use super::tokens::{Tokens, parse_float, parse_integer, words};
 use crate::error::Result;
 use crate::mesh::On;
 
@@ -15,7 +18,7 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
     let other = if ending(&source.path) == "node" { "ele" } else { "node" };
     let upper = source.path.extension().is_some_and(|e| e.to_string_lossy().chars().all(|c| c.is_ascii_uppercase()));
     let path = source.path.with_extension(if upper { other.to_ascii_uppercase() } else { other.to_owned() });
-    Source::read(&path, other).map_err(|error| {
+    Source::open(&path, other).map_err(|error| {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
         source.error(format!("`{name}` is needed beside it ({error})"))
     })
@@ -25,7 +28,7 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
 pub(crate) fn read<'a>(main: &'a Source, companion: &Source, options: &LoadOptions) -> Result<Assembly<'a>> {
     let (node, ele) = if ending(&main.path) == "node" { (main, companion) } else { (companion, main) };
     let mut assembly = Assembly::new(main, options, "TetGen .node and .ele".into());
-    assembly.bytes = (node.bytes.len() + ele.bytes.len()) as u64;
+    assembly.bytes = (node.len() + ele.len()) as u64;
     let tags = nodes(node, &mut assembly)?;
     elements(ele, &tags, &mut assembly)?;
     Ok(assembly)
@@ -35,56 +38,76 @@ pub(crate) fn read<'a>(main: &'a Source, companion: &Source, options: &LoadOptio
 pub(super) struct Lines<'a> {
     source: &'a Source,
     tokens: Tokens<'a>,
+    words: Vec<Range<usize>>,
+}
+
+/// A line, and where its words are.
+pub(super) struct Line<'l> {
+    /// Position in the file.
+    pub at: usize,
+    text: &'l [u8],
+    words: &'l [Range<usize>],
+}
+
+impl<'l> Line<'l> {
+    /// Number of words.
+    pub(super) fn len(&self) -> usize {
+        self.words.len()
+    }
+
+    /// Word number `i`; empty if there are not that many.
+    pub(super) fn word(&self, i: usize) -> &'l [u8] {
+        self.words.get(i).map_or(&[], |word| &self.text[word.clone()])
+    }
 }
 
 impl<'a> Lines<'a> {
     pub(super) fn new(source: &'a Source) -> Self {
-        Self { source, tokens: Tokens::new(source, 0..source.bytes.len(), Some(b'#')) }
+        Self { source, tokens: Tokens::new(source, Some(b'#')), words: Vec::new() }
     }
 
-    /// Puts the words of the next line into `words` and returns the position of the line.
-    pub(super) fn next(&mut self, words: &mut Vec<&'a [u8]>) -> Option<usize> {
-        self.tokens.skip_space();
-        let (line, at) = self.tokens.line()?;
-        let mut rest = Tokens::new(self.source, at..at + line.len(), Some(b'#'));
-        words.clear();
-        while let Some((word, _)) = rest.next_token() {
-            words.push(word);
-        }
-        Some(at)
+    /// The next line.
+    pub(super) fn next(&mut self) -> Result<Option<Line<'_>>> {
+        self.tokens.skip_space()?;
+        self.words.clear();
+        let Some((text, at)) = self.tokens.line()? else { return Ok(None) };
+        self.words.extend(words(text, Some(b'#')));
+        Ok(Some(Line { at, text, words: &self.words }))
     }
 
-    /// The next line, as [`Self::next`] returns it; an error at the end of the file.
-    fn need(&mut self, words: &mut Vec<&'a [u8]>, what: &str) -> Result<usize> {
-        let end = self.source.bytes.len();
-        self.next(words).ok_or_else(|| self.source.error_line(end, format!("the file ends where {what} should be")))
+    /// The next line; an error at the end of the file.
+    fn need(&mut self, what: &str) -> Result<Line<'_>> {
+        let source = self.source;
+        self.next()?.ok_or_else(|| source.error_line(source.len(), format!("the file ends where {what} should be")))
     }
 
     /// Returns an error if anything follows.
-    fn end(mut self, words: &mut Vec<&'a [u8]>, n: usize, what: &str) -> Result<()> {
-        match self.next(words) {
+    fn end(mut self, n: usize, what: &str) -> Result<()> {
+        let source = self.source;
+        match self.next()? {
             None => Ok(()),
-            Some(at) => Err(self.source.error_line(at, format!("more than the {n} {what} that are announced"))),
+            Some(line) => Err(source.error_line(line.at, format!("more than the {n} {what} that are announced"))),
         }
     }
 }
 
 /// Reads the counts in the first line: at least `need` numbers; missing further ones are 0.
-fn header<const N: usize>(source: &Source, at: usize, words: &[&[u8]], need: usize, what: &str) -> Result<[usize; N]> {
+fn header<const N: usize>(source: &Source, line: &Line<'_>, need: usize, what: &str) -> Result<[usize; N]> {
     let mut counts = [0; N];
     for (i, count) in counts.iter_mut().enumerate() {
-        let Some(word) = words.get(i) else {
+        let word = line.word(i);
+        if word.is_empty() {
             if i < need {
-                return Err(source.error_line(at, format!("the first line must be `{what}`")));
+                return Err(source.error_line(line.at, format!("the first line must be `{what}`")));
             }
             break;
-        };
+        }
         let n = parse_integer(word).and_then(|n| usize::try_from(n).ok());
-        let n = n.ok_or_else(|| source.error_line(at, format!("`{}` in the first line, which must be `{what}`", printable(word))))?;
+        let n = n.ok_or_else(|| source.error_line(line.at, format!("`{}` in the first line, which must be `{what}`", printable(word))))?;
         // Everything that is counted takes at least two bytes of the file.
-        let room = source.bytes.len() / 2;
+        let room = source.len() / 2;
         if n > room {
-            return Err(source.error_line(at, format!("{n} in the first line (`{what}`), but the file has room for {room} at most")));
+            return Err(source.error_line(line.at, format!("{n} in the first line (`{what}`), but the file has room for {room} at most")));
         }
         *count = n;
     }
@@ -93,9 +116,9 @@ fn header<const N: usize>(source: &Source, at: usize, words: &[&[u8]], need: usi
 
 fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
     let mut lines = Lines::new(source);
-    let mut words = Vec::new();
-    let at = lines.need(&mut words, "the first line")?;
-    let [n, dimension, attributes, markers] = header(source, at, &words, 2, "<points> <dimension 3> <attributes> <markers 0 or 1>")?;
+    let line = lines.need("the first line")?;
+    let at = line.at;
+    let [n, dimension, attributes, markers] = header(source, &line, 2, "<points> <dimension 3> <attributes> <markers 0 or 1>")?;
     if dimension != 3 {
         return Err(source.error_line(at, format!("dimension {dimension} instead of 3: is this a .node file of TetGen?")));
     }
@@ -106,24 +129,26 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
     let mut columns = vec![Vec::new(); attributes + markers];
     let mut points = Vec::with_capacity(n);
     for i in 0..n {
-        let at = lines.need(&mut words, "a point")?;
-        if words.len() < 4 + attributes {
+        let line = lines.need("a point")?;
+        let at = line.at;
+        if line.len() < 4 + attributes {
             let wanted = 4 + attributes;
-            return Err(source.error_line(at, format!("point {i} has {} numbers instead of {wanted}", words.len())));
+            return Err(source.error_line(at, format!("point {i} has {} numbers instead of {wanted}", line.len())));
         }
         let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", printable(word)));
-        tags.push(parse_integer(words[0]).ok_or_else(|| wrong(words[0]))?);
+        tags.push(parse_integer(line.word(0)).ok_or_else(|| wrong(line.word(0)))?);
         let mut point = [0.0; 3];
-        for (x, word) in point.iter_mut().zip(&words[1..4]) {
+        for (x, word) in point.iter_mut().zip((1..4).map(|i| line.word(i))) {
             *x = parse_float(word).ok_or_else(|| wrong(word))?;
         }
         points.push(point);
         for (c, column) in columns.iter_mut().enumerate() {
-            let value = words.get(4 + c).map_or(Ok(0.0), |word| parse_float(word).ok_or_else(|| wrong(word)));
+            let word = line.word(4 + c); // empty: a marker that is missing
+            let value = if word.is_empty() { Ok(0.0) } else { parse_float(word).ok_or_else(|| wrong(word)) };
             column.push(value? as f32);
         }
     }
-    lines.end(&mut words, n, "points")?;
+    lines.end(n, "points")?;
     for (c, values) in columns.into_iter().enumerate() {
         let name = if c < attributes { format!("attribute{c}") } else { "boundary_marker".into() };
         assembly.arrays.push(Array { name, on: On::Points, components: 1, values });
@@ -136,9 +161,9 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
 
 fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Result<()> {
     let mut lines = Lines::new(source);
-    let mut words = Vec::new();
-    let at = lines.need(&mut words, "the first line")?;
-    let [n, width, attributes] = header(source, at, &words, 2, "<tetrahedra> <points per tetrahedron> <attributes>")?;
+    let line = lines.need("the first line")?;
+    let at = line.at;
+    let [n, width, attributes] = header(source, &line, 2, "<tetrahedra> <points per tetrahedron> <attributes>")?;
     let name = match width {
         4 => "tetrahedron",
         10 => "quadratic tetrahedron",
@@ -151,24 +176,25 @@ fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Resu
     let mut nodes = vec![0; width];
     assembly.reserve(n);
     for i in 0..n {
-        let at = lines.need(&mut words, "a tetrahedron")?;
-        if words.len() < 1 + width + attributes {
+        let line = lines.need("a tetrahedron")?;
+        let at = line.at;
+        if line.len() < 1 + width + attributes {
             let wanted = 1 + width + attributes;
-            return Err(source.error_line(at, format!("tetrahedron {i} has {} numbers instead of {wanted}", words.len())));
+            return Err(source.error_line(at, format!("tetrahedron {i} has {} numbers instead of {wanted}", line.len())));
         }
         let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", printable(word)));
-        for (node, word) in nodes.iter_mut().zip(&words[1..=width]) {
+        for (node, word) in nodes.iter_mut().zip((1..=width).map(|i| line.word(i))) {
             let tag = parse_integer(word).ok_or_else(|| wrong(word))?;
             let found = points.get(tag).map(i64::from);
             *node = found.ok_or_else(|| source.error_line(at, format!("cell {i}: point {tag} does not exist")))?;
         }
         assembly.push(kind, &nodes)?;
         for (c, column) in columns.iter_mut().enumerate() {
-            let word = words[1 + width + c];
+            let word = line.word(1 + width + c);
             column.push(parse_float(word).ok_or_else(|| wrong(word))? as f32);
         }
     }
-    lines.end(&mut words, n, "tetrahedra")?;
+    lines.end(n, "tetrahedra")?;
     for (c, values) in columns.into_iter().enumerate() {
         let name = if c == 0 { "region".into() } else { format!("region{c}") };
         assembly.arrays.push(Array { name, on: On::Cells, components: 1, values });

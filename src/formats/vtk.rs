@@ -7,7 +7,8 @@ use super::cells;
 use super::integers::Integers;
 use super::report::Fate;
 use super::scalar::Scalar;
-use super::source::{Source, Tokens, printable};
+use super::source::{Source, printable};
+use super::tokens::Tokens;
 use super::vtk_attributes::Section;
 use super::vtk_reader::Reader;
 use crate::error::Result;
@@ -35,12 +36,12 @@ impl Cells<'_> {
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
-    let mut reader = Reader { source, tokens: Tokens::new(source, 0..source.bytes.len(), None), binary: false };
+    let mut reader = Reader { source, tokens: Tokens::new(source, None), binary: false };
     let format = reader.header()?;
     let mut assembly = Assembly::new(source, options, format);
     let (mut points, mut cells, mut types) = (None, None, None);
     let mut section: Option<Section> = None;
-    while let Some((token, at)) = reader.tokens.next_token() {
+    while let Some((token, at)) = reader.tokens.next_token()? {
         let keyword = token.to_ascii_uppercase();
         match keyword.as_slice() {
             b"POINTS" => points = Some(reader.points()?),
@@ -50,7 +51,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
                 let on = if keyword == b"POINT_DATA" { On::Points } else { On::Cells };
                 section = Some((on, reader.size("the number of values")?));
             }
-            b"METADATA" => reader.metadata(),
+            b"METADATA" => reader.metadata()?,
             _ => {
                 let arrays = reader.attribute(&keyword, at, section)?;
                 let Some((on, _)) = section else { continue };
@@ -60,7 +61,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
             }
         }
     }
-    let missing = |what: &str| source.error_line(source.bytes.len(), format!("the file ends, and there was no {what}"));
+    let missing = |what: &str| source.error_line(source.len(), format!("the file ends, and there was no {what}"));
     assembly.set_points(points.ok_or_else(|| missing("POINTS"))?, &[0]);
     let mut cells: Cells<'_> = cells.ok_or_else(|| missing("CELLS"))?;
     let mut types: Integers<'_> = types.ok_or_else(|| missing("CELL_TYPES"))?;
@@ -97,13 +98,13 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 
 impl<'a> Reader<'a> {
     fn header(&mut self) -> Result<String> {
-        let (first, _) = self.tokens.line().unwrap_or_default();
+        let (first, _) = self.tokens.line()?.unwrap_or_default();
         let first = first.trim_ascii();
         let Some(version) = first.strip_prefix(b"# vtk DataFile Version") else {
             return Err(self.source.error_line(0, format!("`{}` instead of `# vtk DataFile Version …`", printable(first))));
         };
         let version = printable(version.trim_ascii());
-        self.tokens.line();
+        self.tokens.line()?;
         let (coding, at) = self.tokens.word("ASCII or BINARY")?;
         self.binary = match coding.to_ascii_uppercase().as_slice() {
             b"ASCII" => false,
@@ -142,7 +143,7 @@ impl<'a> Reader<'a> {
         let at = self.tokens.at;
         let n = self.tokens.count("the number of cells")?;
         let size = self.tokens.count("the size of the cell list")?;
-        if self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"OFFSETS")) {
+        if self.tokens.peek()?.is_some_and(|t| t.eq_ignore_ascii_case(b"OFFSETS")) {
             return self.offsets(at, n, size);
         }
         let mut list = self.integers(Some(Scalar::I32), size, "a point of a cell")?;
@@ -164,7 +165,7 @@ impl<'a> Reader<'a> {
     }
 
     fn offsets(&mut self, at: usize, n: usize, size: usize) -> Result<Cells<'a>> {
-        self.tokens.next_token();
+        self.tokens.next_token()?;
         let scalar = self.scalar()?;
         let mut offsets = self.integers(scalar, n, "an offset")?;
         let (word, word_at) = self.tokens.word("CONNECTIVITY")?;

@@ -1,7 +1,8 @@
 //! Reader for the arrays of legacy VTK files.
 
 use super::scalar::Scalar;
-use super::source::{parse_integer, printable};
+use super::source::printable;
+use super::tokens::parse_integer;
 use super::vtk_reader::Reader;
 use crate::error::Result;
 use crate::mesh::On;
@@ -54,14 +55,14 @@ impl Reader<'_> {
         let name = self.name()?;
         let scalar = self.scalar()?;
         let mut rest = self.tokens.clone();
-        let same_line = rest.line().map_or(&b""[..], |(line, _)| line.trim_ascii());
-        let components = if same_line.is_empty() { 1 } else { self.components()? };
+        let is_last = rest.line()?.is_none_or(|(line, _)| line.trim_ascii().is_empty());
+        let components = if is_last { 1 } else { self.components()? };
         // The format requires the look-up table, but it is often missing.
         let mut ahead = self.tokens.clone();
-        ahead.line();
-        if ahead.line().is_some_and(|(line, _)| line.trim_ascii().get(..12).is_some_and(|w| w.eq_ignore_ascii_case(b"LOOKUP_TABLE"))) {
-            self.tokens.next_token();
-            self.tokens.next_token();
+        ahead.line()?;
+        if ahead.line()?.is_some_and(|(line, _)| line.trim_ascii().get(..12).is_some_and(|w| w.eq_ignore_ascii_case(b"LOOKUP_TABLE"))) {
+            self.tokens.next_token()?;
+            self.tokens.next_token()?;
         }
         let values = self.values(scalar, n * components, &value_of(&name))?;
         Ok(vec![(name, components, values)])
@@ -81,15 +82,15 @@ impl Reader<'_> {
         let n = self.tokens.count("the number of arrays")?;
         let mut arrays = Vec::new();
         for _ in 0..n {
-            while self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"METADATA")) {
-                self.tokens.next_token();
-                self.metadata();
+            while self.tokens.peek()?.is_some_and(|t| t.eq_ignore_ascii_case(b"METADATA")) {
+                self.tokens.next_token()?;
+                self.metadata()?;
             }
             let name = self.name()?;
             let components = self.size("a number of components")?;
             let count = components * self.size("a number of tuples")?;
-            if self.tokens.peek().is_some_and(|t| t.eq_ignore_ascii_case(b"string")) {
-                self.tokens.next_token();
+            if self.tokens.peek()?.is_some_and(|t| t.eq_ignore_ascii_case(b"string")) {
+                self.tokens.next_token()?;
                 self.strings(count)?;
                 continue;
             }
@@ -102,22 +103,21 @@ impl Reader<'_> {
 
     /// Skips strings: one per line in text files, each preceded by its length in binary files.
     fn strings(&mut self, count: usize) -> Result<()> {
-        self.tokens.line();
+        self.tokens.line()?;
         for _ in 0..count {
             if !self.binary {
                 let at = self.tokens.at;
-                self.tokens.line().ok_or_else(|| self.source.error_line(at, "the file ends in an array of texts"))?;
+                self.tokens.line()?.ok_or_else(|| self.source.error_line(at, "the file ends in an array of texts"))?;
                 continue;
             }
             let at = self.tokens.at;
-            let rest = &self.source.bytes[at..];
-            let head = rest.first().copied().unwrap_or(0);
+            let cut = || self.source.error_byte(at, "the file ends in an array of texts");
+            let head = self.tokens.bytes(1)?.map(|b| b[0]).ok_or_else(cut)?;
             // The upper two bits encode how many bytes hold the length: 8, 4, 2 or 1.
-            let size = 8usize >> (head >> 6);
-            let word = rest.get(..size).ok_or_else(|| self.source.error_byte(at, "the file ends in an array of texts"))?;
-            let length = word.iter().fold(0u64, |n, &b| n << 8 | u64::from(b)) & (u64::MAX >> (64 - 8 * size) >> 2);
-            let end = usize::try_from(length).ok().and_then(|n| n.checked_add(size)).filter(|&n| n <= rest.len());
-            self.tokens.at += end.ok_or_else(|| self.source.error_byte(at, format!("a text of {length} bytes")))?;
+            let (rest, upper) = ((8usize >> (head >> 6)) - 1, u64::from(head & 0x3f));
+            let length = self.tokens.bytes(rest)?.ok_or_else(cut)?.iter().fold(upper, |n, &b| n << 8 | u64::from(b));
+            let fits = usize::try_from(length).ok().filter(|&n| n <= self.tokens.left());
+            self.tokens.at += fits.ok_or_else(|| self.source.error_byte(at, format!("a text of {length} bytes")))?;
         }
         Ok(())
     }

@@ -4,8 +4,9 @@ use std::ops::Range;
 
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
-use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::source::{Source, printable};
 use super::stored::{Content, Stored};
+use super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
 
 /// Position in the file, and how its numbers are stored.
@@ -31,7 +32,7 @@ impl<'a> Reader<'a> {
     /// Reads `count` numbers; in binary files they start after the end of the line.
     pub(super) fn values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
         if self.binary {
-            self.tokens.line();
+            self.tokens.line()?;
             return self.binary_values(scalar, count, what);
         }
         let room = self.tokens.left() / 2 + 1;
@@ -54,7 +55,7 @@ impl<'a> Reader<'a> {
     /// Reads `count` integers.
     pub(super) fn integers(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Integers<'a>> {
         let Some(scalar) = scalar.filter(|_| self.binary) else { return self.values(scalar, count, what).map(Integers::parsed) };
-        self.tokens.line();
+        self.tokens.line()?;
         let range = self.range(Some(scalar), count, what)?;
         let stored = Stored::new(self.source, what.to_owned(), range.start, Content::File(range), None);
         Ok(Integers::stored(stored, scalar, true))
@@ -73,11 +74,13 @@ impl<'a> Reader<'a> {
     }
 
     fn binary_values<T: Number>(&mut self, scalar: Option<Scalar>, count: usize, what: &str) -> Result<Vec<T>> {
-        let bytes = &self.source.bytes[self.range(scalar, count, what)?];
-        Ok(match scalar {
-            Some(scalar) => scalar.convert(bytes, true),
-            None => (0..count).map(|i| T::from_i64(i64::from(bytes[i / 8] >> (7 - i % 8) & 1))).collect(),
-        })
+        let range = self.range(scalar, count, what)?;
+        let stored = Stored::new(self.source, what.to_owned(), range.start, Content::File(range), None);
+        if let Some(scalar) = scalar {
+            return stored.convert(scalar, true);
+        }
+        let bytes = stored.read(0..stored.len())?;
+        Ok((0..count).map(|i| T::from_i64(i64::from(bytes[i / 8] >> (7 - i % 8) & 1))).collect())
     }
 
     /// Reads a number of values that may or may not follow; if they do, their number is checked then.
@@ -88,8 +91,9 @@ impl<'a> Reader<'a> {
     }
 
     /// Skips a block of metadata, which ends with an empty line.
-    pub(super) fn metadata(&mut self) {
-        self.tokens.line();
-        while self.tokens.line().is_some_and(|(line, _)| !line.trim_ascii().is_empty()) {}
+    pub(super) fn metadata(&mut self) -> Result<()> {
+        self.tokens.line()?;
+        while self.tokens.line()?.is_some_and(|(line, _)| !line.trim_ascii().is_empty()) {}
+        Ok(())
     }
 }

@@ -65,7 +65,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 /// question marks, so that a name in another encoding does no harm.
 fn head(source: &Source) -> Cow<'_, str> {
     const APPENDED: &[u8] = b"<AppendedData";
-    let bytes = &source.bytes;
+    let bytes = source.start();
     let tag = memchr::memmem::find(bytes, APPENDED);
     let end = tag.and_then(|at| bytes[at..].iter().position(|&b| b == b'>').map(|close| at + close + 1)).unwrap_or(bytes.len());
     match std::str::from_utf8(&bytes[..end]) {
@@ -143,7 +143,7 @@ impl Parser<'_, '_> {
             "base64" => true,
             other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", printable(other.as_bytes())))),
         };
-        let bytes = &self.source.bytes[end..];
+        let bytes = &self.source.start()[end..];
         let space = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(bytes.len());
         if bytes.get(space) != Some(&b'_') {
             return Err(self.source.error_byte(end + space, "the appended data must begin with an underscore"));

@@ -12,8 +12,9 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use super::budget::Budget;
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
-use super::source::{Source, Tokens, parse_float, parse_integer, printable};
+use super::source::{Source, printable};
 use super::stored::{Blocks, Content, Stored};
+use super::tokens::{Tokens, parse_float, parse_integer};
 use super::unpack::Compressor;
 use crate::error::{Error, Result};
 
@@ -135,14 +136,14 @@ impl Codec {
 
     fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
         match &array.place {
-            Place::Ascii(parts) | Place::Inline(parts) => Ok(Stream::Base64(parts.iter().map(|r| &source.bytes[r.clone()]).collect())),
+            Place::Ascii(parts) | Place::Inline(parts) => Ok(Stream::Base64(parts.iter().map(|r| &source.start()[r.clone()]).collect())),
             Place::Appended(offset) => {
                 let appended = self.appended.as_ref().ok_or_else(|| place(source, array, "the file has no appended data"))?;
                 let start = usize::try_from(*offset).ok().and_then(|o| appended.range.start.checked_add(o));
                 let start = start.filter(|&s| s < appended.range.end);
                 let start = start.ok_or_else(|| place(source, array, &format!("offset {offset} lies beyond the end of the file")))?;
                 let range = start..appended.range.end;
-                Ok(if appended.base64 { Stream::Base64(vec![&source.bytes[range]]) } else { Stream::Raw(source, range) })
+                Ok(if appended.base64 { Stream::Base64(vec![&source.start()[range]]) } else { Stream::Raw(source, range) })
             }
         }
     }
@@ -234,8 +235,8 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
     }
     let mut values = Vec::with_capacity(count.unwrap_or(0) as usize);
     for part in parts {
-        let mut tokens = Tokens::new(source, part.clone(), None);
-        while let Some((token, at)) = tokens.next_token() {
+        let mut tokens = Tokens::new(source, None).part(part.clone());
+        while let Some((token, at)) = tokens.next_token()? {
             let value = if scalar.is_float() {
                 parse_float(token).map(T::from_f64)
             } else {
