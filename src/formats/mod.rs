@@ -41,6 +41,7 @@ mod vtk_attributes;
 mod vtk_reader;
 mod vtu;
 mod vtu_data;
+mod vtu_outline;
 mod write;
 
 use std::path::Path;

@@ -8,7 +8,6 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 use crate::error::{Error, Result};
-use memchr::memmem;
 
 /// Bytes that are read at a time.
 const CHUNK: usize = 1 << 18;
@@ -38,14 +37,12 @@ struct Rest {
 }
 
 impl Source {
-    /// Opens a file; `kinds` names the readable formats for messages. Of XML, all is read but raw data that are
-    /// appended; of other files, some chunks, in which something follows after comments.
+    /// Opens a file; `kinds` names the readable formats for messages. As many chunks are read as hold what tells its
+    /// format.
     pub fn open(path: &Path, kinds: &str) -> Result<Self> {
         Self::opened(path, kinds, |file, bytes, length| {
-            let mut search = RawData::default();
-            while read_chunk(file, bytes)? > 0 && !search.ends_in(bytes) {
-                bytes.try_reserve_exact(length.saturating_sub(bytes.len()))?;
-            }
+            let tells = |bytes: &[u8]| bytes.len() >= skip_comments(bytes) + TOLD_BY;
+            while Read::take(&mut *file, CHUNK as u64).read_to_end(bytes)? > 0 && !tells(bytes) {}
             if bytes.len() >= length {
                 file.read_to_end(bytes)?; // of a pipe
             }
@@ -93,8 +90,7 @@ impl Source {
         self.rest.as_ref().map_or(self.start.len(), |rest| rest.length)
     }
 
-    /// The start of the contents: all of them if the file was read as a whole; of XML, all but raw data that are
-    /// appended.
+    /// The start of the contents: all of them if the file was read as a whole.
     pub fn start(&self) -> &[u8] {
         &self.start
     }
@@ -160,40 +156,6 @@ impl Source {
             }
         }
         line
-    }
-}
-
-/// Reads the next bytes of a file.
-fn read_chunk(file: &mut File, bytes: &mut Vec<u8>) -> std::io::Result<usize> {
-    Read::take(file, CHUNK as u64).read_to_end(bytes)
-}
-
-/// Search for the place up to which a file that is being read belongs in memory.
-#[derive(Default)]
-struct RawData {
-    /// Bytes searched so far.
-    done: usize,
-    /// Position where the element `AppendedData` starts.
-    tag: Option<usize>,
-}
-
-impl RawData {
-    /// Whether the file is known not to be XML, or raw data have started, that is something follows the start tag of
-    /// their element.
-    fn ends_in(&mut self, bytes: &[u8]) -> bool {
-        const TAG: &[u8] = b"<AppendedData";
-        let text = bytes.strip_prefix(BYTE_ORDER_MARK).unwrap_or(bytes);
-        let content = &text[skip_comments(text)..];
-        if !content.starts_with(b"<") {
-            return content.len() >= TOLD_BY;
-        }
-        let from = self.done.saturating_sub(TAG.len());
-        self.done = bytes.len();
-        self.tag = self.tag.or_else(|| memmem::find(&bytes[from..], TAG).map(|at| from + at));
-        let Some(tag) = self.tag else { return false };
-        let Some(end) = bytes[tag..].iter().position(|&b| b == b'>') else { return false };
-        let is_raw = bytes[tag..tag + end].windows(3).any(|w| w == b"raw");
-        is_raw && !bytes[tag + end + 1..].trim_ascii_start().is_empty()
     }
 }
 

@@ -181,7 +181,26 @@ impl<'a> Tokens<'a> {
         Ok((n == 0 || self.load(n - 1)?).then(|| self.take(n).0))
     }
 
-    /// Moves behind the next occurrence of some bytes; false if there is none.
+    /// Moves to the byte that `find` finds first, or else to the end, and returns it.
+    pub fn skip_until(&mut self, find: impl Fn(&[u8]) -> Option<usize>) -> Result<Option<u8>> {
+        while self.load(0)? {
+            let rest = self.loaded();
+            if let Some(found) = find(rest) {
+                let byte = rest[found];
+                self.at += found;
+                return Ok(Some(byte));
+            }
+            self.at += rest.len();
+        }
+        Ok(None)
+    }
+
+    /// Whether these bytes come next.
+    pub fn starts_with(&mut self, bytes: &[u8]) -> Result<bool> {
+        Ok(self.load(bytes.len() - 1)? && self.loaded().starts_with(bytes))
+    }
+
+    /// Moves behind the next occurrence of some bytes; false, and to the end, if there is none.
     pub fn skip_past(&mut self, sought: &[u8]) -> Result<bool> {
         while self.load(sought.len().saturating_sub(1))? {
             if let Some(found) = memmem::find(self.loaded(), sought) {
@@ -190,6 +209,7 @@ impl<'a> Tokens<'a> {
             }
             self.at += self.loaded().len() + 1 - sought.len();
         }
+        self.at = self.end;
         Ok(false)
     }
 

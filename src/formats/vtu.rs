@@ -1,6 +1,5 @@
 //! Reader for VTK XML unstructured grids (`.vtu`), versions 0.1 to 2.x: the XML structure. `vtu_data` reads the arrays.
 
-use std::borrow::Cow;
 use std::collections::HashMap;
 use std::ops::Range;
 
@@ -15,7 +14,9 @@ use super::cells::{self, CellType};
 use super::report::Fate;
 use super::scalar::Scalar;
 use super::source::{Source, printable};
+use super::tokens::Tokens;
 use super::vtu_data::{Appended, Codec, Place, StoredArray};
+use super::vtu_outline::Outline;
 use crate::error::Result;
 use crate::mesh::On;
 
@@ -40,8 +41,10 @@ struct Skeleton {
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
-    let text = head(source);
-    let skeleton = Parser { source, reader: Reader::from_str(&text), stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
+    let mut outline = Outline::read(source)?;
+    let text = outline.text();
+    let reader = Reader::from_str(&text);
+    let skeleton = Parser { source, outline, reader, stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
     let mut codec = skeleton.codec;
     codec.budget = Budget::new(source.len(), options);
     let mut assembly = Assembly::new(source, options, skeleton.format);
@@ -61,21 +64,9 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     Ok(assembly)
 }
 
-/// The part of the file that is XML, that is up to the appended data. If it is not UTF-8, non-ASCII bytes become
-/// question marks, so that a name in another encoding does no harm.
-fn head(source: &Source) -> Cow<'_, str> {
-    const APPENDED: &[u8] = b"<AppendedData";
-    let bytes = source.start();
-    let tag = memchr::memmem::find(bytes, APPENDED);
-    let end = tag.and_then(|at| bytes[at..].iter().position(|&b| b == b'>').map(|close| at + close + 1)).unwrap_or(bytes.len());
-    match std::str::from_utf8(&bytes[..end]) {
-        Ok(text) => Cow::Borrowed(text),
-        Err(_) => Cow::Owned(bytes[..end].iter().map(|&b| if b.is_ascii() { char::from(b) } else { '?' }).collect()),
-    }
-}
-
 struct Parser<'a, 't> {
     source: &'a Source,
+    outline: Outline,
     reader: Reader<&'t [u8]>,
     stack: Vec<String>,
     codec: Option<(Codec, String)>,
@@ -86,13 +77,14 @@ impl Parser<'_, '_> {
     fn run(mut self) -> Result<Skeleton> {
         let mut appended = None;
         loop {
-            let start = self.reader.buffer_position() as usize;
+            let start = self.outline.in_file(self.reader.buffer_position() as usize);
             let event = self.reader.read_event();
             let end = self.reader.buffer_position() as usize;
             let fail = |message: String| Err(self.source.error_line(start, message));
             match event {
                 Err(error) => {
-                    return Err(self.source.error_line(self.reader.error_position() as usize, format!("not well-formed XML: {error}")));
+                    let at = self.outline.in_file(self.reader.error_position() as usize);
+                    return Err(self.source.error_line(at, format!("not well-formed XML: {error}")));
                 }
                 Ok(Event::Eof) if self.stack.is_empty() => break,
                 Ok(Event::Eof) => return fail(format!("the file ends inside <{}>", self.stack.join("><"))),
@@ -105,10 +97,10 @@ impl Parser<'_, '_> {
                 Ok(Event::GeneralRef(_)) if self.stack.last().is_some_and(|element| element == "DataArray") => {
                     return fail("an entity reference in the data".into());
                 }
-                Ok(Event::Text(_) | Event::CData(_)) => self.text(start..end),
+                Ok(Event::Text(_) | Event::CData(_)) => self.text(start..self.outline.in_file(end)),
                 Ok(Event::Start(e)) => {
                     if e.name().as_ref() == "AppendedData" {
-                        appended = Some((self.attributes(&e, start)?, end));
+                        appended = Some((self.attributes(&e, start)?, self.outline.in_file(end)));
                         break;
                     }
                     if self.stack.len() > 32 {
@@ -116,6 +108,9 @@ impl Parser<'_, '_> {
                     }
                     self.open(&e, start)?;
                     self.stack.push(printable(e.name().as_ref().as_bytes()));
+                    if let Some(range) = self.outline.cut_at(end) {
+                        self.text(range);
+                    }
                 }
                 Ok(Event::Empty(e)) => self.open(&e, start)?,
                 Ok(Event::End(_)) => {
@@ -143,14 +138,17 @@ impl Parser<'_, '_> {
             "base64" => true,
             other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", printable(other.as_bytes())))),
         };
-        let bytes = &self.source.start()[end..];
-        let space = bytes.iter().position(|b| !b.is_ascii_whitespace()).unwrap_or(bytes.len());
-        if bytes.get(space) != Some(&b'_') {
-            return Err(self.source.error_byte(end + space, "the appended data must begin with an underscore"));
+        let mut tokens = Tokens::new(self.source, None);
+        tokens.at = end;
+        tokens.skip_space()?;
+        if !tokens.starts_with(b"_")? {
+            return Err(self.source.error_byte(tokens.at, "the appended data must begin with an underscore"));
         }
-        let start = end + space + 1;
-        let stop = if base64 { bytes[space..].iter().position(|&b| b == b'<').map(|n| end + space + n) } else { None };
-        let stop = stop.unwrap_or(self.source.len());
+        let start = tokens.at + 1;
+        if base64 {
+            tokens.skip_until(|bytes| memchr::memchr(b'<', bytes))?;
+        }
+        let stop = if base64 { tokens.at } else { self.source.len() };
         Ok(Appended { base64, range: start..stop.max(start) })
     }
 

@@ -59,7 +59,7 @@ pub(crate) struct Codec {
 /// The encoded bytes of an array.
 enum Stream<'a> {
     Raw(&'a Source, Range<usize>),
-    Base64(Vec<&'a [u8]>),
+    Base64(&'a Source, Vec<Range<usize>>),
 }
 
 impl Codec {
@@ -136,14 +136,14 @@ impl Codec {
 
     fn stream<'a>(&self, source: &'a Source, array: &StoredArray) -> Result<Stream<'a>> {
         match &array.place {
-            Place::Ascii(parts) | Place::Inline(parts) => Ok(Stream::Base64(parts.iter().map(|r| &source.start()[r.clone()]).collect())),
+            Place::Ascii(parts) | Place::Inline(parts) => Ok(Stream::Base64(source, parts.clone())),
             Place::Appended(offset) => {
                 let appended = self.appended.as_ref().ok_or_else(|| place(source, array, "the file has no appended data"))?;
                 let start = usize::try_from(*offset).ok().and_then(|o| appended.range.start.checked_add(o));
                 let start = start.filter(|&s| s < appended.range.end);
                 let start = start.ok_or_else(|| place(source, array, &format!("offset {offset} lies beyond the end of the file")))?;
                 let range = start..appended.range.end;
-                Ok(if appended.base64 { Stream::Base64(vec![&source.start()[range]]) } else { Stream::Raw(source, range) })
+                Ok(if appended.base64 { Stream::Base64(source, vec![range]) } else { Stream::Raw(source, range) })
             }
         }
     }
@@ -260,7 +260,7 @@ impl<'a> Stream<'a> {
     fn within(&self, n: u64) -> Result<usize, String> {
         let room = match self {
             Stream::Raw(_, range) => range.len(),
-            Stream::Base64(parts) => parts.iter().map(|p| p.len()).sum::<usize>() / 4 * 3 + 3,
+            Stream::Base64(_, parts) => parts.iter().map(Range::len).sum::<usize>() / 4 * 3 + 3,
         };
         let fits = usize::try_from(n).ok().filter(|&n| n <= room);
         fits.ok_or_else(|| format!("it is longer than the {room} bytes that are left of the file"))
@@ -271,7 +271,7 @@ impl<'a> Stream<'a> {
         let n = self.within(n)?;
         match self {
             Stream::Raw(source, range) => source.window(range.start..range.start + n),
-            Stream::Base64(parts) => decode_base64(parts, n).map(Cow::Owned),
+            Stream::Base64(source, parts) => decode_base64(windows(source, parts, n), n).map(Cow::Owned),
         }
     }
 
@@ -280,8 +280,8 @@ impl<'a> Stream<'a> {
         let n = self.within(n)?;
         Ok(match self {
             Stream::Raw(_, range) => Content::File(range.start + header..range.start + n),
-            Stream::Base64(parts) => {
-                let mut bytes = decode_base64(parts, n)?;
+            Stream::Base64(source, parts) => {
+                let mut bytes = decode_base64(windows(source, parts, n), n)?;
                 bytes.drain(..header);
                 Content::Decoded(bytes)
             }
@@ -289,9 +289,22 @@ impl<'a> Stream<'a> {
     }
 }
 
-/// Decodes the first `n` bytes. The header and the data of an array may be encoded separately, with padding between
-/// them.
-fn decode_base64(parts: &[&[u8]], n: usize) -> Result<Vec<u8>, String> {
+/// A part of a file, or why it cannot be read.
+type Window<'a> = Result<Cow<'a, [u8]>, String>;
+
+/// The contents of some ranges of a file, in windows that suit the decoding of `n` bytes.
+fn windows<'a>(source: &'a Source, ranges: &[Range<usize>], n: usize) -> impl Iterator<Item = Window<'a>> {
+    let size = (n / 3 * 4 + 1024).min(1 << 20);
+    let cut = move |range: &Range<usize>| {
+        let end = range.end;
+        range.clone().step_by(size).map(move |begin| begin..end.min(begin + size))
+    };
+    ranges.iter().flat_map(cut).map(|range| source.window(range))
+}
+
+/// Decodes the first `n` bytes of a text in parts. The header and the data of an array may be encoded separately, with
+/// padding between them.
+fn decode_base64<'a>(mut parts: impl Iterator<Item = Window<'a>>, n: usize) -> Result<Vec<u8>, String> {
     const CONFIG: GeneralPurposeConfig =
         GeneralPurposeConfig::new().with_decode_padding_mode(DecodePaddingMode::Indifferent).with_decode_allow_trailing_bits(true);
     const ENGINE: GeneralPurpose = GeneralPurpose::new(&base64::alphabet::STANDARD, CONFIG);
@@ -301,21 +314,23 @@ fn decode_base64(parts: &[&[u8]], n: usize) -> Result<Vec<u8>, String> {
     };
     let mut out = Vec::with_capacity(n + 3);
     let mut group = Vec::with_capacity(4); // that white space has cut
-    for mut run in parts.iter().flat_map(|part| part.split(u8::is_ascii_whitespace)) {
-        while !run.is_empty() && out.len() < n {
-            // Padding ends a group; what follows it is encoded separately.
-            let most = if group.is_empty() { (n - out.len()).div_ceil(3) * 4 } else { 4 - group.len() };
-            let most = most.min(run.len());
-            let padding = run[..most].iter().position(|&b| b == b'=').filter(|_| group.is_empty());
-            let end = padding.map_or(most, |at| (at / 4 + 1) * 4).min(run.len());
-            let whole = if group.is_empty() { end / 4 * 4 } else { 0 };
-            decode(&mut out, &run[..whole])?;
-            group.extend_from_slice(&run[whole..end]);
-            if group.len() == 4 {
-                decode(&mut out, &group)?;
-                group.clear();
+    while let Some(part) = if out.len() < n { parts.next() } else { None } {
+        for mut run in part?.split(u8::is_ascii_whitespace) {
+            while !run.is_empty() && out.len() < n {
+                // Padding ends a group; what follows it is encoded separately.
+                let most = if group.is_empty() { (n - out.len()).div_ceil(3) * 4 } else { 4 - group.len() };
+                let most = most.min(run.len());
+                let padding = run[..most].iter().position(|&b| b == b'=').filter(|_| group.is_empty());
+                let end = padding.map_or(most, |at| (at / 4 + 1) * 4).min(run.len());
+                let whole = if group.is_empty() { end / 4 * 4 } else { 0 };
+                decode(&mut out, &run[..whole])?;
+                group.extend_from_slice(&run[whole..end]);
+                if group.len() == 4 {
+                    decode(&mut out, &group)?;
+                    group.clear();
+                }
+                run = &run[end..];
             }
-            run = &run[end..];
         }
     }
     decode(&mut out, &group)?;
@@ -340,14 +355,16 @@ mod tests {
             for width in 1..12 {
                 for parts in [1, 3, 20] {
                     let lines: Vec<u8> = text.as_bytes().chunks(width).flat_map(|line| [line, b"\r\n "].concat()).collect();
-                    let parts: Vec<&[u8]> = lines.chunks(lines.len().div_ceil(parts)).collect();
+                    let part = lines.len().div_ceil(parts);
+                    let decode = |n| decode_base64(lines.chunks(part).map(|part| Ok(part.into())), n);
                     for n in [0, 1, first, first + 1, 59, 60] {
-                        assert_eq!(decode_base64(&parts, n).as_deref(), Ok(&data[..n]), "{first} {width} {n}");
+                        assert_eq!(decode(n).as_deref(), Ok(&data[..n]), "{first} {width} {n}");
                     }
-                    assert!(decode_base64(&parts, 61).unwrap_err().starts_with("its base64 data end after 60 of 61 bytes"));
+                    assert!(decode(61).unwrap_err().starts_with("its base64 data end after 60 of 61 bytes"));
                 }
             }
         }
-        assert!(decode_base64(&[b"AAAA", b"A*AA"], 6).unwrap_err().starts_with("bad base64 after 3 bytes"));
+        let parts = [&b"AAAA"[..], b"A*AA"].into_iter().map(|part| Ok(part.into()));
+        assert!(decode_base64(parts, 6).unwrap_err().starts_with("bad base64 after 3 bytes"));
     }
 }

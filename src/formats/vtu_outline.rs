@@ -1,0 +1,136 @@
+//! The XML of a VTK file without the contents of its arrays, which stay on disk.
+
+use std::ops::Range;
+
+use super::source::Source;
+use super::tokens::Tokens;
+use crate::error::Result;
+use memchr::{memchr, memchr2, memchr3};
+
+/// What an XML file has up to its appended data, without the text of arrays.
+#[derive(Default)]
+pub(crate) struct Outline {
+    bytes: Vec<u8>,
+    cuts: Vec<Cut>,
+}
+
+/// Text that was left out.
+struct Cut {
+    /// Where it would be in the outline.
+    at: usize,
+    /// Where it is in the file.
+    range: Range<usize>,
+}
+
+/// A tag, comment or the like.
+enum Tag {
+    /// The start of an array with contents.
+    Array,
+    /// The start of the appended data.
+    Appended,
+    Other,
+}
+
+impl Outline {
+    pub fn read(source: &Source) -> Result<Self> {
+        let (mut outline, mut tokens, mut begin) = (Self::default(), Tokens::new(source, None), 0);
+        while let Some(tag) = next_tag(source, &mut tokens)? {
+            match tag {
+                Tag::Array => {
+                    let at = tokens.at;
+                    // A reference in the data is kept, for the parser to refuse.
+                    if tokens.skip_until(|bytes| memchr2(b'<', b'&', bytes))? == Some(b'<') {
+                        outline.keep(source, begin..at)?;
+                        outline.cuts.push(Cut { at: outline.bytes.len(), range: at..tokens.at });
+                        begin = tokens.at;
+                    }
+                }
+                Tag::Appended => break,
+                Tag::Other => {}
+            }
+        }
+        outline.keep(source, begin..tokens.at)?;
+        Ok(outline)
+    }
+
+    fn keep(&mut self, source: &Source, range: Range<usize>) -> Result<()> {
+        let begin = range.start;
+        self.bytes.extend_from_slice(&source.window(range).map_err(|why| source.error_byte(begin, why))?);
+        Ok(())
+    }
+
+    /// The XML. If it is not UTF-8, non-ASCII bytes become question marks, so that a name in another encoding does no
+    /// harm.
+    pub fn text(&mut self) -> String {
+        String::from_utf8(std::mem::take(&mut self.bytes)).unwrap_or_else(|error| {
+            let question = |&b: &u8| if b.is_ascii() { char::from(b) } else { '?' };
+            error.as_bytes().iter().map(question).collect()
+        })
+    }
+
+    /// Position in the file of byte `at` of the text.
+    pub fn in_file(&self, at: usize) -> usize {
+        let before = self.cuts[..self.cuts.partition_point(|cut| cut.at <= at)].last();
+        before.map_or(at, |cut| cut.range.end + (at - cut.at))
+    }
+
+    /// Where in the file the text is that was left out before byte `at` of the text.
+    pub fn cut_at(&self, at: usize) -> Option<Range<usize>> {
+        self.cuts.binary_search_by_key(&at, |cut| cut.at).ok().map(|found| self.cuts[found].range.clone())
+    }
+}
+
+/// Moves behind the next tag, comment or the like; `None` at the end of the file. Whether the XML is well-formed is not
+/// checked here.
+fn next_tag(source: &Source, tokens: &mut Tokens<'_>) -> Result<Option<Tag>> {
+    if tokens.skip_until(|bytes| memchr(b'<', bytes))?.is_none() {
+        return Ok(None);
+    }
+    for (begin, end) in [(&b"<!--"[..], &b"-->"[..]), (b"<![CDATA[", b"]]>"), (b"<?", b"?>")] {
+        if tokens.starts_with(begin)? {
+            tokens.at += begin.len();
+            return Ok(tokens.skip_past(end)?.then_some(Tag::Other));
+        }
+    }
+    let (is_array, is_appended) = (tokens.starts_with(b"<DataArray")?, tokens.starts_with(b"<AppendedData")?);
+    // A > in quotation marks does not end a tag.
+    while let Some(stop) = tokens.skip_until(|bytes| memchr3(b'>', b'"', b'\'', bytes))? {
+        tokens.at += 1;
+        if stop == b'>' {
+            let is_empty = source.window(tokens.at - 2..tokens.at).is_ok_and(|end| *end == *b"/>");
+            return Ok(Some(match (is_array && !is_empty, is_appended) {
+                (true, _) => Tag::Array,
+                (_, true) => Tag::Appended,
+                _ => Tag::Other,
+            }));
+        }
+        if tokens.skip_until(|bytes| memchr(stop, bytes))?.is_none() {
+            break;
+        }
+        tokens.at += 1;
+    }
+    Ok(None)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_the_text_of_arrays_is_left_out() {
+        let xml = "<?xml it's?><!-- <DataArray> --><V a='>'><DataArray b=\"/>\">1 2\n</DataArray><DataArray/> x <DataArray>&lt;</DataArray>\
+                   <![CDATA[<DataArray>]]><DataArray><!-- 4 --> 5</DataArray><AppendedData c='d'>_<DataArray>6";
+        let source = Source::new("none".as_ref(), xml.as_bytes().to_vec());
+        let mut outline = Outline::read(&source).unwrap();
+        let text = outline.text();
+        assert_eq!(text, xml.replace("1 2\n", "").replace("_<DataArray>6", ""));
+        let first = text.find("</DataArray>").unwrap();
+        assert_eq!(outline.cut_at(first), Some(first..first + 4));
+        assert_eq!([first - 1, first, first + 9].map(|at| outline.in_file(at)), [first - 1, first + 4, first + 13]);
+        assert_eq!(outline.in_file(text.len()), xml.find("_<").unwrap());
+        for broken in ["", "no XML", "<V", "<V a='", "<!-- ", "<DataArray>1 2", "<V\"<AppendedData>"] {
+            let source = Source::new("none".as_ref(), broken.as_bytes().to_vec());
+            assert_eq!(Outline::read(&source).unwrap().text(), broken);
+        }
+    }
+}
