@@ -117,12 +117,14 @@ pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
     let root = entries[0];
     Error::TooLarge(match (options.capacity, options.budget) {
         (Some(capacity), _) if root > u64::from(capacity) => {
-            format!("a tree of a single node has {root} entries, the capacity is {capacity}")
+            format!("a tree of a single node has {root} entries, the capacity is {capacity}; raise it to that at least")
         }
         (_, Some(budget)) => {
             let bytes = TreeBytes::most(entries, 0, options.boxes).total();
-            format!("a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes")
+            format!(
+                "a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes; raise it to that at least"
+            )
         }
-        _ => format!("a tree of a single node has {root} entries, more than there is room for"),
+        _ => format!("a tree of a single node has {root} entries, more than there is room for; take the mesh in blocks"),
     })
 }

@@ -228,7 +228,8 @@ impl Walker<'_> {
                 walked.best = Best::inside(t);
                 return true;
             }
-            if if arrived { weights.inside } else { weights.near() } {
+            let is_there = if arrived { weights.inside } else { weights.near() };
+            if is_there {
                 self.arrive(t, x, &mut walked.best);
                 if walked.best.inside {
                     break;
