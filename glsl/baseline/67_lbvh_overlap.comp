@@ -84,9 +84,6 @@ void main() {
         if (done) places.at[t] = NONE;
     }
     unfinished = subgroupAdd(unfinished);
-    narrow = subgroupAdd(narrow);
-    if (subgroupElect()) {
-        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
-        if (narrow > 0u && atomicAdd(status.at[0].narrow[0], narrow) > NONE - narrow) atomicAdd(status.at[0].narrow[1], 1u);
-    }
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
+    ADD_TO_COUNTER(status.at[0].narrow, narrow)
 }

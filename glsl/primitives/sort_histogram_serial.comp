@@ -3,15 +3,16 @@
 // that run a workgroup as loops over wide vectors. Neighbouring invocations own neighbouring columns of the table.
 #include "shared/kernel.glsl"
 #include "shared/sort.glsl"
-ARGUMENTS(3)
+layout(constant_id = 3) const uint FROM_PAIRS = 0; // as sort_scatter_serial
+ARGUMENTS(4)
     uint count;
     uint shift;
     uint mask; // of the digit: the last pass may have fewer bits
-    uint spacing; // words from one key to the next
 END_ARGUMENTS
 BUFFER(0, readonly, uint, live)
 BUFFER(1, readonly, uint, keys)
-BUFFER(2, READ_WRITE, uint, counts)
+BUFFER8(2, readonly, PAIR, pairs)
+BUFFER(3, READ_WRITE, uint, counts)
 
 void main() {
     uint n = min(count, live.at[0]);
@@ -24,7 +25,8 @@ void main() {
     uint first = tile * ROWS;
     uint end = min(n, first + ROWS);
     for (uint i = first; i < end; ++i) {
-        uint d = keys.at[i * spacing] >> shift & mask;
+        uint key = FROM_PAIRS != 0u ? words(pairs.at[i]).x : keys.at[i];
+        uint d = key >> shift & mask;
         counts.at[d * stride + tile] += 1u;
     }
 }

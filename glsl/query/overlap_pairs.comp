@@ -112,12 +112,12 @@ void main() {
         unfinished = uint(!done);
     }
     unfinished = subgroupAdd(unfinished);
-    narrow = subgroupAdd(narrow);
-    pairs = subgroupAdd(pairs);
     if (subgroupElect()) {
         if (FILL == 0u && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
         if (FILL != 0u && unfinished > 0u) atomicAdd(status.at[0].unfilled, unfinished);
-        if (FILL == 0u && narrow > 0u && atomicAdd(status.at[0].narrow[0], narrow) > NONE - narrow) atomicAdd(status.at[0].narrow[1], 1u);
-        if (FILL == 0u && pairs > 0u && atomicAdd(status.at[0].pairs[0], pairs) > NONE - pairs) atomicAdd(status.at[0].pairs[1], 1u);
+    }
+    if (FILL == 0u) {
+        ADD_TO_COUNTER(status.at[0].narrow, narrow)
+        ADD_TO_COUNTER(status.at[0].pairs, pairs)
     }
 }

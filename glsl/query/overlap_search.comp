@@ -63,10 +63,6 @@ bool enters(Node node) {
 #include "shared/quarters.glsl"
 #include "shared/leaf_walk.glsl"
 
-void add_wide(uint n, bool elected) {
-    if (elected && n > 0u && atomicAdd(status.at[0].narrow[0], n) > NONE - n) atomicAdd(status.at[0].narrow[1], 1u);
-}
-
 void main() {
     uint i = item_index();
     uint unfinished = 0u, narrow = 0u, by_node = 0u;
@@ -131,11 +127,10 @@ void main() {
         unfinished = uint(!done);
     }
     unfinished = subgroupAdd(unfinished);
-    narrow = subgroupAdd(narrow);
     by_node = subgroupAdd(by_node);
     if (subgroupElect()) {
         if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
         if (by_node > 0u) atomicAdd(status.at[0].by_node, by_node);
-        add_wide(narrow, true);
     }
+    ADD_TO_COUNTER(status.at[0].narrow, narrow)
 }

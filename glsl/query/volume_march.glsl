@@ -317,14 +317,9 @@ void main() {
         states.at[i] = state;
         colors.at[place] = sum;
     }
-    samples = subgroupAdd(samples);
-    found = subgroupAdd(found);
-    skipped = subgroupAdd(skipped);
+    ADD_TO_COUNTER(status.at[0].samples, samples)
+    ADD_TO_COUNTER(status.at[0].found, found)
+    ADD_TO_COUNTER(status.at[0].skipped, skipped)
     unfinished = subgroupAdd(unfinished);
-    if (subgroupElect()) {
-        if (samples > 0u && atomicAdd(status.at[0].samples[0], samples) > NONE - samples) atomicAdd(status.at[0].samples[1], 1u);
-        if (found > 0u && atomicAdd(status.at[0].found[0], found) > NONE - found) atomicAdd(status.at[0].found[1], 1u);
-        if (skipped > 0u && atomicAdd(status.at[0].skipped[0], skipped) > NONE - skipped) atomicAdd(status.at[0].skipped[1], 1u);
-        if (unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
-    }
+    if (subgroupElect() && unfinished > 0u) atomicAdd(status.at[0].unfinished, unfinished);
 }

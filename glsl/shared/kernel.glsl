@@ -63,4 +63,12 @@ uvec2 items_of_share(uint share, uint count) {
 
 // The item of this invocation, where each takes one.
 uint item_index() { return group_index() * WORKGROUP + local_index(); }
+
+// Adds `n` of every invocation of the subgroup to a counter of 64 bits: two words, the low one first. For the end of
+// main, where the subgroup is together.
+#define ADD_TO_COUNTER(counter, n)                                                                                               \
+    {                                                                                                                            \
+        uint more = subgroupAdd(n);                                                                                              \
+        if (subgroupElect() && more > 0u && atomicAdd(counter[0], more) > ~more) atomicAdd(counter[1], 1u);                      \
+    }
 #endif

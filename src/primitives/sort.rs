@@ -137,10 +137,9 @@ impl PairSort<'_> {
         for pass in 0..passes {
             let (shift, mask) = self.digit(pass);
             let from_pairs = pass % 2;
-            let (keys_at, spacing) = if from_pairs == 0 { (keys, 1) } else { (pairs, 2) };
             r.barrier("keys → sort.histogram");
-            let histogram = SortHistogramSerial { live, keys: keys_at, counts: places, count, shift, mask, spacing };
-            r.dispatch(&histogram, SortHistogramSerialSpec { workgroup, rows, digit_bits }, groups)?;
+            let histogram = SortHistogramSerial { live, keys, pairs, counts: places, count, shift, mask };
+            r.dispatch(&histogram, SortHistogramSerialSpec { workgroup, rows, digit_bits, from_pairs }, groups)?;
             self.cmd_scan(r)?;
             let scatter = SortScatterSerial { live, keys, values, pairs, places, count, shift, mask };
             r.dispatch(&scatter, SortScatterSerialSpec { workgroup, rows, digit_bits, from_pairs }, groups)?;
