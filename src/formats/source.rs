@@ -112,8 +112,9 @@ impl Source {
         let Some(rest) = self.rest.as_ref().filter(|_| range.end > self.start.len()) else {
             return self.start.get(range).map(Cow::Borrowed).ok_or_else(|| "it lies beyond the end of the file".into());
         };
-        let mut file = &rest.file;
-        let mut bytes = vec![0; range.len()];
+        let (mut file, mut bytes) = (&rest.file, Vec::new());
+        bytes.try_reserve_exact(range.len()).map_err(|error| error.to_string())?;
+        bytes.resize(range.len(), 0);
         let read = file.seek(SeekFrom::Start((range.start + rest.mark) as u64)).and_then(|_| file.read_exact(&mut bytes));
         read.map_err(|error| format!("the file cannot be read further: {error}"))?;
         Ok(Cow::Owned(bytes))

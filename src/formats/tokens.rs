@@ -50,10 +50,6 @@ impl<'a> Tokens<'a> {
         Ok(true)
     }
 
-    fn until_line_end(&mut self) -> Result<usize> {
-        self.until(|rest| memchr2(b'\n', b'\r', rest))
-    }
-
     /// The number of bytes before those that `find` finds, or before the end.
     fn until(&mut self, find: impl Fn(&[u8]) -> Option<usize>) -> Result<usize> {
         let mut length = 0;
@@ -80,11 +76,11 @@ impl<'a> Tokens<'a> {
     /// Skips white space and comments.
     pub fn skip_space(&mut self) -> Result<()> {
         loop {
-            self.at += self.until(|rest| rest.iter().position(|&b| !is_space(b)))?;
-            if self.comment.is_none() || self.loaded().first().copied() != self.comment {
+            let next = self.skip_until(|rest| rest.iter().position(|&b| !is_space(b)))?;
+            if next.is_none() || next != self.comment {
                 return Ok(());
             }
-            self.at += self.until_line_end()?;
+            self.skip_until(line_end)?;
         }
     }
 
@@ -157,17 +153,17 @@ impl<'a> Tokens<'a> {
         if self.at >= self.end {
             return Ok(None);
         }
-        let length = self.until_line_end()?;
+        let length = self.until(line_end)?;
         self.load(length + 1)?;
-        let line_end = &self.loaded()[length..];
-        let feed = if line_end.starts_with(b"\r\n") { 2 } else { usize::from(!line_end.is_empty()) };
+        let rest = &self.loaded()[length..];
+        let feed = if rest.starts_with(b"\r\n") { 2 } else { usize::from(!rest.is_empty()) };
         let (line, at) = self.take(length + feed);
         Ok(Some((&line[..length], at)))
     }
 
     /// Limits the cursor to the rest of the line. Returns what [`Self::widen`] takes to undo that.
     pub fn narrow(&mut self) -> Result<usize> {
-        let line_end = self.at + self.until_line_end()?;
+        let line_end = self.at + self.until(line_end)?;
         Ok(std::mem::replace(&mut self.end, line_end))
     }
 
@@ -233,6 +229,10 @@ pub(crate) fn words(line: &[u8], comment: Option<u8>) -> impl Iterator<Item = Ra
         at = line[begin..].iter().position(stops).map_or(line.len(), |n| begin + n);
         (at > begin).then_some(begin..at)
     })
+}
+
+fn line_end(bytes: &[u8]) -> Option<usize> {
+    memchr2(b'\n', b'\r', bytes)
 }
 
 fn is_space(b: u8) -> bool {
