@@ -138,9 +138,20 @@ Place place_beside(Place p, float steps, float rise) {
     return place_at(at, value);
 }
 
+// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
+// weights are `here`, to one whose weights are `there`.
+float way_within(vec4 here, vec4 there) {
+    float least = 1.0;
+    for (uint f = 0u; f < 4u; ++f) {
+        float part = there[f] < 0.0 ? way_before(here[f], there[f]) : 1.0;
+        if (part < least) least = part;
+    }
+    return least;
+}
+
 // The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther than to
-// the samples beside k: where it begins and ends, and the values there. If the sample before has a value, that stretch
-// begins at the sample, for the sample before has one that ends where this tetrahedron begins.
+// the samples beside k: where it begins and ends, and the values there. If it joins the stretch of the sample before, it
+// begins at the sample: two such stretches usually meet at a face, so the value is linear between them.
 void find_ends(uint k, Sides here, float value, bool joins, out Place from, out Place to) {
     precise float at = float(k) + 0.5;
     from = to = place_at(at, value);

@@ -103,18 +103,13 @@ bool step_on(inout Stand s, Sides at) {
     return step_on(s, at, e);
 }
 
-// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
-// weights are `here`, to one whose weights are `there`.
-float way_within(vec4 here, vec4 there) {
-    float least = 1.0;
-    for (uint f = 0u; f < 4u; ++f) {
-        if (!(there[f] < 0.0)) continue;
-        float from = max(here[f], 0.0);
-        precise float length = from - there[f];
-        precise float part = from * reciprocal(length);
-        if (part < least) least = part;
-    }
-    return least;
+// The part of a straight way that lies before a face, whose weight is `here` at the start and `there`, below 0, at the
+// end.
+float way_before(float here, float there) {
+    float from = max(here, 0.0);
+    precise float length = from - there;
+    precise float part = from * reciprocal(length);
+    return part;
 }
 
 // The owner of x, where x is near one face of the stand and far from all other faces of the two tetrahedra that share

@@ -83,9 +83,7 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
         uint next = NONE;
         for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
-            float here = max(before[f], 0.0);
-            precise float length = here - behind[f];
-            precise float at = here * reciprocal(length);
+            float at = way_before(before[f], behind[f]);
             if (at < first) {
                 first = at;
                 next = beside[f];

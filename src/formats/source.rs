@@ -42,7 +42,8 @@ impl Source {
     pub fn open(path: &Path, kinds: &str) -> Result<Self> {
         Self::opened(path, kinds, |file, bytes, length| {
             let tells = |bytes: &[u8]| bytes.len() >= skip_comments(bytes) + TOLD_BY;
-            while Read::take(&mut *file, CHUNK as u64).read_to_end(bytes)? > 0 && !tells(bytes) {}
+            // Twice as much each time, as comments are then searched from the start again.
+            while Read::take(&mut *file, bytes.len().max(CHUNK) as u64).read_to_end(bytes)? > 0 && !tells(bytes) {}
             if bytes.len() >= length {
                 file.read_to_end(bytes)?; // of a pipe
             }

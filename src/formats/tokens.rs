@@ -27,9 +27,9 @@ impl<'a> Tokens<'a> {
         Self { source, at: 0, end: source.len(), comment, chunk: Arc::default(), chunk_at: 0 }
     }
 
-    /// A cursor in a part of what this one reads.
-    pub fn part(&self, range: Range<usize>) -> Self {
-        Self { at: range.start, end: range.end.min(self.end), ..self.clone() }
+    /// The cursor, limited to a part of the file.
+    pub fn within(self, range: Range<usize>) -> Self {
+        Self { at: range.start, end: range.end.min(self.end), ..self }
     }
 
     /// The unread bytes of the chunk.

@@ -41,10 +41,9 @@ struct Skeleton {
 }
 
 pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
-    let mut outline = Outline::read(source)?;
-    let text = outline.text();
-    let reader = Reader::from_str(&text);
-    let skeleton = Parser { source, outline, reader, stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
+    let outline = Outline::read(source)?;
+    let reader = Reader::from_str(&outline.text);
+    let skeleton = Parser { source, outline: &outline, reader, stack: Vec::new(), codec: None, pieces: Vec::new() }.run()?;
     let mut codec = skeleton.codec;
     codec.budget = Budget::new(source.len(), options);
     let mut assembly = Assembly::new(source, options, skeleton.format);
@@ -66,7 +65,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 
 struct Parser<'a, 't> {
     source: &'a Source,
-    outline: Outline,
+    outline: &'t Outline,
     reader: Reader<&'t [u8]>,
     stack: Vec<String>,
     codec: Option<(Codec, String)>,
@@ -145,11 +144,12 @@ impl Parser<'_, '_> {
             return Err(self.source.error_byte(tokens.at, "the appended data must begin with an underscore"));
         }
         let start = tokens.at + 1;
+        let mut stop = self.source.len();
         if base64 {
             tokens.skip_until(|bytes| memchr::memchr(b'<', bytes))?;
+            stop = tokens.at;
         }
-        let stop = if base64 { tokens.at } else { self.source.len() };
-        Ok(Appended { base64, range: start..stop.max(start) })
+        Ok(Appended { base64, range: start..stop })
     }
 
     fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {

@@ -235,7 +235,7 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
     }
     let mut values = Vec::with_capacity(count.unwrap_or(0) as usize);
     for part in parts {
-        let mut tokens = Tokens::new(source, None).part(part.clone());
+        let mut tokens = Tokens::new(source, None).within(part.clone());
         while let Some((token, at)) = tokens.next_token()? {
             let value = if scalar.is_float() {
                 parse_float(token).map(T::from_f64)

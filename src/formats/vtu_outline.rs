@@ -8,9 +8,9 @@ use crate::error::Result;
 use memchr::{memchr, memchr2, memchr3};
 
 /// What an XML file has up to its appended data, without the text of arrays.
-#[derive(Default)]
 pub(crate) struct Outline {
-    bytes: Vec<u8>,
+    /// The XML. If it is not UTF-8, non-ASCII bytes are question marks, so that a name in another encoding does no harm.
+    pub text: String,
     cuts: Vec<Cut>,
 }
 
@@ -33,15 +33,21 @@ enum Tag {
 
 impl Outline {
     pub fn read(source: &Source) -> Result<Self> {
-        let (mut outline, mut tokens, mut begin) = (Self::default(), Tokens::new(source, None), 0);
+        let (mut bytes, mut cuts) = (Vec::new(), Vec::new());
+        let (mut tokens, mut begin) = (Tokens::new(source, None), 0);
+        let keep = |bytes: &mut Vec<u8>, range: Range<usize>| {
+            let begin = range.start;
+            bytes.extend_from_slice(&source.window(range).map_err(|why| source.error_byte(begin, why))?);
+            Ok(())
+        };
         while let Some(tag) = next_tag(source, &mut tokens)? {
             match tag {
                 Tag::Array => {
                     let at = tokens.at;
                     // A reference in the data is kept, for the parser to refuse.
                     if tokens.skip_until(|bytes| memchr2(b'<', b'&', bytes))? == Some(b'<') {
-                        outline.keep(source, begin..at)?;
-                        outline.cuts.push(Cut { at: outline.bytes.len(), range: at..tokens.at });
+                        keep(&mut bytes, begin..at)?;
+                        cuts.push(Cut { at: bytes.len(), range: at..tokens.at });
                         begin = tokens.at;
                     }
                 }
@@ -49,23 +55,10 @@ impl Outline {
                 Tag::Other => {}
             }
         }
-        outline.keep(source, begin..tokens.at)?;
-        Ok(outline)
-    }
-
-    fn keep(&mut self, source: &Source, range: Range<usize>) -> Result<()> {
-        let begin = range.start;
-        self.bytes.extend_from_slice(&source.window(range).map_err(|why| source.error_byte(begin, why))?);
-        Ok(())
-    }
-
-    /// The XML. If it is not UTF-8, non-ASCII bytes become question marks, so that a name in another encoding does no
-    /// harm.
-    pub fn text(&mut self) -> String {
-        String::from_utf8(std::mem::take(&mut self.bytes)).unwrap_or_else(|error| {
-            let question = |&b: &u8| if b.is_ascii() { char::from(b) } else { '?' };
-            error.as_bytes().iter().map(question).collect()
-        })
+        keep(&mut bytes, begin..tokens.at)?;
+        let ascii = |&b: &u8| if b.is_ascii() { char::from(b) } else { '?' };
+        let text = String::from_utf8(bytes).unwrap_or_else(|error| error.as_bytes().iter().map(ascii).collect());
+        Ok(Self { text, cuts })
     }
 
     /// Position in the file of byte `at` of the text.
@@ -74,7 +67,7 @@ impl Outline {
         before.map_or(at, |cut| cut.range.end + (at - cut.at))
     }
 
-    /// Where in the file the text is that was left out before byte `at` of the text.
+    /// Where in the file the contents are that were left out before byte `at` of the text; `None` if none were.
     pub fn cut_at(&self, at: usize) -> Option<Range<usize>> {
         self.cuts.binary_search_by_key(&at, |cut| cut.at).ok().map(|found| self.cuts[found].range.clone())
     }
@@ -121,16 +114,16 @@ mod tests {
         let xml = "<?xml it's?><!-- <DataArray> --><V a='>'><DataArray b=\"/>\">1 2\n</DataArray><DataArray/> x <DataArray>&lt;</DataArray>\
                    <![CDATA[<DataArray>]]><DataArray><!-- 4 --> 5</DataArray><AppendedData c='d'>_<DataArray>6";
         let source = Source::new("none".as_ref(), xml.as_bytes().to_vec());
-        let mut outline = Outline::read(&source).unwrap();
-        let text = outline.text();
-        assert_eq!(text, xml.replace("1 2\n", "").replace("_<DataArray>6", ""));
+        let outline = Outline::read(&source).unwrap();
+        let text = &outline.text;
+        assert_eq!(*text, xml.replace("1 2\n", "").replace("_<DataArray>6", ""));
         let first = text.find("</DataArray>").unwrap();
         assert_eq!(outline.cut_at(first), Some(first..first + 4));
         assert_eq!([first - 1, first, first + 9].map(|at| outline.in_file(at)), [first - 1, first + 4, first + 13]);
         assert_eq!(outline.in_file(text.len()), xml.find("_<").unwrap());
         for broken in ["", "no XML", "<V", "<V a='", "<!-- ", "<DataArray>1 2", "<V\"<AppendedData>"] {
             let source = Source::new("none".as_ref(), broken.as_bytes().to_vec());
-            assert_eq!(Outline::read(&source).unwrap().text(), broken);
+            assert_eq!(Outline::read(&source).unwrap().text, broken);
         }
     }
 }

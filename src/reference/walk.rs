@@ -101,14 +101,11 @@ pub fn outermost(own: [f32; 4]) -> usize {
     (1..4).fold(0, |face, f| if own[f] < own[face] { f } else { face })
 }
 
-/// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
-/// weights are `here`, to one whose weights are `there`.
-pub fn way_within(here: [f32; 4], there: [f32; 4]) -> f32 {
-    (0..4).filter(|&f| there[f] < 0.0).fold(1.0, |least, f| {
-        let from = here[f].max(0.0);
-        let part = from * reciprocal(from - there[f]);
-        if part < least { part } else { least }
-    })
+/// The part of a straight way that lies before a face, whose weight is `here` at the start and `there`, below 0, at the
+/// end.
+pub fn way_before(here: f32, there: f32) -> f32 {
+    let from = here.max(0.0);
+    from * reciprocal(from - there)
 }
 
 /// Walks through one mesh.
@@ -258,10 +255,8 @@ impl Walker<'_> {
             let at_a = tet.weights(a);
             let (mut first, mut next) = (f32::MAX, NONE);
             for (&rank, &u) in tet.rank.iter().zip(&self.neighbours[t as usize]) {
-                let (before, behind) = (at_a.w[rank].max(0.0), at_b.w[rank]);
-                if behind < 0.0 && u != from {
-                    // Where the segment meets the face, from 0 at a to 1 at b.
-                    let at = before * reciprocal(before - behind);
+                if at_b.w[rank] < 0.0 && u != from {
+                    let at = way_before(at_a.w[rank], at_b.w[rank]);
                     if at < first {
                         (first, next) = (at, u);
                     }

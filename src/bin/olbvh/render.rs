@@ -50,7 +50,7 @@ pub struct Args {
     size: [u32; 2],
     /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
     /// bounds, or less where the mesh or its layers are thinner than that, down to 1/8192. An iso-surface may have
-    /// gaps where cells are thinner than a step.
+    /// gaps where the mesh or its cells are thinner than a step.
     #[arg(long, allow_negative_numbers = true)]
     step: Option<f64>,
     /// View and settings, separated by commas, for example `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (angles in

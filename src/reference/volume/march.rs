@@ -4,7 +4,7 @@ use super::Scene;
 use super::skip::{Skips, inverse_of};
 use crate::grid::{canonical, reciprocal};
 use crate::reference::tet::Sides;
-use crate::reference::walk::{Stand, way_within, weighed};
+use crate::reference::walk::{Stand, way_before, weighed};
 use crate::render::{Lighting, Plan};
 
 /// Most tetrahedra of a walk across faces before the tree is searched.
@@ -121,8 +121,9 @@ impl<'a> Marcher<'a> {
     }
 
     /// The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther
-    /// than to the samples beside k: where it begins and ends, and the values there. If the sample before has a value,
-    /// that stretch begins at the sample, for the sample before has one that ends where this tetrahedron begins.
+    /// than to the samples beside k: where it begins and ends, and the values there. If it joins the stretch of the
+    /// sample before, it begins at the sample: two such stretches usually meet at a face, so the value is linear
+    /// between them.
     fn ends(&self, ray: ([f32; 3], [f32; 3]), k: u32, stand: &Stand, here: &Sides, value: f32, joins: bool) -> [Place; 2] {
         let at = k as f32 + 0.5;
         let next = stand.sides(self.scene.tree.grid.normalise(self.plan.sample(ray, k + 1)));
@@ -174,4 +175,13 @@ impl<'a> Marcher<'a> {
         self.cell = found.map(|(stand, _)| stand.t);
         found
     }
+}
+
+/// How far a straight way stays in a tetrahedron: the part of it, at most 1, from a point in the tetrahedron, whose
+/// weights are `here`, to one whose weights are `there`.
+fn way_within(here: [f32; 4], there: [f32; 4]) -> f32 {
+    (0..4).filter(|&f| there[f] < 0.0).fold(1.0, |least, f| {
+        let part = way_before(here[f], there[f]);
+        if part < least { part } else { least }
+    })
 }
