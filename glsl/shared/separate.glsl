@@ -42,16 +42,21 @@ bool box_touches(vec3 v[4], vec3 h[3], vec3 slack) {
     return true;
 }
 
+// Ends of the interval of four vertices on an axis; the first vertex is at 0.
+float low_end(vec3 others) { return min(min(0.0, others.x), min(others.y, others.z)); }
+float high_end(vec3 others) { return max(max(0.0, others.x), max(others.y, others.z)); }
+
 // Whether a face normal of a separates it from b.
 bool face_separates(vec3 a[4], vec3 b[4]) {
     for (uint i = 0u; i < 4u; ++i) {
         uvec3 face = FACES[i];
         vec3 at = a[face.x];
-        vec3 normal = cross_product(difference(a[face.y], at), difference(a[face.z], at));
-        float own = dot_product(normal, difference(a[i], at));
+        vec3 y_side = difference(a[face.y], at), z_side = difference(a[face.z], at);
+        vec3 normal = cross_product(y_side, z_side);
+        vec3 own = vec3(dot_product(normal, difference(a[i], at)), dot_product(normal, y_side), dot_product(normal, z_side));
         float w = dot_product(normal, difference(b[0], at)), x = dot_product(normal, difference(b[1], at));
         float y = dot_product(normal, difference(b[2], at)), z = dot_product(normal, difference(b[3], at));
-        if (min(min(w, x), min(y, z)) > max(own, 0.0) || max(max(w, x), max(y, z)) < min(own, 0.0)) return true;
+        if (min(min(w, x), min(y, z)) > high_end(own) || max(max(w, x), max(y, z)) < low_end(own)) return true;
     }
     return false;
 }
@@ -74,11 +79,12 @@ bool tets_touch(vec3 a[4], vec3 b[4]) {
         for (uint f = 0u; f < 6u; ++f) {
             uvec4 eb = EDGES[f];
             vec3 pb = b[eb.x];
-            vec3 axis = cross_product(along, difference(b[eb.y], pb));
-            float tm = dot_product(axis, am), tn = dot_product(axis, an);
-            float uk = dot_product(axis, difference(b[eb.z], pb)), ul = dot_product(axis, difference(b[eb.w], pb));
-            precise float above = max(max(tm, tn), 0.0) - min(min(uk, ul), 0.0);
-            precise float below = min(min(tm, tn), 0.0) - max(max(uk, ul), 0.0);
+            vec3 along_b = difference(b[eb.y], pb);
+            vec3 axis = cross_product(along, along_b);
+            vec3 t = vec3(dot_product(axis, along), dot_product(axis, am), dot_product(axis, an));
+            vec3 u = vec3(dot_product(axis, along_b), dot_product(axis, difference(b[eb.z], pb)), dot_product(axis, difference(b[eb.w], pb)));
+            precise float above = high_end(t) - low_end(u);
+            precise float below = low_end(t) - high_end(u);
             float offset = dot_product(axis, difference(pb, pa));
             if (offset > above || offset < below) return false;
         }

@@ -10,8 +10,10 @@
 //! called separate, and one that is called touching is at most about 2^-19 of the size of box and tetrahedron away.
 //!
 //! **Two tetrahedra**, [`tets_touch`]: two with an equal vertex touch; of others, 8 face normals and 36 crosses of
-//! edges are tried as axes, with no allowance, and touching counts as intersection. The answer for (a, b) equals that
-//! for (b, a) bit for bit, because every difference and cross product changes only its sign.
+//! edges are tried as axes, with no allowance, and touching counts as intersection. An axis is seldom exactly
+//! perpendicular to what it is a product of, and that of edges that are nearly parallel can have any direction, so every
+//! vertex counts on every axis. The answer for (a, b) equals that for (b, a) bit for bit, because every difference and
+//! cross product changes only its sign.
 
 use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
 use crate::grid::{canonical, reciprocal, two_to};
@@ -65,10 +67,11 @@ pub fn box_touches(v: &[Vec3; 4], h: &[Vec3; 3], slack: Vec3) -> bool {
 fn face_separates(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
     (0..4).any(|i| {
         let [p, q, r] = FACES[i];
-        let normal = cross(sub(a[q], a[p]), sub(a[r], a[p]));
-        let own = dot(normal, sub(a[i], a[p]));
+        let (along_q, along_r) = (sub(a[q], a[p]), sub(a[r], a[p]));
+        let normal = cross(along_q, along_r);
+        let (own_lo, own_hi) = range4([0.0, dot(normal, sub(a[i], a[p])), dot(normal, along_q), dot(normal, along_r)]);
         let (lo, hi) = range4(b.map(|x| dot(normal, sub(x, a[p]))));
-        lo > own.max(0.0) || hi < own.min(0.0)
+        lo > own_hi || hi < own_lo
     })
 }
 
@@ -84,11 +87,10 @@ pub fn tets_touch(a: &[Vec3; 4], b: &[Vec3; 4]) -> bool {
         let along_a = sub(a[q], a[p]);
         let (am, an) = (sub(a[m], a[p]), sub(a[n], a[p]));
         for [r, s, k, l] in EDGES {
-            let axis = cross(along_a, sub(b[s], b[r]));
-            let (tm, tn) = (dot(axis, am), dot(axis, an));
-            let (uk, ul) = (dot(axis, sub(b[k], b[r])), dot(axis, sub(b[l], b[r])));
-            let (a_lo, a_hi) = (tm.min(tn).min(0.0), tm.max(tn).max(0.0));
-            let (b_lo, b_hi) = (uk.min(ul).min(0.0), uk.max(ul).max(0.0));
+            let along_b = sub(b[s], b[r]);
+            let axis = cross(along_a, along_b);
+            let (a_lo, a_hi) = range4([0.0, dot(axis, along_a), dot(axis, am), dot(axis, an)]);
+            let (b_lo, b_hi) = range4([0.0, dot(axis, along_b), dot(axis, sub(b[k], b[r])), dot(axis, sub(b[l], b[r]))]);
             let offset = dot(axis, sub(b[r], a[p]));
             if offset > a_hi - b_lo || offset < a_lo - b_hi {
                 return false;

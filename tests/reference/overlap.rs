@@ -106,6 +106,21 @@ fn two_hundred_poses() {
     assert!(some > 100 && none > 10, "{some} {none}");
 }
 
+/// A mesh and its translate: every edge is parallel to one of the other mesh, but for rounding, so that their cross
+/// product has any direction.
+#[test]
+fn moved_copies() {
+    for (jitter, shift) in [(0.9, [1.096; 3]), (0.2, [0.7, 0.6, 0.9]), (0.5, [-0.3, 1.4, 0.55])] {
+        let a = kuhn_jittered([6; 3], jitter, 1).unwrap();
+        let mut b = a.clone();
+        b.points.iter_mut().for_each(|p| *p = [0, 1, 2].map(|c| p[c] + shift[c]));
+        let (a, b) = (prepared(a), prepared(b));
+        for pairs in [false, true] {
+            check(&format!("moved by {shift:?}"), &a, &b, &run(&a, &b, 0.0, Assign::Planes, pairs));
+        }
+    }
+}
+
 #[test]
 fn contained_touching_identical_apart() {
     let cube = |n: u32, at: [f32; 3], scale: f32| {
