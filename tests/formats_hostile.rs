@@ -7,9 +7,11 @@
 mod formats_small;
 
 use std::alloc::{GlobalAlloc, Layout, System};
+use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 use std::time::Instant;
 
+use formats_small::not_run::not_run;
 use formats_small::shared;
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes};
@@ -60,10 +62,38 @@ fn watched(
     result
 }
 
+/// Bytes that this process has read so far, and calls that it needed; `None` where the system does not count them.
+fn reads() -> Option<[u64; 2]> {
+    let text = std::fs::read_to_string("/proc/self/io").ok()?;
+    let number = |name: &str| text.lines().find_map(|line| line.strip_prefix(name)?.trim().parse::<u64>().ok());
+    Some([number("rchar:")?, number("syscr:")?])
+}
+
+/// Loads a file from disk, as [`watched`] does. Adds a complaint to `broken` if more than `limits` bytes or calls are
+/// needed to read it.
+fn from_disk(path: &Path, limits: [u64; 2], broken: &mut Vec<String>) -> Result<Loaded, Error> {
+    let name = format!("{} on disk", path.file_name().unwrap().display());
+    let size = std::fs::metadata(path).unwrap().len() as usize;
+    let before = reads();
+    let result = watched(&name, size, 3, broken, || load(path, &LoadOptions::default()));
+    if let (Some(before), Some(after)) = (before, reads()) {
+        let [bytes, calls] = [0, 1].map(|i| after[i] - before[i]);
+        println!("{name}: {size} bytes, {bytes} read in {calls} calls");
+        if bytes > limits[0] || calls > limits[1] {
+            broken.push(format!("{name}: {bytes} bytes read in {calls} calls, for {size} bytes"));
+        }
+    }
+    result
+}
+
 #[test]
 fn hostile_files() {
     let mut broken = Vec::new();
+    if reads().is_none() {
+        not_run("the limits of what is read from disk, as there is no /proc/self/io");
+    }
     made_files(&mut broken);
+    foreign_root(&mut broken);
     shared_files(&mut broken);
     assert!(broken.is_empty(), "{}", broken.join("\n"));
 }
@@ -115,8 +145,8 @@ fn vtk(names: impl Iterator<Item = String>) -> Vec<u8> {
     format!("{head}CELL_DATA 1\nFIELD F {}\n{}", arrays.len(), arrays.concat()).into_bytes()
 }
 
-/// Files that once took time or memory in proportion to the square of their size. Arrays that need more NaN than the
-/// size of the file allows are left out.
+/// Files that once took time, memory or bytes from disk in proportion to the square of their size. Arrays that need more
+/// NaN than the size of the file allows are left out.
 fn made_files(broken: &mut Vec<String>) {
     let array = |i: usize, components: usize| {
         let values = "7 ".repeat(components);
@@ -126,12 +156,14 @@ fn made_files(broken: &mut Vec<String>) {
     let pieces: Vec<_> = std::iter::once(first).chain((0..500).map(|i| (1, array(i, 9), String::new()))).collect();
     let arrays: String = (0..100_000).map(|i| array(i, 1)).collect();
     let empty = (0, "<DataArray type=\"Int8\" format=\"binary\"/>\n".repeat(200_000), String::new());
+    let tags = (4, "<b/>".repeat(1_000_000), String::new());
     let view = |i: usize| format!("v{i:06}");
     let many = 100_000;
     let files = [
         ("pieces.vtu", vtu(&pieces), None),
         ("arrays.vtu", vtu(&[(4, String::new(), arrays)]), Some(many)),
         ("empty_arrays.vtu", vtu(&[empty, (4, String::new(), String::new())]), Some(0)),
+        ("tags.vtu", vtu(&[tags]), Some(0)),
         ("empty_views.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, ""))), Some(0)),
         ("views_of_one.msh", msh(20_000, (0..1000).map(|i| (view(i), 9, "1 1 2 3 4 5 6 7 8 9"))), None),
         ("views.msh", msh(4, (0..many).map(|i| (view(i), 1, "1 1"))), Some(many)),
@@ -139,18 +171,34 @@ fn made_files(broken: &mut Vec<String>) {
         ("names.vtk", vtk((0..many).map(view)), Some(many)),
         ("name.vtk", vtk((0..many).map(|_| "a".into())), Some(many)),
     ];
+    let folder = tempfile::tempdir().unwrap();
     for (name, bytes, wanted) in files {
-        let loaded = watched(name, bytes.len(), 3, broken, || load_bytes(name, bytes, &LoadOptions::default()));
-        let Loaded { mesh, report } = loaded.unwrap_or_else(|e| panic!("{e}"));
-        let fields = mesh.fields.len();
-        match wanted {
-            Some(wanted) if fields != wanted => broken.push(format!("{name}: {fields} fields, not {wanted}")),
-            None if fields == 0 || !report.warnings.iter().any(|w| w.contains("times the size of the file")) => {
-                broken.push(format!("{name}: {fields} fields, and no word of the others"));
+        let path = folder.path().join(name);
+        std::fs::write(&path, &bytes).unwrap();
+        let size = bytes.len() as u64;
+        let disk = from_disk(&path, [3 * size + (1 << 20), size / 32 + 1000], broken);
+        let memory = watched(name, bytes.len(), 3, broken, || load_bytes(name, bytes, &LoadOptions::default()));
+        for loaded in [disk, memory] {
+            let Loaded { mesh, report } = loaded.unwrap_or_else(|e| panic!("{e}"));
+            let fields = mesh.fields.len();
+            match wanted {
+                Some(wanted) if fields != wanted => broken.push(format!("{name}: {fields} fields, not {wanted}")),
+                None if fields == 0 || !report.warnings.iter().any(|w| w.contains("times the size of the file")) => {
+                    broken.push(format!("{name}: {fields} fields, and no word of the others"));
+                }
+                _ => {}
             }
-            _ => {}
         }
     }
+}
+
+/// Of a file with a foreign root no more than its start is read.
+fn foreign_root(broken: &mut Vec<String>) {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("root.vtu");
+    std::fs::write(&path, "<b/>".repeat(1_000_000)).unwrap();
+    let error = from_disk(&path, [1 << 20, 100], broken).unwrap_err().to_string();
+    assert!(error.ends_with("line 1: an XML or HTML document <b>, not a VTK file"), "{error}");
 }
 
 fn shared_files(broken: &mut Vec<String>) {

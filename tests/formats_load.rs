@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::{POINTS, TETS, all, replace, shared};
+use formats_small::{POINTS, TETS, all, open_bytes, replace, shared};
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load, load_bytes};
 use olbvh::mesh::On;
@@ -160,6 +160,13 @@ fn content_decides_before_the_name() {
         ("*VERTICES\n8 3 0 0\n", "h.veg", "Vega"),
         ("*VERTICES\n8 3 0 0\n", "h.veg", "save it in a format that can be read (.vtu"),
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nf 1 2 3\n", "o.obj", "fill it with tetrahedra first"),
+        ("$# LS-DYNA Keyword file created by LS-PrePost\n$\n*KEYWORD\n", "p.k", "LS-DYNA"),
+        ("$ made by hand\n$$ twice\n\n*KEYWORD\n", "q.dat", "LS-DYNA"),
+        ("$ made by hand\nGRID,1,,0.,0.,0.\n", "r.bdf", "Nastran file, which cannot be read; convert it"),
+        ("$ made by hand\nASSIGN x\n", "s.dat", "Nastran"),
+        ("SOL 101\nCEND\nBEGIN BULK\n", "t.dat", "Nastran"),
+        ("GRID           1", "u.nas", "Nastran"),
+        ("$ made by hand", "v.xyz", "neither its content"),
         ("CDF\x01xxxx", "i.e", "Exodus"),
         ("\u{89}", "j.xyz", ".vtu"),
         ("<!DOCTYPE html><html>", "k.vtu", "HTML"),
@@ -169,38 +176,6 @@ fn content_decides_before_the_name() {
         assert!(matches!(&error, Error::File { .. }) && error.to_string().contains(word), "{name}: {error}");
     }
     assert!(matches!(load(folder.path().join("none.vtu"), &LoadOptions::default()), Err(Error::Io { .. })));
-}
-
-fn open_bytes(name: &str, bytes: Vec<u8>) -> Loaded {
-    load_bytes(name, bytes, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
-}
-
-/// The cell field `c`, 0 to 5, serves as marks of ghosts here.
-#[test]
-fn ghost_cells_are_left_out() {
-    for (name, old, new) in [
-        ("ascii.vtk", "SCALARS c int", "SCALARS GHOST int"),
-        ("binary.vtk", "SCALARS c short", "SCALARS GHOST short"),
-        ("v51.vtk", "SCALARS c int", "SCALARS GHOST int"),
-        ("ascii.vtu", "Name=\"c\"", "Name=\"GHOST\""),
-        ("raw.vtu", "Name=\"c\"", "Name=\"GHOST\""),
-    ] {
-        for (ghost, wanted) in [("vtkGhostType", &[0, 2, 4][..]), ("vtkGhostLevels", &[0])] {
-            let Loaded { mesh, report } = open_bytes(name, replace(name, old.as_bytes(), new.replace("GHOST", ghost).as_bytes()));
-            assert_eq!(mesh.cell_ids.as_deref(), Some(wanted), "{name}: {ghost}");
-            assert_eq!((mesh.source_cells, report.count(Fate::Ghost)), (6, 6 - wanted.len() as u64), "{name}: {ghost}");
-            assert_eq!(mesh.field(ghost).unwrap().values, wanted.iter().map(|&v| v as f32).collect::<Vec<_>>());
-        }
-    }
-}
-
-#[test]
-fn hidden_cells_are_left_out() {
-    let marks = "Name=\"vtkGhostType\" NumberOfComponents=\"1\" format=\"ascii\">0 32 0 0 8 40<";
-    let old = "Name=\"c\" NumberOfComponents=\"1\" format=\"ascii\">0 1 2 3 4 5<";
-    let Loaded { mesh, report } = open_bytes("hidden.vtu", replace("ascii.vtu", old.as_bytes(), marks.as_bytes()));
-    assert_eq!(mesh.cell_ids.unwrap(), [0, 2, 3, 4]);
-    assert!(report.to_string().contains("2 ghost or hidden cell: left out"), "{report}");
 }
 
 /// Every cell has its own copies of its points.
@@ -224,79 +199,6 @@ fn cells_that_share_no_points() {
     for (found, wanted) in mesh.tets.as_flattened().iter().zip(TETS.as_flattened()) {
         assert_eq!(place(*found), (POINTS[*wanted as usize].map(|x| x as f32), *wanted as f32));
     }
-}
-
-#[test]
-fn numbers_as_windows_writes_them() {
-    let odd = ">1.#QNAN -1.#IND00 1.#INF -1.#inf 1.#SNAN -nan(ind) nan(0x8000000000000) 7<";
-    let Loaded { mesh, report } = open_bytes("odd.vtu", replace("ascii.vtu", b">0 1 2 3 4 5 6 7<", odd.as_bytes()));
-    assert_eq!(report.warnings, ["array `s`: 7 of 8 values are not finite in single precision"]);
-    let values = &mesh.field("s").unwrap().values;
-    assert!(values[..7].iter().all(|v| v.is_nan()) && values[7] == 7.0);
-}
-
-#[test]
-fn entities_of_xml_matter_in_arrays_only() {
-    let key = "<InformationKey name=\"UNITS\">N&amp;m</InformationKey>";
-    assert!(
-        open_bytes("key.vtu", replace("ascii.vtu", b"</DataArray>", format!("{key}</DataArray>").as_bytes())).report.warnings.is_empty()
-    );
-    let error = load_bytes("in.vtu", replace("ascii.vtu", b"</DataArray>", b"&amp;</DataArray>"), &LoadOptions::default()).unwrap_err();
-    assert!(error.to_string().contains("line 5: an entity reference in the data"), "{error}");
-}
-
-#[test]
-fn arrays_of_bits_are_named_as_such() {
-    let report = open_bytes("bits.vtu", replace("ascii.vtu", b"type=\"Float32\"", b"type=\"Bit\"")).report;
-    assert_eq!(report.warnings, ["array `s` holds text or bits and is left out"]);
-}
-
-#[test]
-fn empty_lines_before_the_coding_of_legacy_files() {
-    assert_eq!(open_bytes("lines.vtk", replace("ascii.vtk", b"ASCII", b"\n\nASCII")).mesh.tets.len(), 6);
-    assert_eq!(open_bytes("lines.vtk", replace("binary.vtk", b"BINARY", b"\nBINARY ")).mesh.tets.len(), 6);
-}
-
-#[test]
-fn parametric_volumes_are_missed() {
-    let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10", b"CELL_TYPES 6\n55")).report;
-    assert_eq!((report.count(Fate::Unsupported), report.count(Fate::Boundary)), (1, 0), "{report}");
-}
-
-/// Of three pieces, the first and the last have the array `a`, in the last with twice as many components; the second
-/// has `b`.
-#[test]
-fn arrays_of_some_pieces() {
-    let values = |name: &str, values: [i32; 4]| {
-        let text = values.map(|v| v.to_string()).join(" ");
-        format!("<DataArray type=\"Int32\" Name=\"{name}\" format=\"ascii\">{text}</DataArray>")
-    };
-    let points = "0 0 0 1 0 0 0 1 0 0 0 1";
-    let piece = |arrays: [String; 2]| {
-        format!(
-            "<Piece NumberOfPoints=\"4\" NumberOfCells=\"1\"><PointData>{}</PointData>
-            <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\">{points}</DataArray></Points>
-            <Cells><DataArray type=\"Int32\" Name=\"connectivity\">0 1 2 3</DataArray><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray>
-            <DataArray type=\"UInt8\" Name=\"types\">10</DataArray></Cells></Piece>",
-            arrays.concat()
-        )
-    };
-    let pieces = [
-        piece([values("a", [0, 1, 2, 3]), values("a", [4, 5, 6, 7])]),
-        piece([values("b", [1, 1, 1, 1]), String::new()]),
-        piece([values("a", [8, 9, 8, 9]), values("a", [7, 6, 7, 6])]),
-    ];
-    let file = format!("<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid>{}</UnstructuredGrid></VTKFile>", pieces.concat());
-    let apart = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
-    let mesh = load_bytes("three.vtu", file.into_bytes(), &apart).unwrap().mesh;
-    let found: Vec<_> =
-        mesh.fields.iter().map(|f| (f.name.as_str(), f.values.iter().map(|&v| v as i32 - i32::from(v.is_nan())).collect())).collect();
-    let wanted: [(&str, Vec<i32>); 3] = [
-        ("a", vec![0, 1, 2, 3, -1, -1, -1, -1, 8, 9, 8, 9]),
-        ("a (again)", vec![4, 5, 6, 7, -1, -1, -1, -1, 7, 6, 7, 6]),
-        ("b", vec![-1, -1, -1, -1, 1, 1, 1, 1, -1, -1, -1, -1]),
-    ];
-    assert_eq!(found, wanted);
 }
 
 #[test]

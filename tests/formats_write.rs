@@ -2,13 +2,12 @@
 #![cfg(feature = "formats")]
 #![allow(clippy::unwrap_used)] // also in helpers of tests
 
-use std::io::Write as _;
 use std::path::Path;
 
 use olbvh::Error;
 use olbvh::formats::{
-    LoadOptions, Located, OutputFile, OutputFormat, SliceGrid, SliceWriter, load, load_points, write_json, write_located, write_mesh,
-    write_npy, write_png,
+    LoadOptions, Located, OutputFormat, SliceGrid, SliceWriter, load, load_points, write_json, write_located, write_mesh, write_npy,
+    write_png,
 };
 use olbvh::mesh::{Field, Mesh, On};
 
@@ -47,6 +46,39 @@ fn meshes() {
     assert_eq!(read.report.bounds[0], [1e7, 0.25, -3e8]);
     assert_eq!(read.mesh.points[100][0], far.points[100][0]);
     assert_eq!(names(folder.path()), ["out.vtu"]);
+}
+
+/// The same mesh with its points and cells in the opposite order.
+fn reversed(mut mesh: Mesh) -> Mesh {
+    let (points, cells) = (mesh.points.len() as u32, mesh.tets.len() as u32);
+    mesh.points.reverse();
+    mesh.tets.reverse();
+    mesh.tets.as_flattened_mut().iter_mut().for_each(|v| *v = points - 1 - *v);
+    mesh.fields.iter_mut().for_each(|field| field.values.reverse());
+    Mesh { cell_ids: Some((0..cells).rev().collect()), point_ids: Some((0..points).rev().collect()), ..mesh }
+}
+
+/// Ids are those of the file that was read last, however often a mesh is written and read.
+#[test]
+fn ids_replace_those_of_earlier_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.vtu");
+    let mut mesh = load("kuhn:1,2,3", &LoadOptions::default()).unwrap().mesh;
+    let others = mesh.points.iter().map(|p| p[0]).collect();
+    mesh.fields = vec![Field { name: "other".into(), on: On::Points, values: others }];
+    for round in 0..3 {
+        write_mesh(&path, &reversed(mesh)).unwrap();
+        let read = load(&path, &LoadOptions::default()).unwrap();
+        mesh = read.mesh;
+        let mut names: Vec<_> = mesh.fields.iter().map(|f| (f.name.as_str(), f.on)).collect();
+        names.sort_by_key(|name| name.0);
+        let wanted = [("cell_id", On::Cells), ("other", On::Points), ("point_id", On::Points)];
+        assert!(names == wanted && read.report.warnings.is_empty(), "round {round}: {names:?}, {}", read.report);
+        for name in ["cell_id", "point_id"] {
+            let ids = &mesh.field(name).unwrap().values;
+            assert!(ids.iter().rev().zip(0u16..).all(|(&id, i)| id == f32::from(i)), "round {round}: {ids:?}");
+        }
+    }
 }
 
 #[test]
@@ -210,6 +242,20 @@ fn located_points() {
     assert!(matches!(write_located(folder.path().join("out.npy"), &short), Err(Error::Invalid(_))));
 }
 
+/// JSON has the numbers that a table has, and not those of another precision.
+#[test]
+fn located_points_as_json() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.json");
+    let bary = [[0.4f32, 0.1, 1e-9, 0.5], [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0]];
+    let located = Located { points: &[[0.0; 3]; 2], owner: &[7, u32::MAX], bary: &bary, value: Some(&[16_777_216.0, 1.1]) };
+    write_located(&path, &located).unwrap();
+    let wanted = r#"{"owner":[7,4294967295],"bary":[[0.4,0.1,1e-9,0.5],[null,null,null,-0.0]],"value":[16777216.0,1.1]}"#;
+    assert_eq!(std::fs::read_to_string(&path).unwrap(), format!("{wanted}\n"));
+    write_located(&path, &Located { value: None, ..located }).unwrap();
+    assert!(std::fs::read_to_string(&path).unwrap().ends_with(",\"value\":null}\n"));
+}
+
 const GRID: SliceGrid = SliceGrid {
     size: [3, 2, 2],
     origin: [0.5, 1.0, 2.0],
@@ -282,48 +328,4 @@ fn pictures_and_json() {
     assert_eq!(std::fs::read_to_string(folder.path().join("j.json")).unwrap(), "[1,2]\n");
     assert_eq!(OutputFormat::of("A.PNG", &[OutputFormat::Png]).unwrap(), OutputFormat::Png);
     assert!(matches!(OutputFormat::of("a.png", &[OutputFormat::Npy]), Err(Error::Invalid(m)) if m.contains(".npy")));
-}
-
-#[test]
-fn no_half_written_file() {
-    let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("out.bin");
-    std::fs::write(&path, "old").unwrap();
-    let mut file = OutputFile::create(&path).unwrap();
-    file.write_all(b"new").unwrap();
-    file.flush().unwrap();
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
-    drop(file);
-    assert_eq!(names(folder.path()), ["out.bin"]);
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
-    let mut file = OutputFile::create(&path).unwrap();
-    file.write_all(b"new").unwrap();
-    file.commit().unwrap();
-    assert_eq!(std::fs::read_to_string(&path).unwrap(), "new");
-    assert_eq!(names(folder.path()), ["out.bin"]);
-    assert!(matches!(OutputFile::create(folder.path().join("no/such/out.bin")), Err(Error::Io { .. })));
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt as _;
-        let plain = folder.path().join("plain");
-        std::fs::write(&plain, "").unwrap();
-        let mode = |p: &Path| std::fs::metadata(p).unwrap().permissions().mode();
-        assert_eq!(mode(&path), mode(&plain), "permissions as of any other new file");
-        let link = folder.path().join("link");
-        std::os::unix::fs::symlink(&path, &link).unwrap();
-        let file = OutputFile::create(&link).unwrap();
-        file.commit().unwrap();
-        assert!(link.is_symlink() && std::fs::read(&path).unwrap().is_empty());
-        // A pipe is written to, not replaced by a file.
-        let pipe = folder.path().join("pipe");
-        assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-        let reader = std::thread::spawn({
-            let pipe = pipe.clone();
-            move || std::fs::read(pipe).unwrap()
-        });
-        let mut file = OutputFile::create(&pipe).unwrap();
-        file.write_all(b"x").unwrap();
-        file.commit().unwrap();
-        assert_eq!(reader.join().unwrap(), b"x");
-    }
 }

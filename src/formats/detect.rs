@@ -49,7 +49,8 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     if is(b"v ") && isaac::has_tetrahedra(source)? {
         return Ok(Format::Isaac);
     }
-    if let Some(found) = foreign_text(&is, &ending) {
+    let has_dollar = bytes.trim_ascii_start().starts_with(b"$");
+    if let Some(found) = foreign_text(&is, has_dollar, &ending) {
         return Err(source.error(found));
     }
     let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
@@ -98,7 +99,9 @@ fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {
     Some(format!("a file in {found}, which cannot be read; {CONVERT}"))
 }
 
-fn foreign_text(is: &dyn Fn(&[u8]) -> bool, ending: &str) -> Option<String> {
+/// Names a foreign format of text. `is` tells whether the first line that is no comment starts like this, `has_dollar`
+/// whether the file starts with a comment after `$`.
+fn foreign_text(is: &dyn Fn(&[u8]) -> bool, has_dollar: bool, ending: &str) -> Option<String> {
     let any = |prefixes: &[&str]| prefixes.iter().any(|p| is(p.as_bytes()));
     let save = || format!("save it in a format that can be read ({READABLE}) with the program that made it");
     let (found, advice) = if any(&["MFEM "]) {
@@ -109,6 +112,8 @@ fn foreign_text(is: &dyn Fn(&[u8]) -> bool, ending: &str) -> Option<String> {
         ("an Abaqus input file, which cannot be read", CONVERT.into())
     } else if any(&["*KEYWORD"]) {
         ("an LS-DYNA keyword file, which cannot be read", save())
+    } else if ["bdf", "nas"].contains(&ending) || (ending == "dat" && (has_dollar || any(&["SOL ", "CEND", "BEGIN BULK", "GRID"]))) {
+        ("a Nastran file, which cannot be read", CONVERT.into())
     } else if any(&["FoamFile", "/*--------------------------------*- C++ -*-"]) {
         ("an OpenFOAM file, which cannot be read", "convert it to .vtu, for example with ParaView".into())
     } else if any(&["TITLE", "VARIABLES"]) && ["dat", "plt", "tec"].contains(&ending) {

@@ -10,7 +10,7 @@ use super::gmsh_data::View;
 use super::gmsh_elements::{Elements, kinds};
 use super::gmsh_reader::{Reader, Version, old};
 use super::scalar::Scalar;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
@@ -34,14 +34,14 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     let mut content = Content::default();
     while let Some((token, at)) = reader.tokens.next_token()? {
         let Some(name) = token.strip_prefix(b"$").map(<[u8]>::to_vec) else {
-            return Err(source.error_line(at, format!("`{}` where a section ($…) should be", printable(token))));
+            return Err(source.error_line(at, format!("`{}` where a section ($…) should be", excerpt(token))));
         };
         let name = name.as_slice();
         match (name, version) {
             (b"MeshFormat", None) => version = Some(reader.format()?),
             (b"NOD" | b"ELM", _) => return Err(old(source, at, "1.0")),
             (b"Comments", None) => reader.skip(name, at)?,
-            (_, None) => return Err(source.error_line(at, format!("section ${} before $MeshFormat", printable(name)))),
+            (_, None) => return Err(source.error_line(at, format!("section ${} before $MeshFormat", excerpt(name)))),
             (b"Nodes", Some(version)) => {
                 reader.once(&mut content.has[0], name, at)?;
                 reader.nodes(version, &mut content)?;
@@ -66,7 +66,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
             (b"NodeData", Some(_)) => content.views.push(reader.view(On::Points, b"$EndNodeData")?),
             (b"ElementData", Some(_)) => content.views.push(reader.view(On::Cells, b"$EndElementData")?),
             _ => {
-                let shown = format!("${}", printable(name));
+                let shown = format!("${}", excerpt(name));
                 let known: [&[u8]; 4] = [b"PhysicalNames", b"Periodic", b"Comments", b"InterpolationScheme"];
                 if !known.contains(&name) && content.skipped.len() < 12 && !content.skipped.contains(&shown) {
                     content.skipped.push(shown);

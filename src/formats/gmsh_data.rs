@@ -3,7 +3,7 @@
 use super::array::Array;
 use super::budget::Budget;
 use super::gmsh_reader::Reader;
-use super::source::printable;
+use super::source::excerpt;
 use super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
@@ -24,7 +24,7 @@ impl View {
     /// `Err` holds a warning: values for something that does not exist, as in renumbered meshes, are no reason to
     /// refuse the mesh.
     pub fn array(&self, tags: &Tags, count: usize, padding: &mut Budget) -> Result<Array, String> {
-        let left_out = |why: String| format!("array `{}` is left out: {why}", printable(self.name.as_bytes()));
+        let left_out = |why: String| format!("array `{}` is left out: {why}", excerpt(self.name.as_bytes()));
         if self.tags.is_empty() {
             return Err(left_out("it has no values".into()));
         }

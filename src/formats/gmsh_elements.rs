@@ -5,7 +5,7 @@ use std::collections::{HashMap, HashSet};
 use super::cells::{self, CellType};
 use super::gmsh_reader::{Reader, Version};
 use super::scalar::Scalar;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::parse_integer;
 use crate::error::Result;
 
@@ -80,7 +80,7 @@ impl Reader<'_> {
     fn line_of_nodes(&mut self, elements: &mut Elements) -> Result<()> {
         while let Some((token, at)) = self.tokens.next_token()? {
             let node = parse_integer(token);
-            let node = node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", printable(token))))?;
+            let node = node.ok_or_else(|| self.source.error_line(at, format!("`{}` where a node should be", excerpt(token))))?;
             elements.nodes.push(node);
         }
         Ok(())

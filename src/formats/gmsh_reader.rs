@@ -2,7 +2,7 @@
 //! first section states.
 
 use super::scalar::{Number, Scalar};
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::Tokens;
 use crate::error::{Error, Result};
 
@@ -30,7 +30,7 @@ impl<'a> Reader<'a> {
     /// Refuses a second section of the same kind.
     pub fn once(&self, seen: &mut bool, name: &[u8], at: usize) -> Result<()> {
         if std::mem::replace(seen, true) {
-            return Err(self.source.error_line(at, format!("a second section ${}", printable(name))));
+            return Err(self.source.error_line(at, format!("a second section ${}", excerpt(name))));
         }
         Ok(())
     }
@@ -42,7 +42,7 @@ impl<'a> Reader<'a> {
             b"2" | b"2.0" | b"2.1" | b"2.2" => Version::V2,
             b"4" | b"4.0" => Version::V40,
             b"4.1" => Version::V41,
-            other => return Err(old(self.source, at, &printable(other))),
+            other => return Err(old(self.source, at, &excerpt(other))),
         };
         self.binary = match self.tokens.integer("the file type (0 or 1)")? {
             0 => false,
@@ -70,11 +70,11 @@ impl<'a> Reader<'a> {
 
     /// Reads the end of a section.
     pub fn end(&mut self, name: &[u8]) -> Result<()> {
-        let (token, at) = self.tokens.word(&printable(name))?;
+        let (token, at) = self.tokens.word(&excerpt(name))?;
         if token == name {
             return Ok(());
         }
-        let message = format!("`{}` where {} should be", printable(token), printable(name));
+        let message = format!("`{}` where {} should be", excerpt(token), excerpt(name));
         Err(if self.binary { self.source.error_byte(at, message) } else { self.source.error_line(at, message) })
     }
 
@@ -82,7 +82,7 @@ impl<'a> Reader<'a> {
     pub fn skip(&mut self, name: &[u8], at: usize) -> Result<()> {
         let end = [b"$End", name].concat();
         if !self.tokens.skip_past(&end)? {
-            return Err(self.source.error_line(at, format!("section ${0} without $End{0}", printable(name))));
+            return Err(self.source.error_line(at, format!("section ${0} without $End{0}", excerpt(name))));
         }
         Ok(())
     }

@@ -4,7 +4,7 @@
 use super::LoadOptions;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tetgen::{Line, Lines};
 use super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
@@ -32,7 +32,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
             b"v" => points.push(numbers(source, &line, parse_float)?),
             b"t" => tets.push(numbers(source, &line, parse_integer)?),
             other => {
-                let shown = printable(other);
+                let shown = excerpt(other);
                 if skipped.len() < 12 && !skipped.contains(&shown) {
                     skipped.push(shown);
                 }
@@ -51,12 +51,12 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 /// The numbers that follow the first word of a line, which must be `N`.
 fn numbers<T: Copy + Default, const N: usize>(source: &Source, line: &Line<'_>, parse: fn(&[u8]) -> Option<T>) -> Result<[T; N]> {
     if line.len() != N + 1 {
-        let (word, found) = (printable(line.word(0)), line.len() - 1);
+        let (word, found) = (excerpt(line.word(0)), line.len() - 1);
         return Err(source.error_line(line.at, format!("{found} numbers after `{word}` instead of {N}")));
     }
     let mut numbers = [T::default(); N];
     for (number, word) in numbers.iter_mut().zip((1..=N).map(|i| line.word(i))) {
-        *number = parse(word).ok_or_else(|| source.error_line(line.at, format!("`{}` where a number should be", printable(word))))?;
+        *number = parse(word).ok_or_else(|| source.error_line(line.at, format!("`{}` where a number should be", excerpt(word))))?;
     }
     Ok(numbers)
 }

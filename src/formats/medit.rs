@@ -4,7 +4,7 @@ use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::Tokens;
 use crate::error::Result;
 use crate::mesh::On;
@@ -104,11 +104,11 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         } else if is("End") {
             break;
         } else if token[0].is_ascii_alphabetic() {
-            content.skipped.push(printable(&token));
+            content.skipped.push(excerpt(&token));
             skip(&mut tokens)?;
         } else {
             return Err(
-                source.error_line(at, format!("`{}` where a keyword should be; is the count of the section right?", printable(&token)))
+                source.error_line(at, format!("`{}` where a keyword should be; is the count of the section right?", excerpt(&token)))
             );
         }
     }
@@ -122,7 +122,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
     }
     content.assemble(source, &mut assembly)?;
     if let Some((token, at)) = tokens.next_token()? {
-        assembly.warnings.push(format!("line {}: `{}` and what follows after End is not read", source.line(at), printable(token)));
+        assembly.warnings.push(format!("line {}: `{}` and what follows after End is not read", source.line(at), excerpt(token)));
     }
     Ok(assembly)
 }

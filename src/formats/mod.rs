@@ -54,9 +54,10 @@ use detect::Format;
 pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
 use source::Source;
+pub use source::printable;
 pub use write::{
-    Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, write_json,
-    write_located, write_mesh, write_npy, write_png,
+    Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, is_part,
+    write_json, write_located, write_mesh, write_npy, write_png, xml_attribute,
 };
 
 /// How to read a mesh.

@@ -2,7 +2,7 @@
 //! whole parser of Python literals, and trust the announced shape before they look at the size of the file.
 
 use super::scalar::Scalar;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use crate::error::Result;
 
 pub(crate) const MAGIC: &[u8] = b"\x93NUMPY";
@@ -92,7 +92,7 @@ fn describe(descr: &str, name: Option<&str>) -> String {
         Some('M' | 'm') => "times",
         _ => "another type",
     };
-    format!("{what} (`{}`)", printable(name.as_bytes()))
+    format!("{what} (`{}`)", excerpt(name.as_bytes()))
 }
 
 /// Parses a NumPy type such as `<f8` into number type and byte order (`true`: big-endian).

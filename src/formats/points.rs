@@ -7,7 +7,7 @@ use std::path::Path;
 
 use super::detect::ending;
 use super::npy;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::parse_float;
 use crate::error::{Error, Result};
 
@@ -126,7 +126,7 @@ impl Columns {
             let mut point = [0.0; 3];
             for (x, column) in point.iter_mut().zip(self.at) {
                 let field = found[column];
-                *x = number(field).ok_or_else(|| source.error_line(at, format!("`{}` is not a number", printable(field))))?;
+                *x = number(field).ok_or_else(|| source.error_line(at, format!("`{}` is not a number", excerpt(field))))?;
             }
             points.push(point);
         }

@@ -96,14 +96,15 @@ impl Source {
         &self.start
     }
 
-    /// Contents around byte `at`, at least `least` bytes from there on or all that there are, and the position where
-    /// they begin.
-    pub fn chunk(&self, at: usize, least: usize) -> Result<(usize, Arc<Vec<u8>>)> {
-        let wanted = at.saturating_add(least).min(self.len());
+    /// Contents around byte `at`, at least `least` bytes from there on or all that there are before `end`, and the
+    /// position where they begin. Nothing beyond `end` is read.
+    pub fn chunk(&self, at: usize, least: usize, end: usize) -> Result<(usize, Arc<Vec<u8>>)> {
+        let end = end.min(self.len());
+        let wanted = at.saturating_add(least).min(end);
         if wanted <= self.start.len() {
             return Ok((0, self.start.clone()));
         }
-        let end = at.saturating_add(least.saturating_mul(2).max(CHUNK)).min(self.len()); // for long lines, twice what is needed
+        let end = at.saturating_add(least.saturating_mul(2).max(CHUNK)).min(end); // for long lines, twice what is needed
         let bytes = self.window(at..end).map_err(|why| self.error_byte(at, why))?;
         Ok((at, Arc::new(bytes.into_owned())))
     }
@@ -161,26 +162,57 @@ impl Source {
     }
 }
 
-/// Start of the first line that is neither empty nor a comment (`#`, or `**` as in Abaqus files).
+/// Start of the first line that is neither empty nor a comment: `#`, `**` as in Abaqus files, or `$` as in those of
+/// LS-DYNA and Nastran, unless a letter follows at once as in the sections of Gmsh.
 pub(crate) fn skip_comments(bytes: &[u8]) -> usize {
     let mut at = 0;
     loop {
         at += bytes[at..].iter().take_while(|b| b.is_ascii_whitespace()).count();
         let rest = &bytes[at..];
-        if !(rest.starts_with(b"#") || rest.starts_with(b"**")) {
+        let dollar = rest.first() == Some(&b'$') && !rest.get(1).is_some_and(u8::is_ascii_alphabetic);
+        if !(rest.starts_with(b"#") || rest.starts_with(b"**") || dollar) {
             return at;
         }
         at += rest.iter().position(|&b| b == b'\n' || b == b'\r').unwrap_or(rest.len());
     }
 }
 
-/// A word of a file, made fit for a message: short, and without control characters.
-pub(crate) fn printable(word: &[u8]) -> String {
+/// A word of a file, made fit for a message: [`printable`], and only the start of a long one.
+pub(crate) fn excerpt(word: &[u8]) -> String {
     let cut = &word[..word.len().min(60)];
-    let text = String::from_utf8_lossy(cut);
-    let mut text: String = text.chars().map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect();
+    let mut text = printable(&String::from_utf8_lossy(cut)).into_owned();
     if cut.len() < word.len() {
         text.push('…');
     }
     text
+}
+
+/// A text made fit for a terminal, such as the name of a field, in which a file may have any characters: those that
+/// control the terminal, end the line or turn the direction of writing are escaped as in Rust (`\n`, `\u{1b}`).
+pub fn printable(text: &str) -> Cow<'_, str> {
+    let turns = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
+    let escaped = |c: char| c.is_control() || turns(c) || matches!(c, '\u{2028}' | '\u{2029}');
+    if !text.contains(escaped) {
+        return Cow::Borrowed(text);
+    }
+    let mut shown = String::with_capacity(text.len() + 16);
+    for c in text.chars() {
+        if escaped(c) { shown.extend(c.escape_default()) } else { shown.push(c) }
+    }
+    Cow::Owned(shown)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_are_shown_in_one_line_as_they_are_read() {
+        assert!(matches!(printable("von Mises (σ) \\n"), Cow::Borrowed("von Mises (σ) \\n")));
+        let odd = "a\nb\r\t\0\u{1b}[31m\u{7f}\u{9b}\u{202e}x\u{2028}";
+        assert_eq!(printable(odd), r"a\nb\r\t\u{0}\u{1b}[31m\u{7f}\u{9b}\u{202e}x\u{2028}");
+        let long = "n".repeat(1000) + "\n";
+        assert_eq!(printable(&long), "n".repeat(1000) + r"\n");
+        assert_eq!((excerpt(long.as_bytes()), excerpt(b"a\x1b\xff")), ("n".repeat(60) + "…", "a\\u{1b}\u{fffd}".into()));
+    }
 }

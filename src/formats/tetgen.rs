@@ -7,7 +7,7 @@ use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
 use super::detect::ending;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tags::Tags;
 use super::tokens::{Tokens, parse_float, parse_integer, words};
 use crate::error::Result;
@@ -103,7 +103,7 @@ fn header<const N: usize>(source: &Source, line: &Line<'_>, need: usize, what: &
             break;
         }
         let n = parse_integer(word).and_then(|n| usize::try_from(n).ok());
-        let n = n.ok_or_else(|| source.error_line(line.at, format!("`{}` in the first line, which must be `{what}`", printable(word))))?;
+        let n = n.ok_or_else(|| source.error_line(line.at, format!("`{}` in the first line, which must be `{what}`", excerpt(word))))?;
         // Everything that is counted takes at least two bytes of the file.
         let room = source.len() / 2;
         if n > room {
@@ -135,7 +135,7 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
             let wanted = 4 + attributes;
             return Err(source.error_line(at, format!("point {i} has {} numbers instead of {wanted}", line.len())));
         }
-        let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", printable(word)));
+        let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", excerpt(word)));
         tags.push(parse_integer(line.word(0)).ok_or_else(|| wrong(line.word(0)))?);
         let mut point = [0.0; 3];
         for (x, word) in point.iter_mut().zip((1..4).map(|i| line.word(i))) {
@@ -182,7 +182,7 @@ fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Resu
             let wanted = 1 + width + attributes;
             return Err(source.error_line(at, format!("tetrahedron {i} has {} numbers instead of {wanted}", line.len())));
         }
-        let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", printable(word)));
+        let wrong = |word: &[u8]| source.error_line(at, format!("`{}` where a number should be", excerpt(word)));
         for (node, word) in nodes.iter_mut().zip((1..=width).map(|i| line.word(i))) {
             let tag = parse_integer(word).ok_or_else(|| wrong(word))?;
             let found = points.get(tag).map(i64::from);

@@ -1,9 +1,10 @@
 //! The words and numbers of a text, and the bytes of binary data between them.
 
+use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Arc;
 
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use crate::error::Result;
 use memchr::{memchr2, memmem};
 
@@ -46,7 +47,7 @@ impl<'a> Tokens<'a> {
         if self.left() <= n {
             return Ok(false);
         }
-        (self.chunk_at, self.chunk) = self.source.chunk(self.at, n + 1)?;
+        (self.chunk_at, self.chunk) = self.source.chunk(self.at, n + 1, self.end)?;
         Ok(true)
     }
 
@@ -71,6 +72,15 @@ impl<'a> Tokens<'a> {
         self.at += n;
         let begin = at.wrapping_sub(self.chunk_at);
         (self.chunk.get(begin..begin.wrapping_add(n)).unwrap_or_default(), at)
+    }
+
+    /// The bytes from `begin` to the cursor. Only if the chunk does not hold all of them are they read again.
+    pub fn since(&self, begin: usize) -> Result<Cow<'_, [u8]>> {
+        let held = begin.checked_sub(self.chunk_at).and_then(|from| self.chunk.get(from..self.at - self.chunk_at));
+        match held {
+            Some(bytes) => Ok(Cow::Borrowed(bytes)),
+            None => self.source.window(begin..self.at).map_err(|why| self.source.error_byte(begin, why)),
+        }
     }
 
     /// Skips white space and comments.
@@ -126,7 +136,7 @@ impl<'a> Tokens<'a> {
     pub fn integer(&mut self, what: &str) -> Result<i64> {
         let source = self.source;
         let (token, at) = self.word(what)?;
-        parse_integer(token).ok_or_else(|| source.error_line(at, format!("`{}` where {what} should be", printable(token))))
+        parse_integer(token).ok_or_else(|| source.error_line(at, format!("`{}` where {what} should be", excerpt(token))))
     }
 
     /// The next token as a count of things that take at least two bytes each in the rest of the text, so that a wrong
@@ -134,7 +144,7 @@ impl<'a> Tokens<'a> {
     pub fn count(&mut self, what: &str) -> Result<usize> {
         let (source, end, unit) = (self.source, self.end, self.unit());
         let (token, at) = self.word(what)?;
-        let fail = |why: &str| source.error_line(at, format!("`{}` as {what}: {why}", printable(token)));
+        let fail = |why: &str| source.error_line(at, format!("`{}` as {what}: {why}", excerpt(token)));
         let n = parse_integer(token).ok_or_else(|| fail("not an integer in range"))?;
         let n = usize::try_from(n).map_err(|_| fail("negative"))?;
         let room = (end - at - token.len()) / 2 + 1;
@@ -145,7 +155,7 @@ impl<'a> Tokens<'a> {
     pub fn float(&mut self, what: &str) -> Result<f64> {
         let source = self.source;
         let (token, at) = self.word(what)?;
-        parse_float(token).ok_or_else(|| source.error_line(at, format!("`{}` where {what} should be", printable(token))))
+        parse_float(token).ok_or_else(|| source.error_line(at, format!("`{}` where {what} should be", excerpt(token))))
     }
 
     /// The rest of the current line, consuming the line end; `None` at the end of the text.

@@ -7,7 +7,7 @@ use super::cells;
 use super::integers::Integers;
 use super::report::Fate;
 use super::scalar::Scalar;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::Tokens;
 use super::vtk_attributes::Section;
 use super::vtk_reader::Reader;
@@ -90,7 +90,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
         if array.values.len() != count * array.components {
             let found = array.values.len() / array.components.max(1);
             let message = format!("{found} tuples, but {what} has {count}");
-            return Err(source.error_in(format_args!("array `{}`", printable(array.name.as_bytes())), message));
+            return Err(source.error_in(format_args!("array `{}`", excerpt(array.name.as_bytes())), message));
         }
     }
     Ok(assembly)
@@ -101,26 +101,26 @@ impl<'a> Reader<'a> {
         let (first, _) = self.tokens.line()?.unwrap_or_default();
         let first = first.trim_ascii();
         let Some(version) = first.strip_prefix(b"# vtk DataFile Version") else {
-            return Err(self.source.error_line(0, format!("`{}` instead of `# vtk DataFile Version …`", printable(first))));
+            return Err(self.source.error_line(0, format!("`{}` instead of `# vtk DataFile Version …`", excerpt(first))));
         };
-        let version = printable(version.trim_ascii());
+        let version = excerpt(version.trim_ascii());
         self.tokens.line()?;
         let (coding, at) = self.tokens.word("ASCII or BINARY")?;
         self.binary = match coding.to_ascii_uppercase().as_slice() {
             b"ASCII" => false,
             b"BINARY" => true,
             _ => {
-                let message = format!("`{}` where ASCII or BINARY should be (line 2 must be a title)", printable(coding));
+                let message = format!("`{}` where ASCII or BINARY should be (line 2 must be a title)", excerpt(coding));
                 return Err(self.source.error_line(at, message));
             }
         };
         let (word, at) = self.tokens.word("DATASET")?;
         if !word.eq_ignore_ascii_case(b"DATASET") {
-            return Err(self.source.error_line(at, format!("`{}` where DATASET should be", printable(word))));
+            return Err(self.source.error_line(at, format!("`{}` where DATASET should be", excerpt(word))));
         }
         let (dataset, at) = self.tokens.word("the type of the dataset")?;
         if !dataset.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
-            return Err(self.source.error_line(at, format!("a {} dataset, not an UNSTRUCTURED_GRID", printable(dataset))));
+            return Err(self.source.error_line(at, format!("a {} dataset, not an UNSTRUCTURED_GRID", excerpt(dataset))));
         }
         Ok(format!("VTK legacy unstructured grid {version}, {}", if self.binary { "binary" } else { "text" }))
     }
@@ -170,7 +170,7 @@ impl<'a> Reader<'a> {
         let mut offsets = self.integers(scalar, n, "an offset")?;
         let (word, word_at) = self.tokens.word("CONNECTIVITY")?;
         if !word.eq_ignore_ascii_case(b"CONNECTIVITY") {
-            return Err(self.source.error_line(word_at, format!("`{}` where CONNECTIVITY should be", printable(word))));
+            return Err(self.source.error_line(word_at, format!("`{}` where CONNECTIVITY should be", excerpt(word))));
         }
         let scalar = self.scalar()?;
         let nodes = self.integers(scalar, size, "a point of a cell")?;

@@ -1,7 +1,7 @@
 //! Reader for the arrays of legacy VTK files.
 
 use super::scalar::Scalar;
-use super::source::printable;
+use super::source::excerpt;
 use super::tokens::parse_integer;
 use super::vtk_reader::Reader;
 use crate::error::Result;
@@ -21,7 +21,7 @@ impl Reader<'_> {
 
     /// Reads an array in a `POINT_DATA` or `CELL_DATA` section (or before the first one, where it belongs to neither).
     pub(super) fn attribute(&mut self, keyword: &[u8], at: usize, section: Option<Section>) -> Result<Vec<Named>> {
-        let unknown = || Err(self.source.error_line(at, format!("`{}` where a keyword should be", printable(keyword))));
+        let unknown = || Err(self.source.error_line(at, format!("`{}` where a keyword should be", excerpt(keyword))));
         if keyword == b"FIELD" {
             return self.field();
         }
@@ -39,33 +39,61 @@ impl Reader<'_> {
         };
         let name = self.name()?;
         let components = if components == 0 { self.components()? } else { components };
+        if typed {
+            let values = self.typed(&name, n * components)?;
+            return Ok(values.map(|values| (name, components, values)).into_iter().collect());
+        }
         // Colours are bytes in binary files and fractions in text files.
-        let scalar = if typed { self.scalar()? } else { Some(if self.binary { Scalar::U8 } else { Scalar::F32 }) };
+        let scalar = Some(if self.binary { Scalar::U8 } else { Scalar::F32 });
         let values = self.values(scalar, n * components, &value_of(&name))?;
         Ok(vec![(name, components, values)])
+    }
+
+    /// Reads the type of `count` values and then the values; `None` if they are text, which is skipped.
+    fn typed(&mut self, name: &str, count: usize) -> Result<Option<Vec<f32>>> {
+        let kind = self.tokens.peek()?.unwrap_or_default().to_ascii_lowercase();
+        match kind.as_slice() {
+            b"string" | b"utf8_string" => self.strings(count).map(|()| None),
+            b"variant" => self.variants(count).map(|()| None),
+            _ => {
+                let scalar = self.scalar()?;
+                self.values(scalar, count, &value_of(name)).map(Some)
+            }
+        }
     }
 
     fn components(&mut self) -> Result<usize> {
         let (token, at) = self.tokens.word("a number of components")?;
         let n = parse_integer(token).filter(|n| (1..=9).contains(n));
-        n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("{} components, not 1 to 9", printable(token))))
+        n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("{} components, not 1 to 9", excerpt(token))))
     }
 
     fn scalars(&mut self, n: usize) -> Result<Vec<Named>> {
         let name = self.name()?;
         let scalar = self.scalar()?;
-        let mut rest = self.tokens.clone();
-        let is_last = rest.line()?.is_none_or(|(line, _)| line.trim_ascii().is_empty());
-        let components = if is_last { 1 } else { self.components()? };
-        // The format requires the look-up table, but it is often missing.
-        let mut ahead = self.tokens.clone();
-        ahead.line()?;
-        if ahead.line()?.is_some_and(|(line, _)| line.trim_ascii().get(..12).is_some_and(|w| w.eq_ignore_ascii_case(b"LOOKUP_TABLE"))) {
-            self.tokens.next_token()?;
-            self.tokens.next_token()?;
+        let mut components = 1;
+        // The format requires the look-up table, but it is often missing, so a number in the next line is a value.
+        let is_last = self.tokens.clone().line()?.is_none_or(|(line, _)| line.trim_ascii().is_empty());
+        if !self.skip_table()? && !is_last {
+            components = self.components()?;
+            self.skip_table()?;
         }
         let values = self.values(scalar, n * components, &value_of(&name))?;
         Ok(vec![(name, components, values)])
+    }
+
+    /// Skips the name of the look-up table of scalars, if that comes next.
+    fn skip_table(&mut self) -> Result<bool> {
+        const KEYWORD: &[u8] = b"LOOKUP_TABLE";
+        let before = self.tokens.at;
+        self.tokens.skip_space()?;
+        let found = self.tokens.bytes(KEYWORD.len())?.is_some_and(|word| word.eq_ignore_ascii_case(KEYWORD));
+        if found {
+            self.tokens.word("the name of a look-up table")?;
+        } else {
+            self.tokens.at = before;
+        }
+        Ok(found)
     }
 
     /// Skips a table of colours, which is not used.
@@ -86,23 +114,32 @@ impl Reader<'_> {
                 self.tokens.next_token()?;
                 self.metadata()?;
             }
+            // VTK writes this and nothing more for a missing array.
+            if self.tokens.peek()?.is_some_and(|word| word == b"NULL_ARRAY") {
+                self.tokens.next_token()?;
+                continue;
+            }
             let name = self.name()?;
             let components = self.size("a number of components")?;
             let count = components * self.size("a number of tuples")?;
-            if self.tokens.peek()?.is_some_and(|t| t.eq_ignore_ascii_case(b"string")) {
-                self.tokens.next_token()?;
-                self.strings(count)?;
-                continue;
-            }
-            let scalar = self.scalar()?;
-            let values = self.values(scalar, count, &value_of(&name))?;
-            arrays.push((name, components, values));
+            arrays.extend(self.typed(&name, count)?.map(|values| (name, components, values)));
         }
         Ok(arrays)
     }
 
-    /// Skips strings: one per line in text files, each preceded by its length in binary files.
+    /// Skips `variant` and such values: the number of a type and a word each.
+    fn variants(&mut self, count: usize) -> Result<()> {
+        self.tokens.next_token()?;
+        for _ in 0..count {
+            self.tokens.word("the type of a value")?;
+            self.tokens.word("a value")?;
+        }
+        Ok(())
+    }
+
+    /// Skips the word for strings and the strings: one per line in text files, each preceded by its length in binary files.
     fn strings(&mut self, count: usize) -> Result<()> {
+        self.tokens.next_token()?;
         self.tokens.line()?;
         for _ in 0..count {
             if !self.binary {
@@ -124,7 +161,7 @@ impl Reader<'_> {
 }
 
 fn value_of(name: &str) -> String {
-    format!("a value of array `{}`", printable(name.as_bytes()))
+    format!("a value of array `{}`", excerpt(name.as_bytes()))
 }
 
 /// Decodes a name, in which spaces and other characters are percent-encoded (%20).

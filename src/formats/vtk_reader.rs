@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::stored::{Content, Stored};
 use super::tokens::{Tokens, parse_float, parse_integer};
 use crate::error::Result;
@@ -25,7 +25,7 @@ impl<'a> Reader<'a> {
             "bit" => Ok(None),
             name => Scalar::vtk_legacy(name)
                 .map(Some)
-                .ok_or_else(|| self.source.error_line(at, format!("unknown number type `{}`", printable(word)))),
+                .ok_or_else(|| self.source.error_line(at, format!("unknown number type `{}`", excerpt(word)))),
         }
     }
 
@@ -47,7 +47,7 @@ impl<'a> Reader<'a> {
             let value = if float { parse_float(token).map(T::from_f64) } else { parse_integer(token).map(T::from_i64) };
             // Some writers announce an integer type and then write fractions.
             let value = value.or_else(|| if T::EXACT { None } else { parse_float(token).map(T::from_f64) });
-            values.push(value.ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", printable(token))))?);
+            values.push(value.ok_or_else(|| self.source.error_line(at, format!("`{}` where {what} should be", excerpt(token))))?);
         }
         Ok(values)
     }
@@ -87,7 +87,7 @@ impl<'a> Reader<'a> {
     pub(super) fn size(&mut self, what: &str) -> Result<usize> {
         let (token, at) = self.tokens.word(what)?;
         let n = parse_integer(token).and_then(|n| u32::try_from(n).ok());
-        n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("`{}` as {what}", printable(token))))
+        n.map(|n| n as usize).ok_or_else(|| self.source.error_line(at, format!("`{}` as {what}", excerpt(token))))
     }
 
     /// Skips a block of metadata, which ends with an empty line.

@@ -13,7 +13,7 @@ use super::budget::Budget;
 use super::cells::{self, CellType};
 use super::report::Fate;
 use super::scalar::Scalar;
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::tokens::Tokens;
 use super::vtu_data::{Appended, Codec, Place, StoredArray};
 use super::vtu_outline::Outline;
@@ -96,7 +96,8 @@ impl Parser<'_, '_> {
                 Ok(Event::GeneralRef(_)) if self.stack.last().is_some_and(|element| element == "DataArray") => {
                     return fail("an entity reference in the data".into());
                 }
-                Ok(Event::Text(_) | Event::CData(_)) => self.text(start..self.outline.in_file(end)),
+                Ok(Event::Text(_)) => self.text(start..self.outline.in_file(end)),
+                Ok(Event::CData(_)) => self.text(start + "<![CDATA[".len()..self.outline.in_file(end) - "]]>".len()),
                 Ok(Event::Start(e)) => {
                     if e.name().as_ref() == "AppendedData" {
                         appended = Some((self.attributes(&e, start)?, self.outline.in_file(end)));
@@ -106,7 +107,7 @@ impl Parser<'_, '_> {
                         return fail("elements nested more than 32 deep".into());
                     }
                     self.open(&e, start)?;
-                    self.stack.push(printable(e.name().as_ref().as_bytes()));
+                    self.stack.push(excerpt(e.name().as_ref().as_bytes()));
                     if let Some(range) = self.outline.cut_at(end) {
                         self.text(range);
                     }
@@ -125,21 +126,25 @@ impl Parser<'_, '_> {
             return Err(self.source.error("there is no element <Piece>"));
         }
         if let Some((attributes, end)) = appended {
-            codec.appended = Some(self.appended(&attributes, end)?);
+            codec.appended = self.appended(&attributes, end)?;
         }
         Ok(Skeleton { codec, pieces: self.pieces, format })
     }
 
-    fn appended(&self, attributes: &[(String, String)], end: usize) -> Result<Appended> {
+    /// Locates the appended data, whose element starts before byte `end` of the file; `None` if it is empty.
+    fn appended(&self, attributes: &[(String, String)], end: usize) -> Result<Option<Appended>> {
         let encoding = get(attributes, "encoding").unwrap_or("base64");
         let base64 = match encoding {
             "raw" => false,
             "base64" => true,
-            other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", printable(other.as_bytes())))),
+            other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", excerpt(other.as_bytes())))),
         };
         let mut tokens = Tokens::new(self.source, None);
         tokens.at = end;
         tokens.skip_space()?;
+        if tokens.starts_with(b"</AppendedData")? {
+            return Ok(None);
+        }
         if !tokens.starts_with(b"_")? {
             return Err(self.source.error_byte(tokens.at, "the appended data must begin with an underscore"));
         }
@@ -149,7 +154,7 @@ impl Parser<'_, '_> {
             tokens.skip_until(|bytes| memchr::memchr(b'<', bytes))?;
             stop = tokens.at;
         }
-        Ok(Appended { base64, range: start..stop })
+        Ok(Some(Appended { base64, range: start..stop }))
     }
 
     fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {
@@ -173,23 +178,23 @@ impl Parser<'_, '_> {
                 let kind = get(&attributes, "type").unwrap_or("");
                 if kind != "UnstructuredGrid" {
                     let hint = if kind.starts_with('P') { "; open the pieces it lists, or let ParaView save it as one file" } else { "" };
-                    let message = format!("a VTK XML file of type `{}`, not UnstructuredGrid{hint}", printable(kind.as_bytes()));
+                    let message = format!("a VTK XML file of type `{}`, not UnstructuredGrid{hint}", excerpt(kind.as_bytes()));
                     return Err(self.source.error_line(at, message));
                 }
                 let codec = Codec::new(|name| get(&attributes, name)).map_err(|message| self.source.error_line(at, message))?;
                 let version = get(&attributes, "version").unwrap_or("without a version");
-                let format = format!("VTK XML unstructured grid {}{}", printable(version.as_bytes()), codec.describe());
+                let format = format!("VTK XML unstructured grid {}{}", excerpt(version.as_bytes()), codec.describe());
                 self.codec = Some((codec, format));
             }
             (name, None) => {
-                let message = format!("an XML or HTML document <{}>, not a VTK file", printable(name.as_bytes()));
+                let message = format!("an XML or HTML document <{}>, not a VTK file", excerpt(name.as_bytes()));
                 return Err(self.source.error_line(at, message));
             }
             ("Piece", _) => {
                 let attributes = self.attributes(element, at)?;
                 let number = |name: &str| {
                     let text = get(&attributes, name).unwrap_or("");
-                    let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", printable(text.as_bytes())));
+                    let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", excerpt(text.as_bytes())));
                     text.trim().parse::<u64>().map_err(|_| wrong())
                 };
                 let piece = Piece { at, points: number("NumberOfPoints")?, cells: number("NumberOfCells")?, ..Piece::default() };
@@ -214,17 +219,17 @@ impl Parser<'_, '_> {
 
     fn array(&self, attributes: &[(String, String)], at: usize) -> Result<StoredArray> {
         let name = get(attributes, "Name").unwrap_or("unnamed").to_owned();
-        let fail = |message: String| self.source.error_line(at, format!("array `{}`: {message}", printable(name.as_bytes())));
+        let fail = |message: String| self.source.error_line(at, format!("array `{}`: {message}", excerpt(name.as_bytes())));
         let kind = get(attributes, "type").unwrap_or("");
         let scalar = match kind {
             "String" | "Bit" => None,
-            _ => Some(Scalar::vtk_xml(kind).ok_or_else(|| fail(format!("unknown type `{}`", printable(kind.as_bytes()))))?),
+            _ => Some(Scalar::vtk_xml(kind).ok_or_else(|| fail(format!("unknown type `{}`", excerpt(kind.as_bytes()))))?),
         };
         let components = match get(attributes, "NumberOfComponents") {
             None => 1,
             Some(text) => {
                 let n = text.trim().parse::<u64>().ok().filter(|&n| u32::try_from(n).is_ok());
-                n.ok_or_else(|| fail(format!("NumberOfComponents=\"{}\"", printable(text.as_bytes()))))?
+                n.ok_or_else(|| fail(format!("NumberOfComponents=\"{}\"", excerpt(text.as_bytes()))))?
             }
         };
         let place = match get(attributes, "format").unwrap_or("ascii") {
@@ -233,9 +238,9 @@ impl Parser<'_, '_> {
             "appended" => {
                 let text = get(attributes, "offset").unwrap_or("");
                 let offset = text.trim().parse::<u64>();
-                Place::Appended(offset.map_err(|_| fail(format!("offset=\"{}\" is not a number", printable(text.as_bytes()))))?)
+                Place::Appended(offset.map_err(|_| fail(format!("offset=\"{}\" is not a number", excerpt(text.as_bytes()))))?)
             }
-            other => return Err(fail(format!("unknown format `{}`", printable(other.as_bytes())))),
+            other => return Err(fail(format!("unknown format `{}`", excerpt(other.as_bytes())))),
         };
         Ok(StoredArray { name, scalar, components, place, at })
     }
@@ -300,9 +305,9 @@ fn read_arrays<'p>(
     for (on, arrays, count, before) in groups {
         for array in arrays {
             if array.scalar.is_none() {
-                assembly.warnings.push(format!("array `{}` holds text or bits and is left out", printable(array.name.as_bytes())));
+                assembly.warnings.push(format!("array `{}` holds text or bits and is left out", excerpt(array.name.as_bytes())));
             } else if array.components == 0 || array.components > 9 {
-                let message = format!("array `{}` has {} components and is left out", printable(array.name.as_bytes()), array.components);
+                let message = format!("array `{}` has {} components and is left out", excerpt(array.name.as_bytes()), array.components);
                 assembly.warnings.push(message);
             } else {
                 let values: Vec<f32> = codec.floats(source, array, count)?;

@@ -12,7 +12,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use super::budget::Budget;
 use super::integers::Integers;
 use super::scalar::{Number, Scalar};
-use super::source::{Source, printable};
+use super::source::{Source, excerpt};
 use super::stored::{Blocks, Content, Stored};
 use super::tokens::{Tokens, parse_float, parse_integer};
 use super::unpack::Compressor;
@@ -65,7 +65,7 @@ enum Stream<'a> {
 impl Codec {
     /// Makes a codec from the attributes of the root element.
     pub fn new<'s>(get: impl Fn(&str) -> Option<&'s str>) -> Result<Self, String> {
-        let quote = |s: &str| printable(s.as_bytes());
+        let quote = |s: &str| excerpt(s.as_bytes());
         let big_endian = match get("byte_order") {
             None | Some("LittleEndian") => false,
             Some("BigEndian") => true,
@@ -208,7 +208,7 @@ impl Codec {
 
 /// Describes an array for messages.
 fn described(array: &StoredArray) -> String {
-    format!("array `{}`", printable(array.name.as_bytes()))
+    format!("array `{}`", excerpt(array.name.as_bytes()))
 }
 
 /// Makes an error about an array.
@@ -245,7 +245,7 @@ fn ascii<T: Number>(source: &Source, array: &StoredArray, scalar: Scalar, parts:
             };
             values.push(value.ok_or_else(|| {
                 let kind = if scalar.is_float() { "number" } else { "whole number" };
-                source.error_line(at, format!("{}: `{}` is not a {kind}", described(array), printable(token)))
+                source.error_line(at, format!("{}: `{}` is not a {kind}", described(array), excerpt(token)))
             })?);
         }
     }

@@ -24,38 +24,42 @@ struct Cut {
 
 /// A tag, comment or the like.
 enum Tag {
+    /// The start of the root `VTKFile`.
+    Root,
     /// The start of an array with contents.
     Array,
-    /// The start of the appended data.
+    /// The start of appended data with contents.
     Appended,
-    Other,
+    /// The start or end of another element, or an empty element.
+    Element,
+    /// A comment, declaration or the like.
+    Markup,
 }
 
 impl Outline {
     pub fn read(source: &Source) -> Result<Self> {
         let (mut bytes, mut cuts) = (Vec::new(), Vec::new());
-        let (mut tokens, mut begin) = (Tokens::new(source, None), 0);
-        let keep = |bytes: &mut Vec<u8>, range: Range<usize>| {
-            let begin = range.start;
-            bytes.extend_from_slice(&source.window(range).map_err(|why| source.error_byte(begin, why))?);
-            Ok(())
-        };
-        while let Some(tag) = next_tag(source, &mut tokens)? {
+        let (mut tokens, mut begin, mut has_root) = (Tokens::new(source, None), 0, false);
+        while let Some(tag) = next_tag(&mut tokens)? {
             match tag {
+                Tag::Root => has_root = true,
+                Tag::Markup => {}
+                // The parser needs no more to refuse a file with another root.
+                _ if !has_root => break,
                 Tag::Array => {
-                    let at = tokens.at;
+                    bytes.extend_from_slice(&tokens.since(begin)?);
+                    begin = tokens.at;
                     // A reference in the data is kept, for the parser to refuse.
                     if tokens.skip_until(|bytes| memchr2(b'<', b'&', bytes))? == Some(b'<') {
-                        keep(&mut bytes, begin..at)?;
-                        cuts.push(Cut { at: bytes.len(), range: at..tokens.at });
+                        cuts.push(Cut { at: bytes.len(), range: begin..tokens.at });
                         begin = tokens.at;
                     }
                 }
                 Tag::Appended => break,
-                Tag::Other => {}
+                Tag::Element => {}
             }
         }
-        keep(&mut bytes, begin..tokens.at)?;
+        bytes.extend_from_slice(&tokens.since(begin)?);
         let ascii = |&b: &u8| if b.is_ascii() { char::from(b) } else { '?' };
         let text = String::from_utf8(bytes).unwrap_or_else(|error| error.as_bytes().iter().map(ascii).collect());
         Ok(Self { text, cuts })
@@ -75,27 +79,30 @@ impl Outline {
 
 /// Moves behind the next tag, comment or the like; `None` at the end of the file. Whether the XML is well-formed is not
 /// checked here.
-fn next_tag(source: &Source, tokens: &mut Tokens<'_>) -> Result<Option<Tag>> {
+fn next_tag(tokens: &mut Tokens<'_>) -> Result<Option<Tag>> {
     if tokens.skip_until(|bytes| memchr(b'<', bytes))?.is_none() {
         return Ok(None);
     }
     for (begin, end) in [(&b"<!--"[..], &b"-->"[..]), (b"<![CDATA[", b"]]>"), (b"<?", b"?>")] {
         if tokens.starts_with(begin)? {
             tokens.at += begin.len();
-            return Ok(tokens.skip_past(end)?.then_some(Tag::Other));
+            return Ok(tokens.skip_past(end)?.then_some(Tag::Markup));
         }
     }
-    let (is_array, is_appended) = (tokens.starts_with(b"<DataArray")?, tokens.starts_with(b"<AppendedData")?);
+    let mut tag = Tag::Element;
+    for (begin, kind) in
+        [(&b"<VTKFile"[..], Tag::Root), (b"<DataArray", Tag::Array), (b"<AppendedData", Tag::Appended), (b"<!", Tag::Markup)]
+    {
+        if tokens.starts_with(begin)? {
+            tag = kind;
+        }
+    }
     // A > in quotation marks does not end a tag.
     while let Some(stop) = tokens.skip_until(|bytes| memchr3(b'>', b'"', b'\'', bytes))? {
+        let is_empty = stop == b'>' && *tokens.since(tokens.at - 1)? == *b"/";
         tokens.at += 1;
         if stop == b'>' {
-            let is_empty = source.window(tokens.at - 2..tokens.at).is_ok_and(|end| *end == *b"/>");
-            return Ok(Some(match (is_array && !is_empty, is_appended) {
-                (true, _) => Tag::Array,
-                (_, true) => Tag::Appended,
-                _ => Tag::Other,
-            }));
+            return Ok(Some(if is_empty { Tag::Element } else { tag }));
         }
         if tokens.skip_until(|bytes| memchr(stop, bytes))?.is_none() {
             break;
@@ -111,8 +118,8 @@ mod tests {
 
     #[test]
     fn only_the_text_of_arrays_is_left_out() {
-        let xml = "<?xml it's?><!-- <DataArray> --><V a='>'><DataArray b=\"/>\">1 2\n</DataArray><DataArray/> x <DataArray>&lt;</DataArray>\
-                   <![CDATA[<DataArray>]]><DataArray><!-- 4 --> 5</DataArray><AppendedData c='d'>_<DataArray>6";
+        let xml = "<?xml it's?><!-- <DataArray> --><VTKFile a='>'><DataArray b=\"/>\">1 2\n</DataArray><DataArray/> x \
+                   <DataArray>&lt;</DataArray><![CDATA[<DataArray>]]><DataArray><!-- 4 --> 5</DataArray><AppendedData c='d'>_<DataArray>6";
         let source = Source::new("none".as_ref(), xml.as_bytes().to_vec());
         let outline = Outline::read(&source).unwrap();
         let text = &outline.text;
@@ -121,9 +128,27 @@ mod tests {
         assert_eq!(outline.cut_at(first), Some(first..first + 4));
         assert_eq!([first - 1, first, first + 9].map(|at| outline.in_file(at)), [first - 1, first + 4, first + 13]);
         assert_eq!(outline.in_file(text.len()), xml.find("_<").unwrap());
-        for broken in ["", "no XML", "<V", "<V a='", "<!-- ", "<DataArray>1 2", "<V\"<AppendedData>"] {
+        for broken in ["", "no XML", "<V", "<V a='", "<!-- ", "<VTKFile><DataArray>1 2", "<V\"<AppendedData>"] {
             let source = Source::new("none".as_ref(), broken.as_bytes().to_vec());
             assert_eq!(Outline::read(&source).unwrap().text, broken);
+        }
+    }
+
+    #[test]
+    fn only_empty_appended_data_have_xml_behind_them() {
+        for (xml, end) in [("<VTKFile><AppendedData a='/'>_ </VTKFile>", 29), ("<VTKFile><AppendedData/> </VTKFile>", 35)] {
+            let source = Source::new("none".as_ref(), xml.as_bytes().to_vec());
+            assert_eq!(Outline::read(&source).unwrap().text, xml[..end]);
+        }
+    }
+
+    /// The root tells whether to go on.
+    #[test]
+    fn nothing_is_read_behind_another_root() {
+        for root in ["<b/>", "<b c='>'>", "</b>", "<DataArray>", "<DataArray/>", "<AppendedData>"] {
+            let start = format!("<?xml?><!-- <a> --><!DOCTYPE x> {root}");
+            let source = Source::new("none".as_ref(), format!("{start} <VTKFile>").into_bytes());
+            assert_eq!(Outline::read(&source).unwrap().text, start);
         }
     }
 }

@@ -4,9 +4,10 @@
 #![allow(clippy::format_push_string, clippy::format_collect, clippy::unwrap_used)] // simple code matters more than speed here
 
 #[path = "../not_run/mod.rs"]
-mod not_run;
+pub mod not_run;
 
 use not_run::not_run;
+use olbvh::formats::{LoadOptions, Loaded, load_bytes};
 use std::path::{Path, PathBuf};
 
 pub const POINTS: [[f64; 3]; 8] =
@@ -50,6 +51,8 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("zero.ele", tetgen(0).1),
         ("zero.node", tetgen(0).0),
         ("isaac.tet", isaac()),
+        ("quoted.vtu", vtu_quoted()),
+        ("texts.vtk", vtk_texts()),
     ]
 }
 
@@ -59,6 +62,11 @@ pub fn replace(name: &str, old: &[u8], new: &[u8]) -> Vec<u8> {
     let at = bytes.windows(old.len()).position(|w| w == old).unwrap();
     bytes.splice(at..at + old.len(), new.iter().copied());
     bytes
+}
+
+/// Reads a file from memory.
+pub fn open_bytes(name: &str, bytes: Vec<u8>) -> Loaded {
+    load_bytes(name, bytes, &LoadOptions::default()).unwrap_or_else(|e| panic!("{name}: {e}"))
 }
 
 fn vtu_ascii() -> Vec<u8> {
@@ -75,6 +83,12 @@ fn vtu_ascii() -> Vec<u8> {
         array("UInt8", "types", 1, join([10; 6])),
     )
     .into_bytes()
+}
+
+/// With the data of its arrays in sections of CDATA, and without appended data.
+fn vtu_quoted() -> Vec<u8> {
+    let text = String::from_utf8(vtu_ascii()).unwrap().replace("</VTKFile>", "<AppendedData encoding=\"raw\"/></VTKFile>");
+    text.replace("ascii\">", "ascii\"><![CDATA[").replace("</DataArray>", "]]></DataArray>").into_bytes()
 }
 
 fn isaac() -> Vec<u8> {
@@ -150,6 +164,14 @@ fn vtk_ascii() -> Vec<u8> {
     let cells = rows(&TETS, "4 ");
     let types = "10\n".repeat(6);
     format!("# vtk DataFile Version 3.0\nsmall\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 8 double\n{}CELLS 6 30\n{cells}CELL_TYPES 6\n{types}CELL_DATA 6\nSCALARS c int 1\nLOOKUP_TABLE default\n{}\nPOINT_DATA 8\nFIELD FieldData 1\ns 1 8 float\n{}\n", rows(&POINTS, ""), join(0..6), join(0..8)).into_bytes()
+}
+
+/// With texts, and without an array.
+fn vtk_texts() -> Vec<u8> {
+    let text = String::from_utf8(vtk_ascii()).unwrap();
+    let fields = "FIELD FieldData 4\nNULL_ARRAY\nt 1 2 utf8_string\na b\n\nv 1 2 variant\n6 1 13 b\ns";
+    let text = text.replace("SCALARS c int 1", "PEDIGREE_IDS p string\na\nb\n\nc\nd\ne\nSCALARS c int\n");
+    text.replace("FIELD FieldData 1\ns", fields).into_bytes()
 }
 
 fn vtk_binary() -> Vec<u8> {

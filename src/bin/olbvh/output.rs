@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use olbvh::error::Error;
-use olbvh::formats::{OutputFile, OutputFormat, destination};
+use olbvh::formats::{OutputFile, OutputFormat, destination, is_part};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -47,13 +47,11 @@ pub fn clean_up_on_interrupt() {
     }
 }
 
-/// Removes the temporary files of `path`, `.NAME.*.part` in the same folder.
+/// Removes the temporary files of `path`, which are in the same folder.
 fn remove_parts(path: &Path) {
-    let name = format!(".{}.", path.file_name().unwrap_or_default().to_string_lossy());
     for entry in std::fs::read_dir(folder(path)).into_iter().flatten().flatten() {
-        let part = entry.path();
-        if part.extension().is_some_and(|e| e == "part") && entry.file_name().to_string_lossy().starts_with(&name) {
-            let _ = std::fs::remove_file(part);
+        if is_part(&entry.file_name(), path) {
+            let _ = std::fs::remove_file(entry.path());
         }
     }
 }

@@ -1,5 +1,6 @@
 //! Writers for result files. Every file is written under a temporary name in the same folder and renamed when it is
-//! complete, so that a reader never sees half a file, and a failure leaves an existing file unchanged.
+//! complete, so that a reader never sees half a file, and a failure leaves an existing file unchanged. The new file has
+//! the permissions of the one that it replaces.
 
 mod image;
 mod located;
@@ -7,8 +8,9 @@ mod slices;
 mod voxels;
 mod vtu;
 
+use std::ffi::OsStr;
 use std::fs::File;
-use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::io::{BufWriter, ErrorKind, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -82,6 +84,12 @@ impl OutputFormat {
 /// Maximum number of symbolic links that are followed one after the other, as on Linux.
 const MAX_LINKS: usize = 40;
 
+/// Maximum number of bytes of the name of a result in that of its temporary file, which must not exceed 255 bytes.
+const MAX_PREFIX: usize = 200;
+
+/// Ending of the names of temporary files.
+const PART: &str = ".part";
+
 /// A file that appears at its path when it is complete; if it is dropped before that, nothing remains of it. Symbolic
 /// links are followed ([`destination`]).
 pub struct OutputFile {
@@ -96,30 +104,38 @@ enum Target {
 }
 
 impl OutputFile {
-    /// Creates a file that will appear at `path`.
+    /// Creates a file that will appear at `path`, with the permissions of the file that is there now.
     ///
     /// # Errors
-    /// [`Error::Io`] if the folder is not writable.
+    /// [`Error::Io`] if the folder is not writable, or the file that is there is read-only.
     pub fn create(path: impl AsRef<Path>) -> Result<Self> {
         let path = path.as_ref();
         let fail = |source| Error::Io { path: path.into(), source: nameless(source) };
-        if let Ok(meta) = std::fs::metadata(path)
-            && !meta.is_file()
-        {
+        let existing = std::fs::metadata(path).ok();
+        if existing.as_ref().is_some_and(|existing| !existing.is_file()) {
             let file = File::options().write(true).open(path).map_err(fail)?;
             return Ok(Self { target: path.into(), file: Target::Direct(BufWriter::new(file)) });
         }
+        let permissions = existing.map(|existing| existing.permissions());
+        if permissions.as_ref().is_some_and(std::fs::Permissions::readonly) {
+            let why = "the file is read-only; allow writing to it, or choose another name";
+            return Err(fail(std::io::Error::new(ErrorKind::PermissionDenied, why)));
+        }
         let target = destination(path);
         let folder = target.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or_else(|| Path::new("."));
-        let prefix = format!(".{}.", target.file_name().unwrap_or_default().to_string_lossy());
+        let prefix = part_prefix(&target);
         let mut builder = tempfile::Builder::new();
-        builder.prefix(&prefix).suffix(".part");
+        builder.prefix(&prefix).suffix(PART);
         #[cfg(unix)]
         {
             use std::os::unix::fs::PermissionsExt as _;
-            builder.permissions(std::fs::Permissions::from_mode(0o666));
+            // The system takes away what its mask forbids to new files.
+            builder.permissions(permissions.clone().unwrap_or_else(|| std::fs::Permissions::from_mode(0o666)));
         }
         let file = builder.tempfile_in(folder).map_err(fail)?;
+        if let Some(permissions) = permissions {
+            file.as_file().set_permissions(permissions).map_err(fail)?;
+        }
         Ok(Self { target, file: Target::Temporary(BufWriter::with_capacity(1 << 18, file)) })
     }
 
@@ -154,6 +170,21 @@ pub fn destination(path: &Path) -> PathBuf {
         target = target.parent().unwrap_or_else(|| Path::new("")).join(next);
     }
     target
+}
+
+/// Start of the names of the temporary files of a result.
+fn part_prefix(target: &Path) -> String {
+    let name = target.file_name().unwrap_or_default().to_string_lossy();
+    let end = (0..=MAX_PREFIX.min(name.len())).rev().find(|&end| name.is_char_boundary(end));
+    format!(".{}.", &name[..end.unwrap_or(0)])
+}
+
+/// Whether a file name is that of a temporary file for the result `target`: such a file, in the same folder, remains
+/// where a process ends before it has dropped its [`OutputFile`].
+pub fn is_part(name: &OsStr, target: &Path) -> bool {
+    let name = name.to_string_lossy();
+    let random = name.strip_prefix(&part_prefix(target)).and_then(|rest| rest.strip_suffix(PART));
+    random.is_some_and(|random| !random.contains('.'))
 }
 
 /// Removes the name of the temporary file, which nobody asked for, from an error.
@@ -246,7 +277,7 @@ pub fn write_npy<T: NpyNumber>(path: impl AsRef<Path>, shape: &[usize], data: &[
 }
 
 /// Escapes text for an XML attribute; characters that XML cannot hold become U+FFFD.
-pub(crate) fn xml_attribute(text: &str) -> String {
+pub fn xml_attribute(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
         match c {

@@ -115,7 +115,8 @@ fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
 }
 
 /// Writes a mesh with its fields as `.vtu`. If cells were split or reordered, their ids become the array `cell_id`; if
-/// points were reordered, theirs become `point_id`.
+/// points were reordered, theirs become `point_id`. These are ids of the file that the mesh was read from, so a field of
+/// that name, which an earlier such file may have left, gives way to them.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be written.
@@ -132,7 +133,10 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     };
     let (mut point_data, mut cell_data) = (columns(On::Points), columns(On::Cells));
     for (name, ids, columns) in [("point_id", &mesh.point_ids, &mut point_data), ("cell_id", &mesh.cell_ids, &mut cell_data)] {
-        columns.extend(ids.as_ref().map(|ids| Column { name, components: 1, block: Block::U32(ids) }));
+        if let Some(ids) = ids {
+            columns.retain(|column| column.name != name);
+            columns.push(Column { name, components: 1, block: Block::U32(ids) });
+        }
     }
     let grid =
         Grid { points, connectivity: mesh.tets.as_flattened(), ends: &ends, types: &types, point_data: &point_data, cell_data: &cell_data };
