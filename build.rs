@@ -139,7 +139,7 @@ fn write(path: &Path, text: &str) -> Result<(), String> {
     fs::write(path, text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
-/// `build.30_splits` → `Splits`, `primitives.scan_tiles` → `ScanTiles`.
+/// `build.30_count_splits` → `CountSplits`, `primitives.scan_tiles` → `ScanTiles`.
 fn type_name(stem: &str) -> String {
     let words = stem.rsplit('.').next().unwrap_or(stem).split('_');
     let words = words.filter(|w| !w.chars().all(|c| c.is_ascii_digit()));

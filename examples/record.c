@@ -113,8 +113,8 @@ int main(int argc, char **argv) {
     check(olbvh_plan_measure(gpu, &plan, &sizes), "measuring");
     olbvh_buffer positions = upload(mesh_data.place, 12ull * mesh_data.points, sizes.usage);
     olbvh_buffer cells = upload(mesh_data.cells, 16ull * mesh_data.tets, sizes.usage);
-    void *unused, *picture_bytes, *slice_bytes;
-    olbvh_buffer memory = make_buffer(sizes.memory, sizes.usage, &unused), scratch = make_buffer(sizes.scratch, sizes.usage, &unused);
+    void *unused, *tree_bytes, *picture_bytes, *slice_bytes;
+    olbvh_buffer memory = make_buffer(sizes.memory, sizes.usage, &tree_bytes), scratch = make_buffer(sizes.scratch, sizes.usage, &unused);
     olbvh_scene *scene = NULL;
     check(olbvh_scene_place(gpu, &plan, positions, cells, memory, scratch, &scene), "placing");
 
@@ -173,6 +173,14 @@ int main(int argc, char **argv) {
     VkSubmitInfo submission = {.sType = VK_STRUCTURE_TYPE_SUBMIT_INFO, .commandBufferCount = 1, .pCommandBuffers = &commands};
     vk(vkQueueSubmit(queue, 1, &submission, VK_NULL_HANDLE), "vkQueueSubmit");
     vk(vkQueueWaitIdle(queue), "vkQueueWaitIdle");
+
+    /* What became of the mesh and its tree; a renderer would copy both to memory that it can read. */
+    olbvh_scene_arrays_data arrays;
+    check(olbvh_scene_arrays(scene, NULL, &arrays), "asking for arrays");
+    const olbvh_build_status *built = (const olbvh_build_status *)((const char *)tree_bytes + arrays.status.offset);
+    const olbvh_mesh_status *seen = (const olbvh_mesh_status *)((const char *)tree_bytes + arrays.mesh_status.offset);
+    printf("tree: level %u, %u entries; %u bad tetrahedra\n", built->level, built->entries, seen->bad);
+    if (built->overflow || built->level != built->wanted_level || seen->overflow || seen->bad || !seen->boundary) return 1;
 
     /* The same results from the owning calls. */
     olbvh_mesh *mesh = NULL;

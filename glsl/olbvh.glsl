@@ -119,12 +119,16 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
         arrive(first.owner, x, unused);
         range = uvec2(0u, star_size);
     }
+    Sought sought = sought_at(g, place, x, 0.0);
     uint n = 0u;
-    for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? star[i] : listed_tet(i);
-        if (!weights(load_tet(words(cells.at[t])), x).inside) continue;
-        if (n < OLBVH_OWNERS) owners[n] = t;
-        ++n;
+    for (uint begin = range.x; begin < range.y; begin += 32u) {
+        uint count = min(32u, range.y - begin);
+        for (uint near = by_walk ? NONE >> (32u - count) : near_among(begin, range.y, sought); near != 0u; near &= near - 1u) {
+            uint i = begin + findLSB(near), t = by_walk ? star[i] : listed_tet(i);
+            if (!weights(load_tet(words(cells.at[t])), x).inside) continue;
+            if (n < OLBVH_OWNERS) owners[n] = t;
+            ++n;
+        }
     }
     return n;
 }
@@ -135,7 +139,7 @@ float no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
 float olbvh_value(uint owner, vec4 weights_of_owner) {
     if (scene.at[0].has_field == 0u) return no_value();
     uvec4 v = words(cells.at[owner]);
-    return dot(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
+    return weighed(weights_of_owner, vec4(field.at[v.x], field.at[v.y], field.at[v.z], field.at[v.w]));
 }
 
 // The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.

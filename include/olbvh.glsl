@@ -64,8 +64,8 @@ struct olbvh_MeshStatus {
     uint boundary;  // Boundary tetrahedra.
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
-    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
+    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
@@ -121,9 +121,8 @@ struct olbvh_RenderPlan {
 struct olbvh_RayState {
     uint next;      // Number of the next sample.
     uint end;       // One past the last sample.
-    uint hint;      // Tetrahedron of the last sample found, or `NONE`.
-    uint cursor;    // Entries of the leaf's list already searched for the next sample.
-    uint best;      // Best candidate owner among them, or `NONE`.
+    uint cursor;    // Not 0: how much of the leaf's list has been searched for the next sample; the search goes on.
+    uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
     uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
     float last_at;  // Distance of that place from the ray's origin in steps.
@@ -156,9 +155,9 @@ struct olbvh_SlicePlan {
     uint pad1;   // Unused.
     uint pad2;   // Unused.
     vec4 origin; // Centre of voxel (0, 0) of layer 0.
-    vec4 across; // From one voxel of a row to the next.
-    vec4 down;   // From one row to the next.
-    vec4 up;     // From one layer to the next.
+    vec4 next_voxel; // From one voxel of a row to the next.
+    vec4 next_row;   // From one row to the next.
+    vec4 next_layer; // From one layer to the next.
     vec4 half0;  // Half axis of a voxel's box along the row, in normalised coordinates.
     vec4 half1;  // Half axis of the box from row to row.
     vec4 half2;  // Half axis of the box from layer to layer.
@@ -168,14 +167,14 @@ struct olbvh_SlicePlan {
     uint layer;  // Layer of the first row of the band, the rows that are sliced now.
     uint first;  // Number of that row in its layer.
     uint rows;   // Rows of the band.
-    uint refused; // 1: boxes are flat; 2: boxes are more than twice as large as the mesh; else 0.
+    uint refused; // 1: boxes are flat; 2: boxes are longer along an axis than 4 / scale of the grid; else 0.
     uint first_cell; // First cell of the finest grid that is searched, 10 bits per axis, x lowest.
     uint last_cell;  // Last such cell. The box of the two cells contains a block of the mesh, or all of it.
 };
 
 // State of the search for the tetrahedron closest to a voxel between two dispatches.
 struct olbvh_TouchState {
-    uint code;    // Morton code of the leaf to resume at; `NONE`: done.
+    uint code;    // Morton code of the leaf to resume at; in a binary tree, the place of a tetrahedron.
     uint entry;   // Entries of that leaf already tested.
     uint owner;   // Closest tetrahedron so far, or `NONE`.
     float square; // Squared distance of that tetrahedron.
@@ -198,7 +197,7 @@ struct olbvh_RunState {
 struct olbvh_SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
     uint touching; // Voxels whose boxes need another round. Boxes are tested once all centres are located.
-    uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2), and all voxels are empty.
+    uint refused;  // Not 0: boxes are flat (1) or too large, as in `SlicePlan` (2), and all voxels are empty.
     uint inside;   // Voxels with their centre in the mesh. Counted once all centres are located.
     uint touched;  // Voxels that the mesh only touches. Counted once all boxes are tested.
     uint empty;    // Voxels that it does not touch and, until all boxes are tested, those that it may touch.
@@ -811,6 +810,9 @@ struct olbvh_Exchange {
     bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
+// Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
+uint olbvh_walked_tets = 0u;
+
 olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
 
 vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
@@ -925,6 +927,7 @@ bool olbvh_stride_to(inout uint t, vec3 x, uint most) {
     olbvh_Stand s = olbvh_stand_in(t);
     uint owner = olbvh_NONE;
     for (uint k = 0u; k < most; ++k) {
+        ++olbvh_walked_tets;
         olbvh_Sides at = olbvh_sides_of(s, x);
         owner = olbvh_owner_of(s, at, x);
         if (owner != olbvh_NONE || at.near || !olbvh_step_on(s, at)) break;
@@ -956,6 +959,7 @@ void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
+        ++olbvh_walked_tets;
         if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
     }
 }
@@ -966,6 +970,7 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
     olbvh_star_size = 1u;
     for (uint i = 0u; i < olbvh_star_size; ++i) {
         uint t = olbvh_star[i];
+        ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
         olbvh_consider(best, t, tet, w);
@@ -981,6 +986,7 @@ bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best
 bool olbvh_walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout olbvh_Best best) {
     if (arrived) s = max(s, olbvh_STEPS - olbvh_ROUND);
     for (; s < olbvh_STEPS; ++s) {
+        ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
         if (w.clear) best = olbvh_Best(t, true, true, 0.0);
@@ -997,6 +1003,7 @@ bool olbvh_walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout 
 uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
     uint from = olbvh_NONE;
     for (uint s = 0u; s < olbvh_LEG; ++s) {
+        ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
         uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
@@ -1132,12 +1139,16 @@ uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
         olbvh_arrive(first.owner, x, unused);
         range = uvec2(0u, olbvh_star_size);
     }
+    olbvh_Sought sought = olbvh_sought_at(g, place, x, 0.0);
     uint n = 0u;
-    for (uint i = range.x; i < range.y; ++i) {
-        uint t = by_walk ? olbvh_star[i] : olbvh_listed_tet(i);
-        if (!olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[t])), x).inside) continue;
-        if (n < OLBVH_OWNERS) owners[n] = t;
-        ++n;
+    for (uint begin = range.x; begin < range.y; begin += 32u) {
+        uint count = min(32u, range.y - begin);
+        for (uint olbvh_near = by_walk ? olbvh_NONE >> (32u - count) : olbvh_near_among(begin, range.y, sought); olbvh_near != 0u; olbvh_near &= olbvh_near - 1u) {
+            uint i = begin + findLSB(olbvh_near), t = by_walk ? olbvh_star[i] : olbvh_listed_tet(i);
+            if (!olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[t])), x).inside) continue;
+            if (n < OLBVH_OWNERS) owners[n] = t;
+            ++n;
+        }
     }
     return n;
 }
@@ -1148,7 +1159,7 @@ float olbvh_no_value() { return uintBitsToFloat(0x7fc00000u); } // NaN
 float olbvh_value(uint owner, vec4 weights_of_owner) {
     if (olbvh_scene.at[0].has_field == 0u) return olbvh_no_value();
     uvec4 v = olbvh_words(olbvh_cells.at[owner]);
-    return dot(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
+    return olbvh_weighed(weights_of_owner, vec4(olbvh_field.at[v.x], olbvh_field.at[v.y], olbvh_field.at[v.z], olbvh_field.at[v.w]));
 }
 
 // The gradient of the field in a tetrahedron, per unit of length of the mesh; 0 in a flat one, NaN without a field.

@@ -11,6 +11,8 @@
  *   reports how many bytes of memory the query takes and where in that memory its results will be. Parts of buffers
  *   start at multiples of olbvh_plan_sizes.alignment, and every buffer needs the usage flags given there. The buffers
  *   belong to the host, which keeps them until the commands that use them have been executed.
+ * - Errors: a command that returns an error may have recorded a part of its work. The host then does not submit the
+ *   command buffer but resets it, and starts the recording again.
  * - Barriers: unless stated otherwise, a command reads its input in compute shaders, uses its memory in compute shaders
  *   and transfers, writes its results in compute shaders, and records no barrier before or after itself. Before
  *   anything reads the results or uses the memory again, the host records olbvh_cmd_barrier, or a barrier of its own
@@ -30,7 +32,7 @@
 /*
  Version of this interface. A header and a library with different versions are incompatible.
  */
-#define OLBVH_ABI 1
+#define OLBVH_ABI 2
 
 /*
  Result of a call.
@@ -124,8 +126,9 @@ typedef struct olbvh_build_options {
    */
   uint32_t fineness;
   /*
-   Maximum number of entries of the tree, which is made coarser until it fits. 0: the usual capacity, 64 entries
-   per tetrahedron and at least 2^20.
+   Maximum number of entries of the tree, which is made coarser until it fits; `olbvh_tree_build` counts those of
+   `assign` 0 with full lists, which are more. 0: the usual capacity, 64 entries per tetrahedron and at least 2^20,
+   or that of `olbvh_plan`.
    */
   uint32_t capacity;
   /*
@@ -418,7 +421,7 @@ typedef struct olbvh_plan {
    */
   uint32_t tets;
   /*
-   Deepest level that the leaves may have, at most 10.
+   Deepest level that the leaves may have, from 1 to 10. 0: the level of `build`, or 7 if that has none.
    */
   uint32_t level;
   /*
@@ -429,7 +432,7 @@ typedef struct olbvh_plan {
   /*
    How to build the tree. If both a capacity and a budget are given, the smaller one holds. If neither is given,
    there is room for 8 entries per tetrahedron, or 24 if all leaves have full lists. A tree that would need more is
-   made coarser.
+   made coarser. A capacity is at least the number of tetrahedra.
    */
   struct olbvh_build_options build;
 } olbvh_plan;
@@ -484,8 +487,8 @@ typedef struct olbvh_buffer {
  */
 typedef struct olbvh_scene_arrays_data {
   /*
-   Content of the buffer whose address is passed to `olbvh_open`. With descriptors, this buffer is the first
-   binding.
+   Content of the buffer whose address is passed to `olbvh_open`, a multiple of 8. With descriptors, this buffer is
+   the first binding.
    */
   uint32_t addresses[22];
   /*
@@ -493,11 +496,17 @@ typedef struct olbvh_scene_arrays_data {
    */
   struct olbvh_buffer bindings[10];
   /*
-   What was built, in words: level of the leaves, level before the limits (by alpha or as requested; larger than
-   the level of the leaves where a capacity lowered it), candidates, entries, nodes, internal
-   nodes, leaves, …
+   An `olbvh_build_status`: what was built.
    */
   struct olbvh_buffer status;
+  /*
+   An `olbvh_mesh_status`: what is known of the mesh, such as the number of bad tetrahedra.
+   */
+  struct olbvh_buffer mesh_status;
+  /*
+   One bit per tetrahedron, lowest bit of a word first: set if it is bad, and so left out of the tree.
+   */
+  struct olbvh_buffer bad;
 } olbvh_scene_arrays_data;
 
 /*
@@ -528,7 +537,8 @@ typedef struct olbvh_location {
   uint32_t path;
   /*
    For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
-   owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh.
+   owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh. The hints may be where
+   the owners are: each is read before it is replaced.
    */
   struct olbvh_buffer hints;
   /*
@@ -804,6 +814,107 @@ typedef struct olbvh_pair_parts_data {
   struct olbvh_buffer status;
 } olbvh_pair_parts_data;
 
+/*
+ The result of `olbvh_cmd_build`, which the device writes to `olbvh_scene_arrays_data.status`.
+ */
+typedef struct olbvh_build_status {
+  /*
+   Level of the leaves.
+   */
+  uint32_t level;
+  /*
+   Level before the limits, by alpha or as requested; `level` is smaller where a limit lowered it.
+   */
+  uint32_t wanted_level;
+  /*
+   Number of octree cells in the bounding boxes of all tetrahedra, of which the entries are chosen.
+   */
+  uint32_t candidates;
+  /*
+   Number of entries, that is of (tetrahedron, leaf) pairs.
+   */
+  uint32_t entries;
+  /*
+   Number of nodes.
+   */
+  uint32_t nodes;
+  /*
+   Number of internal nodes.
+   */
+  uint32_t internal;
+  /*
+   Number of leaves.
+   */
+  uint32_t leaves;
+  /*
+   Number of leaves that the surface of the mesh may pass through.
+   */
+  uint32_t boundary_leaves;
+  /*
+   Number of entries of the longest leaf, for `olbvh_plan.longest_leaf`.
+   */
+  uint32_t longest_leaf;
+  /*
+   Unused.
+   */
+  uint32_t pad;
+  /*
+   Sum of the estimates from which the level by alpha follows, lower word first.
+   */
+  uint32_t sum[2];
+  /*
+   Number of candidates on every level from 0 to 10, two words each, lower word first.
+   */
+  uint32_t total[22];
+  /*
+   Element k is the number of nodes on levels 0 to k.
+   */
+  uint32_t levels[11];
+  /*
+   Not 0: the tree is empty, since its capacity is too small even for a single node; that of a plan never is.
+   */
+  uint32_t overflow;
+} olbvh_build_status;
+
+/*
+ What is known of a mesh, which the device writes to `olbvh_scene_arrays_data.mesh_status`.
+ */
+typedef struct olbvh_mesh_status {
+  /*
+   Lower corner of the bounds, in a form of the kernels.
+   */
+  uint32_t lo[3];
+  /*
+   Upper corner of the bounds, in a form of the kernels.
+   */
+  uint32_t hi[3];
+  /*
+   Number of bad tetrahedra, which the tree leaves out: a vertex does not exist, occurs twice, or has a coordinate
+   that is not finite or beyond 2^125.
+   */
+  uint32_t bad;
+  /*
+   Number of boundary tetrahedra: those on the surface, without volume, beside a fold, or at a crowded vertex.
+   */
+  uint32_t boundary;
+  /*
+   Number of tetrahedra without volume.
+   */
+  uint32_t zero_volume;
+  /*
+   Number of tetrahedra of negative volume, in the order of their vertices; they are as good as others.
+   */
+  uint32_t negative;
+  /*
+   Number of crowded vertices, at which more than 128 tetrahedra may meet.
+   */
+  uint32_t crowded;
+  /*
+   Not 0: the table of faces is full, as it can be beyond 429 million tetrahedra only. The tree must not be used.
+   */
+  uint32_t overflow;
+} olbvh_mesh_status;
+
 #ifdef __cplusplus
 extern "C" {
 #endif // __cplusplus
@@ -915,7 +1026,8 @@ struct olbvh_picture_settings olbvh_default_picture_settings(void);
 /*
  Draws a field as a picture. `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets
  four floats per pixel, upper row first: colour (sRGB, 0 to 1) multiplied by its opacity, and opacity. The caller
- adds the background.
+ adds the background. The mesh is read back to host memory, once, when settings first need it there: with shading, or
+ if `opacity`, `range`, or `eye` of `camera` is not given.
  */
 enum olbvh_status olbvh_render(const struct olbvh_tree *tree,
                                const struct olbvh_picture_settings *settings,
@@ -1040,6 +1152,14 @@ enum olbvh_status olbvh_cmd_build(struct olbvh_recording *recording,
                                   const struct olbvh_scene *scene);
 
 /*
+ As `olbvh_cmd_build`, for positions that have changed since a tree of the scene was built: neighbours, whose search
+ takes much of that time, stay as they were found then. The cells must be the same. A tetrahedron that was or becomes
+ bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`; no point is lost.
+ */
+enum olbvh_status olbvh_cmd_rebuild(struct olbvh_recording *recording,
+                                    const struct olbvh_scene *scene);
+
+/*
  Reports how much scratch memory the location needs besides the results.
  */
 enum olbvh_status olbvh_location_parts(const struct olbvh_scene *scene,
@@ -1065,7 +1185,8 @@ enum olbvh_status olbvh_owner_parts(const struct olbvh_scene *scene,
 /*
  Records the search for all owners of points, that is for all tetrahedra that contain each of them: a word each in
  `found`, point by point, ascending for each point. Only as many as fit `found` are written; `ends` and `total` of
- `olbvh_owner_parts` are correct in any case. Of `location`, only points, stride, count and tolerance are used.
+ `olbvh_owner_parts` are correct in any case, modulo 2^32. Of `location`, only points, stride, count and tolerance
+ are used.
  */
 enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
                                    const struct olbvh_scene *scene,

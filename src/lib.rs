@@ -47,6 +47,7 @@
 //!
 //! /// Records into your command buffer; `r` comes from `Recorder::new(&gpu, commands, None)`, which is unsafe.
 //! fn record(r: &mut Recorder, frame: &Frame, asked: &PointInput, found: &LocateOutput) -> Result<()> {
+//!     r.barrier("frame before → mesh"); // `r` does not see what earlier recordings do with the same memory
 //!     cmd_prepare_mesh(r, &frame.input, &frame.arrays, &frame.scratch)?; // positions must be visible to compute shaders
 //!     r.barrier("mesh → tree");
 //!     let mesh = MeshView { input: frame.input, arrays: frame.arrays };

@@ -48,7 +48,9 @@ fn check_stages(report: &Value, structure: &Value) {
 fn time_per_item_is_told_over_sizes() {
     let folder = tempfile::tempdir().unwrap();
     let sizes = ["--suite", "scaling", "--points", "300", "--repeat", "3", "--seconds", "0.02", "--quiet"];
-    let out = bench(folder.path(), &[&["kuhn:2,2,2", "kuhn:7,6,5", "-o", "out", "--json"], &sizes[..]].concat());
+    // A folder that exists may have a name with a dot in it.
+    std::fs::create_dir(folder.path().join("results.v1")).unwrap();
+    let out = bench(folder.path(), &[&["kuhn:2,2,2", "kuhn:7,6,5", "-o", "results.v1", "--json"], &sizes[..]].concat());
     assert_eq!(out.status.code(), Some(0), "{}", String::from_utf8_lossy(&out.stderr));
     let report: Value = serde_json::from_slice(&out.stdout).unwrap();
     let scaling = report["scaling"].as_array().unwrap();
@@ -62,9 +64,9 @@ fn time_per_item_is_told_over_sizes() {
         // The larger mesh is nearer to 200,000 tetrahedra.
         assert!(scale["mesh"] != "kuhn:7,6,5" || scale["ratio"] == 1.0, "{scale}");
     }
-    assert!(std::fs::read_to_string(folder.path().join("out/bench.md")).unwrap().contains("## Scaling: Construction"));
+    assert!(std::fs::read_to_string(folder.path().join("results.v1/bench.md")).unwrap().contains("## Scaling: Construction"));
     for plot in ["fig06_construction", "location_random", "location_coherent"] {
-        let svg = std::fs::read_to_string(folder.path().join(format!("out/scaling_{plot}.svg"))).unwrap();
+        let svg = std::fs::read_to_string(folder.path().join(format!("results.v1/scaling_{plot}.svg"))).unwrap();
         assert!(svg.matches("<circle").count() == 6 && svg.matches("<polyline").count() == 3 && !svg.contains("NaN"), "{svg}");
     }
 }
@@ -205,5 +207,14 @@ fn wrong_arguments_are_refused() {
     let message = String::from_utf8(bench(folder.path(), &["--seconds", "-3"]).stderr).unwrap();
     assert!(message.contains("--seconds -3: a time"), "{message}");
     assert_eq!(bench(folder.path(), &["nothing.vtu"]).status.code(), Some(3));
+    for wrong in [&["kuhn:2,2,2", "--seconds", "-1"][..], &["kuhn:2,2,2", "--device", "no such device"], &["nothing.vtu"]] {
+        assert_ne!(bench(folder.path(), &[wrong, &["-o", "a/b/c"]].concat()).status.code(), Some(0), "{wrong:?}");
+    }
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0, "a refused run leaves nothing");
+    for (output, part) in [("file", ".json"), ("mesh.md", "would replace")] {
+        std::fs::write(folder.path().join(output), "").unwrap();
+        let out = bench(folder.path(), &["mesh.md", "-o", output]);
+        let message = String::from_utf8_lossy(&out.stderr);
+        assert!(out.status.code() == Some(2) && message.contains(part), "{output}: {message}");
+    }
 }

@@ -72,40 +72,6 @@ fn points_that_coincide_are_merged_on_demand() {
 }
 
 #[test]
-fn render_takes_every_setting() {
-    let folder = TempDir::new().unwrap();
-    std::fs::write(folder.path().join("t.json"), r#"{"map": "magma", "opacity": [[0, 0], [1, 1]]}"#).unwrap();
-    let settings = [
-        "--camera -x,ortho,zoom=2",
-        "--camera azimuth=-40,elevation=10 --tf t.json",
-        "--tf inferno_r --background black --no-shading",
-        "--iso 0.3,-1,0.6 --opacity 0.5",
-        "--opacity 0:0,0.5:0.2,1:1 --range -0.5:1.5 --light -1,0,1 --outline 0",
-        "--background #ffffff,#aabbcc --opacity 0.2 --opacity-scale 2 --termination 1 --step 0.2",
-        "--background transparent --alpha 2 --assign exact --field jet --quiet",
-    ];
-    for line in settings {
-        let arguments: Vec<&str> = RENDER.iter().copied().chain(line.split(' ')).collect();
-        let out = olbvh(folder.path(), &arguments);
-        assert_eq!(out.status.code(), Some(0), "{line}: {}", text(&out.stderr));
-        assert_eq!(out.stdout.is_empty(), line.ends_with("--quiet"), "{line}");
-    }
-}
-
-#[test]
-fn what_nobody_sees_is_skipped() {
-    let folder = TempDir::new().unwrap();
-    let picture = ["render", "kuhn:24,20,16", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
-    let run = |opacity: &str| json(folder.path(), &[&picture[..], &["--opacity", opacity]].concat());
-    let (opaque, narrow) = (run("0.2"), run("0:0,0.6:0,0.65:0.9,0.7:0"));
-    let of = |result: &Value, key: &str| result[key].as_u64().unwrap();
-    assert_eq!(of(&opaque, "skipped_samples"), 0);
-    assert!(of(&narrow, "skipped_samples") > 0 && of(&narrow, "samples") < of(&opaque, "samples"), "{narrow:#}");
-    let surface = json(folder.path(), &[&picture[..], &["--iso", "0.65"]].concat());
-    assert!(of(&surface, "skipped_samples") > of(&surface, "samples") && surface["iso"].as_array().unwrap().len() == 1, "{surface:#}");
-}
-
-#[test]
 fn info_tells_mesh_and_tree() {
     let folder = TempDir::new().unwrap();
     let result = json(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
@@ -232,6 +198,10 @@ fn wrong_usage_ends_with_2() {
         (&["--tf", "jet"], "viridis"),
         (&["--opacity", "2"], "outside 0 to 1"),
         (&["--step", "0"], "step"),
+        (&["--step", "1e39"], "a step of 1e39 is longer than"),
+        (&["--camera", "ortho=1e39"], "a picture 1e39 high"),
+        (&["--camera", "eye=1e39,0,0,ortho"], "an eye at a distance of 1.0e39"),
+        (&["--camera", "up=0,0,0"], "`up=0,0,0` needs a direction"),
         (&["--iso", "0.2,x"], "separated by commas"),
         (&["--iso", "1,2,3,4,5,6,7,8,9"], "up to 8"),
         (&["--background", "pink"], "pink"),

@@ -106,7 +106,7 @@ fn remarks() {
         ),
         (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8", "--layers", "2"], "2 of the 4 layers"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "7,9"], "no surface to be seen"),
-        (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.5,9"], ""),
+        (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.2,9"], ""),
         (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8"], ""),
         (&["devices"], "these are all devices"),
     ] {
@@ -128,10 +128,13 @@ fn inputs_are_not_replaced() {
         &["overlap", "kuhn:1,1,1", "m.vtu", "-o", "./m.vtu"],
         &["locate", "m.vtu", "p.csv", "-o", "m.vtu"],
         &["locate", "m.vtu", "p.csv", "-o", "p.csv"],
+        &["conformance", "m.vtu", "--junit", "m.vtu"],
     ] {
         let (code, _, text) = olbvh(folder, wrong);
         assert!(code == 2 && text.contains("would replace"), "{wrong:?}: {code} {text}");
     }
+    let (code, _, text) = olbvh(folder, &["conformance", "m.vtu", "--junit", "p.csv"]);
+    assert!(code == 2 && text.contains("p.csv: a JUnit report is an .xml file"), "{code} {text}");
     assert_eq!(["m.vtu", "p.csv"].map(|name| std::fs::read(folder.join(name)).unwrap()), inputs);
 }
 
@@ -159,9 +162,118 @@ fn overlaps_become_files() {
     assert_eq!((code, away["a"].as_u64(), away["narrow_tests"].as_u64()), (0, Some(0), Some(0)));
     let (code, _, text) = olbvh(folder, &["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.vtu", "--pairs"]);
     assert!(code == 2 && text.contains("--pairs needs a .json file"), "{code} {text}");
-    for wrong in [&["--rotate-b", "z"][..], &["--rotate-b", "0,0,0,5"], &["--move-b", "1,2"], &["--move-b", "1,2,inf"]] {
-        let arguments = [&["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.json"], wrong].concat();
-        assert_eq!(olbvh(folder, &arguments).0, 2, "{wrong:?}");
+    for (wrong, part) in [
+        (["--rotate-b", "z"], "--rotate-b"),
+        (["--rotate-b", "0,0,0,5"], "--rotate-b"),
+        (["--move-b", "1,2"], "--move-b"),
+        (["--move-b", "1,2,inf"], "--move-b"),
+        (["--move-b", "1e39,0,0"], "--move-b: coordinates of B"),
+        (["--move-b", "0,5e37,0"], "2^125"),
+    ] {
+        let (code, _, text) = olbvh(folder, &[&["overlap", "kuhn:2,2,2", "kuhn:2,2,2", "-o", "x.json"], &wrong[..]].concat());
+        assert!(code == 2 && text.contains(part), "{wrong:?}: {code} {text}");
     }
     assert_eq!(files(folder), ["a.json", "b.json", "c.json", "d.vtu"]);
+}
+
+/// The unit cube as text: a mesh with these cells, each with its type, and a field with the value 0.1 everywhere. Its
+/// last point lies far away.
+fn cube(cells: &[(&str, u32)]) -> String {
+    let points = "0 0 0 1 0 0 1 1 0 0 1 0 0 0 1 1 0 1 1 1 1 0 1 1 9.1 9 9";
+    let n = cells.iter().map(|(ids, _)| ids.split(' ').count()).sum::<usize>();
+    let [ids, types] = [0, 1].map(|part| {
+        let of = |&(ids, kind): &(&str, u32)| if part == 0 { format!("{} {ids}", ids.split(' ').count()) } else { kind.to_string() };
+        cells.iter().map(of).collect::<Vec<_>>().join("\n")
+    });
+    let values = "0.1 ".repeat(9);
+    format!(
+        "# vtk DataFile Version 3.0\ncube\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 9 float\n{points}\nCELLS {} {}\n{ids}\n\
+         CELL_TYPES {}\n{types}\nPOINT_DATA 9\nSCALARS t float 1\nLOOKUP_TABLE default\n{values}\n",
+        cells.len(),
+        n + cells.len(),
+        cells.len(),
+    )
+}
+
+/// A point that no cell has does not move the centre about which B is rotated.
+#[test]
+fn rotations_are_about_the_centre_of_the_cells() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("b.vtk"), cube(&[("0 1 2 3 4 5 6 7", 12)])).unwrap();
+    let posed = |more: &[&str]| {
+        let (code, json, text) = olbvh(folder, &[&["overlap", "kuhn:1,1,1", "b.vtk", "-o", "a.json"], more].concat());
+        assert_eq!(code, 0, "{text}");
+        [&json["a"], &json["b"]].map(|n| n.as_u64().unwrap())
+    };
+    assert_eq!(posed(&["--rotate-b", "z,90"]), [6, 1]);
+    assert_eq!(posed(&["--rotate-b", "z,90", "--move-b", "0,0,1.5"]), [0, 0]);
+}
+
+/// Bad cells are left out, but never silently.
+#[test]
+fn bad_cells_are_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("good.vtk"), cube(&[("0 1 3 4", 10)])).unwrap();
+    std::fs::write(folder.join("one.vtk"), cube(&[("0 1 3 4", 10), ("0 1 1 4", 10)])).unwrap();
+    std::fs::write(folder.join("two.vtk"), cube(&[("2 2 2 2", 10), ("0 1 3 4", 10), ("0 1 1 4", 10)])).unwrap();
+    std::fs::write(folder.join("p.csv"), "0.1,0.1,0.1\n").unwrap();
+    let (one, two) = ("one.vtk: 1 bad cell is left out (`olbvh info --bad-cells` lists it)", "two.vtk: 2 bad cells are left out");
+    for (arguments, bad, remarks) in [
+        (&["locate", "good.vtk", "p.csv", "-o", "o.csv"][..], 0, &[][..]),
+        (&["locate", "one.vtk", "p.csv", "-o", "o.csv"], 1, &[one]),
+        (&["locate", "two.vtk", "p.csv", "-o", "o.csv", "--all"], 2, &[two]),
+        (&["slice", "two.vtk", "-o", "s.npy", "--size", "4"], 2, &[two]),
+        (&["overlap", "one.vtk", "two.vtk", "-o", "o.json"], 3, &[one, two]),
+        (&["overlap", "one.vtk", "good.vtk", "-o", "o.json", "--pairs"], 1, &[one]),
+    ] {
+        let (code, json, text) = olbvh(folder, arguments);
+        assert_eq!((code, json["bad_cells"].as_u64()), (0, Some(bad)), "{arguments:?}: {text}");
+        assert!(text.lines().count() == remarks.len() && remarks.iter().all(|remark| text.contains(remark)), "{arguments:?}: {text}");
+        let (_, json, text) = olbvh(folder, &[arguments, &["--quiet"]].concat());
+        assert!(text.is_empty() && json["bad_cells"] == bad, "{arguments:?}: {text}");
+    }
+}
+
+/// Numbers of single precision have the digits that people gave them.
+#[test]
+fn json_numbers_are_short() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    std::fs::write(folder.join("m.vtk"), cube(&[("0 1 3 8", 10)])).unwrap();
+    std::fs::write(folder.join("p.csv"), "0.1,0.1,0.1\n").unwrap();
+    let (_, json, text) = olbvh(folder, &["locate", "m.vtk", "p.csv", "-o", "o.csv"]);
+    assert_eq!(json["tolerance"], 1e-5, "{text}");
+    let (_, json, text) = olbvh(folder, &["info", "m.vtk", "--alpha", "0.4"]);
+    let shown = [&json["fields"][0]["min"], &json["fields"][0]["max"], &json["bounds"]["max"][0], &json["tree"]["alpha"]];
+    assert_eq!(shown.map(|n| n.as_f64().unwrap()), [0.1, 0.1, 9.1, 0.4], "{text}");
+}
+
+/// Names of fields are any text; on a terminal they neither begin lines nor control it.
+#[test]
+fn names_are_shown_on_one_line() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let of_points = cube(&[("0 1 3 4", 10)]).replace("SCALARS t", "SCALARS a%0aforged%1b[2J");
+    std::fs::write(folder.join("points.vtk"), &of_points).unwrap();
+    std::fs::write(
+        folder.join("cells.vtk"),
+        cube(&[("0 1 3 4", 10); 9]).replace("POINT_DATA 9\nSCALARS t", "CELL_DATA 9\nSCALARS a%0aforged%1b[2J"),
+    )
+    .unwrap();
+    for arguments in [
+        &["info", "points.vtk"][..],
+        &["slice", "points.vtk", "-o", "a.npy", "--field", "t"],
+        &["locate", "cells.vtk", "p.csv", "-o", "a.csv", "--field", "t"],
+        &["slice", "cells.vtk", "-o", "a.svx", "--size", "4"],
+    ] {
+        let output =
+            Command::new(env!("CARGO_BIN_EXE_olbvh")).current_dir(folder).args(arguments).args(["--device", "cpu"]).output().unwrap();
+        let [told, remarks] = [output.stdout, output.stderr].map(|text| String::from_utf8(text).unwrap());
+        let text = told + &remarks;
+        assert!(text.contains(r"a\nforged\u{1b}[2J") && !text.contains('\u{1b}'), "{arguments:?}: {text}");
+    }
+    let (_, json, text) = olbvh(folder, &["info", "points.vtk"]);
+    assert_eq!(json["fields"][0]["name"], "a\nforged\u{1b}[2J", "{text}");
 }

@@ -138,13 +138,21 @@ fn profiles_are_found_and_passed_over() {
     let unknown = home.olbvh(&["info", "kuhn:2,2,2"], &[("OLBVH_TARGET", "bogus")]);
     let message = String::from_utf8_lossy(&unknown.stderr);
     assert!(unknown.status.code() == Some(2) && message.contains("OLBVH_TARGET: unknown target `bogus`"), "{message}");
+    let unknown = home.olbvh(&["devices", "-v"], &[("OLBVH_TARGET", "bogus")]);
+    let message = String::from_utf8_lossy(&unknown.stderr);
+    assert!(unknown.status.code() == Some(2) && message.contains("OLBVH_TARGET: unknown target `bogus`"), "{message}");
     write(&home.path("narrow.json"), &narrow);
     write(&home.path("broken.json"), &Value::Null);
     for (target, code) in [("nvida", 2), ("narrow.json", 2), ("broken.json", 3), ("nothing.json", 3)] {
-        let out = home.olbvh(&["info", "kuhn:2,2,2", "--target", target], &[]);
-        let message = String::from_utf8_lossy(&out.stderr);
-        assert_eq!(out.status.code(), Some(code), "{target}: {message}");
-        assert!(message.contains("--target: ") && message.contains(target), "{message}");
+        // A file may suit some of the devices, so a list of devices says which it does not suit.
+        let narrow = target == "narrow.json";
+        for (command, code) in [(&["info", "kuhn:2,2,2"][..], code), (&["devices"], if narrow { 0 } else { code })] {
+            let out = home.olbvh(&[command, &["--target", target]].concat(), &[]);
+            let [told, message] = [&out.stdout, &out.stderr].map(|text| String::from_utf8_lossy(text));
+            assert_eq!(out.status.code(), Some(code), "{target}: {message}");
+            let message = if code == 0 { told } else { message };
+            assert!(message.contains("--target: ") && message.contains(target), "{message}");
+        }
     }
 }
 

@@ -153,13 +153,14 @@ fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field:
     Some(drawn)
 }
 
-/// Draws fields that number points and cells. Returns the number of samples in the mesh.
+/// Draws fields that number points, with light, and cells, without. Returns the number of samples in the mesh.
 fn check_picture(name: &str, b: &HostAndDevice) -> u64 {
     let mut found = 0;
     for (camera, on, n) in [("iso", On::Points, b.mesh.points.len()), ("azimuth=100,elevation=-10,zoom=1.5", On::Cells, b.mesh.tets.len())]
     {
         let field = Field { name: "number".into(), on, values: (0..n).map(|i| (i % 17) as f32).collect() };
-        let settings = RenderSettings { size: size(name, [28, 20]), camera: camera.parse().unwrap(), ..RenderSettings::default() };
+        let (size, camera, shading) = (size(name, [28, 20]), camera.parse().unwrap(), on == On::Points);
+        let settings = RenderSettings { size, camera, shading, ..RenderSettings::default() };
         found += same_picture(name, b, &settings, &field).map_or(0, |drawn| drawn.stats.found_samples);
     }
     found

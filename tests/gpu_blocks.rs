@@ -50,6 +50,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         assert_eq!(bits(found.answer.barycentrics.as_flattened()), bits(whole.barycentrics.as_flattened()));
         assert_eq!(bits(&found.answer.values), bits(&whole.values));
         assert!(found.peak <= memory && found.peak > memory / 4, "{} of {memory} bytes", found.peak);
+        assert!(found.bad_cells == [device.status().bad, 0] && found.bad_cells[0] > 0, "{:?}", found.bad_cells);
         println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
         most = most.max(found.trees);
     }
@@ -79,7 +80,9 @@ fn answers_are_those_of_the_whole() {
     remedied(&gpu);
     flat(&gpu);
     overlapped(&gpu, &mesh);
+    apart(&gpu, &mesh);
     sliced(&gpu, &mesh);
+    far(&gpu, &mesh);
     passed_over(&gpu);
     drawn(&gpu, &mesh);
     hidden(&gpu, &mesh);
@@ -103,7 +106,8 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
     let asked = Points { mesh, options, points: &points, how: LocateOptions::default() };
-    assert_eq!(locate(gpu, 64 << 20, &asked, None, SILENT).unwrap().trees, 1);
+    let found = locate(gpu, 64 << 20, &asked, None, SILENT).unwrap();
+    assert_eq!((found.trees, found.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
     let refused = locate(gpu, 1 << 14, &asked, None, SILENT).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
     // Blocks as small as these are not cut, so they are asked for few points at a time.
@@ -159,19 +163,50 @@ fn flat(gpu: &Gpu) {
 fn overlapped(gpu: &Gpu, a: &Mesh) {
     let mut b = kuhn_jittered([9, 16, 9], 0.15, 8).unwrap();
     b.points.iter_mut().for_each(|p| *p = [0.8 * p[0] + 0.3 * p[1] + 3.3, p[1] - 2.2, p[2] + 0.1 * p[0] + 9.1]);
+    b.tets[40][2] = b.tets[40][1];
     for (pairs, lists) in [(false, Lists::Boundary), (true, Lists::All)] {
         let options = BuildOptions { lists, ..BuildOptions::default() };
         let devices = [a, &b].map(|mesh| DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
         let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
         let [x, y] = [0, 1].map(|i| OverlapInput { mesh: &devices[i], tree: &trees[i] });
-        let whole = query::overlap(x, y, pairs, SILENT).unwrap().overlap;
+        let told = RefCell::new(Vec::new());
+        let report = |done, all| told.borrow_mut().push((done, all));
+        let whole = query::overlap(x, y, pairs, &report).unwrap().overlap;
+        let searched = u64::from(whole.effort[0].searched) + u64::from(whole.effort[1].searched);
+        rises(&told, if pairs { 2 * a.tets.len() as u64 } else { searched });
         let memory = 3 << 19;
-        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, SILENT).unwrap();
+        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, &report).unwrap();
+        rises(&told, 1_000_000);
         println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
         assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
         assert_eq!(found.answer.overlap.a, whole.a);
         assert_eq!(found.answer.overlap.b, whole.b);
         assert_eq!(found.answer.overlap.pairs, whole.pairs);
+        let bad = devices.each_ref().map(|device| device.status().bad);
+        let uncut = overlap(gpu, 64 << 20, &Meshes { meshes: [a, &b], options, pairs }, SILENT).unwrap();
+        assert!(bad[0] > 0 && bad[1] == 1 && found.bad_cells == bad && (uncut.trees, uncut.bad_cells) == (2, bad), "{bad:?}");
+    }
+}
+
+/// Progress never falls, and ends with all of `all`. Forgets it.
+fn rises(told: &RefCell<Vec<(u64, u64)>>, all: u64) {
+    let told = told.take();
+    assert!(told.is_sorted() && told.iter().all(|t| t.1 == all) && told.last() == Some(&(all, all)), "{told:?}, not up to {all}");
+}
+
+/// Of meshes far from each other, no blocks are compared: there are lists of pairs nevertheless, which are empty.
+fn apart(gpu: &Gpu, a: &Mesh) {
+    let mut b = kuhn_jittered([9, 16, 9], 0.15, 8).unwrap();
+    b.points.iter_mut().for_each(|p| p[0] += 100.0);
+    let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
+    for (pairs, wanted) in [(false, None), (true, Some(vec![]))] {
+        let told = RefCell::new(Vec::new());
+        let report = |done, all| told.borrow_mut().push((done, all));
+        // Too little memory for the whole meshes to be tried.
+        let found = overlap(gpu, 1 << 19, &Meshes { meshes: [a, &b], options, pairs }, &report).unwrap();
+        rises(&told, 1_000_000);
+        assert_eq!((found.trees, found.answer.overlap.pairs), (0, wanted));
+        assert!(found.answer.overlap.a.is_empty() && found.answer.overlap.b.is_empty());
     }
 }
 
@@ -216,6 +251,31 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
         assert_eq!(first.map(|i| (i, all[0][i], all[1].get(i).copied())), None, "{settings:?}");
         assert!(whole.inside > 100 && whole.touched > 50 && found.answer == whole, "{whole:?}");
         assert!(found.trees > 2 && found.peak <= memory, "{} trees, {} bytes", found.trees, found.peak);
+        assert_eq!(found.bad_cells, [device.status().bad, 0]);
+    }
+}
+
+/// The centres of a stack that begins far away are rounded by more than the height of its voxels: to the lower end of
+/// the mesh, and to planes within it.
+fn far(gpu: &Gpu, mesh: &Mesh) {
+    let options = BuildOptions::default();
+    for at in [-9_999_996.0, -9_999_992.0] {
+        let stack = SliceSettings { at: Some(at), layers: 11, spacing: Some(999_999.562_5), ..SliceSettings::default() };
+        let voxels =
+            &SliceSettings { size: [32, 32], thickness: Some(0.001), ..stack }.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
+        let asked = Stack { mesh, options, field: None, voxels, extrapolate: Extrapolate::Nearest };
+        let of = |memory: u64| {
+            let mut owners = Vec::new();
+            let mut sink = |band: Band| {
+                owners.extend(band.owners);
+                Ok(())
+            };
+            (slice(gpu, memory, &asked, SILENT, &mut sink).unwrap(), owners)
+        };
+        let (whole, owners) = of(64 << 20);
+        let (found, in_blocks) = of(640 << 10);
+        assert!(whole.trees == 1 && whole.answer.inside > 500 && found.trees > 1, "{whole:?}, {found:?}");
+        assert!(whole.answer == found.answer && owners == in_blocks, "{:?}, in blocks {:?}", whole.answer, found.answer);
     }
 }
 
@@ -258,14 +318,15 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
         let options = BuildOptions::default();
         let asked = View { mesh, options, field: wave, settings: &settings };
         let (whole, took) = render(gpu, 64 << 20, &asked, SILENT).unwrap().into_parts();
-        assert_eq!(took.trees, 1);
+        let bad = took.bad_cells;
+        assert!(took.trees == 1 && bad[0] > 0);
         let memory = 448 << 10;
         let (found, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
         println!("{camera}: {} samples, {} trees, peak {}", found.rendered.stats.found_samples, took.trees, took.peak);
         let first = (0..whole.rendered.colors.len()).find(|&i| bits(&whole.rendered.colors[i]) != bits(&found.rendered.colors[i]));
         assert_eq!(first.map(|i| (i % 41, i / 41, whole.rendered.colors[i], found.rendered.colors[i])), None, "{camera}");
         assert!(whole.rendered.colors.iter().filter(|c| c[3] > 0.1).count() > 150, "{camera}");
-        assert!(took.trees > 4 && took.peak <= memory, "{} trees, {} bytes", took.trees, took.peak);
+        assert!(took.trees > 4 && took.peak <= memory && took.bad_cells == bad, "{} trees, {} bytes", took.trees, took.peak);
     }
 }
 

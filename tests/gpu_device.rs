@@ -1,10 +1,17 @@
 //! Opening a device: which one is chosen, which are refused, and the pipeline cache on disk.
 
-#![allow(clippy::unwrap_used)]
+#![allow(clippy::unwrap_used, unsafe_code)]
 
+mod host;
+
+use ash::vk;
+use host::Host;
 use olbvh::Error;
-use olbvh::gpu::{Gpu, GpuOptions, list_devices};
+use olbvh::gpu::{Gpu, GpuOptions, HostDevice, list_devices};
+use std::cell::Cell;
 use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 #[test]
 fn a_listed_device_opens_by_index_and_by_name() {
@@ -24,30 +31,107 @@ fn a_device_that_is_not_there_is_told_with_those_that_are() {
     assert!(matches!(&error, Error::NoDevice(text) if text.contains("no such device") && text.contains(&names[0].name)), "{error}");
 }
 
+fn files(folder: &Path) -> Vec<PathBuf> {
+    fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()).collect()
+}
+
+static CREATE_CACHE: OnceLock<vk::PFN_vkCreatePipelineCache> = OnceLock::new();
+thread_local! {
+    /// Bytes that this thread's last pipeline cache was created from.
+    static GIVEN: Cell<usize> = const { Cell::new(usize::MAX) };
+}
+
+unsafe extern "system" fn create_cache(
+    device: vk::Device,
+    info: *const vk::PipelineCacheCreateInfo<'_>,
+    callbacks: *const vk::AllocationCallbacks<'_>,
+    out: *mut vk::PipelineCache,
+) -> vk::Result {
+    // SAFETY: the caller's valid arguments are passed on.
+    unsafe {
+        GIVEN.set((*info).initial_data_size);
+        CREATE_CACHE.get().unwrap()(device, info, callbacks, out)
+    }
+}
+
+/// The driver is given what it has written, and nothing else.
 #[test]
 fn a_broken_pipeline_cache_is_ignored_and_replaced() {
-    let folder = tempfile::tempdir().unwrap();
-    let file = folder.path().join("deeper").join("pipelines.bin");
-    let open = || drop(Gpu::new(&GpuOptions { pipeline_cache: Some(file.clone()), ..Default::default() }).unwrap());
-    open();
-    let good = fs::read(&file).unwrap();
-    assert!(good.len() >= 32, "a cache has a header of 32 bytes");
-    let broken: [Vec<u8>; 6] =
-        [vec![], b"not a cache at all".to_vec(), vec![0xff; 4096], vec![0; good.len() + 7], good[..good.len() / 2].to_vec(), {
-            // The header of another device.
-            let mut other = good.clone();
-            other.iter_mut().skip(8).take(24).for_each(|b| *b ^= 0x5a);
-            other
-        }];
+    let host = Host::new();
+    let mut zero = host.device.fp_v1_0().clone();
+    CREATE_CACHE.get_or_init(|| zero.create_pipeline_cache);
+    zero.create_pipeline_cache = create_cache;
+    let (one, two, three) = (host.device.fp_v1_1().clone(), host.device.fp_v1_2().clone(), host.device.fp_v1_3().clone());
+    let device = ash::Device::from_parts_1_3(host.device.handle(), zero, one, two, three);
+    let temporary = tempfile::tempdir().unwrap();
+    let folder = temporary.path().join("deeper");
+    let options = GpuOptions { pipeline_cache: Some(folder.clone()), ..Default::default() };
+    let open = || {
+        // SAFETY: the host's handles belong together and outlive the `Gpu`; the function above calls the device's own.
+        drop(unsafe { Gpu::from_raw(HostDevice { device: device.clone(), ..host.lend() }, &options) }.unwrap());
+        GIVEN.replace(usize::MAX)
+    };
+    assert_eq!(open(), 0);
+    let found = files(&folder);
+    assert_eq!(found.len(), 1, "{found:?}");
+    let file = &found[0];
+    let good = fs::read(file).unwrap();
+    let data = good.len() - 16;
+    assert!(data >= 32, "a cache has a header of 32 bytes");
+    assert_eq!(open(), data);
+    let changed = |at: usize| {
+        let mut other = good.clone();
+        other[at] ^= 0x5a;
+        other
+    };
+    let broken = [
+        vec![],
+        b"not a cache at all".to_vec(),
+        vec![0xff; 4096],
+        vec![0; good.len()],
+        good[..good.len() / 2].to_vec(),
+        [&good[..], &[0]].concat(),
+        good[16..].to_vec(),
+        changed(0),
+        changed(8),
+        changed(40),
+        changed(good.len() - 1),
+    ];
     for content in broken {
-        fs::write(&file, &content).unwrap();
-        open();
-        let now = fs::read(&file).unwrap();
-        assert_ne!(now, content, "still broken");
-        assert_eq!(now[..32], good[..32], "the header is this device's");
+        fs::write(file, &content).unwrap();
+        assert_eq!(open(), 0, "{} bytes reach the driver", content.len());
+        assert_ne!(fs::read(file).unwrap(), content, "still broken");
     }
-    let left: Vec<_> = fs::read_dir(file.parent().unwrap()).unwrap().map(|e| e.unwrap().file_name()).collect();
-    assert_eq!(left.len(), 1, "temporary files are gone: {left:?}");
+    assert_ne!(open(), 0, "the last one was replaced");
+    assert_eq!(files(&folder).len(), 1, "temporary files are gone");
+}
+
+static PROPERTIES: OnceLock<vk::PFN_vkGetPhysicalDeviceProperties> = OnceLock::new();
+
+/// The driver's properties, with another identity of its pipeline caches.
+unsafe extern "system" fn other_caches(physical: vk::PhysicalDevice, properties: *mut vk::PhysicalDeviceProperties) {
+    // SAFETY: the caller's valid arguments are passed on.
+    unsafe {
+        PROPERTIES.get().unwrap()(physical, properties);
+        (*properties).pipeline_cache_uuid[0] ^= 1;
+    }
+}
+
+#[test]
+fn devices_keep_their_pipelines_in_files_of_their_own() {
+    let host = Host::new();
+    let mut zero = host.instance.fp_v1_0().clone();
+    PROPERTIES.get_or_init(|| zero.get_physical_device_properties);
+    zero.get_physical_device_properties = other_caches;
+    let (one, three) = (host.instance.fp_v1_1().clone(), host.instance.fp_v1_3().clone());
+    let other = ash::Instance::from_parts_1_3(host.instance.handle(), zero, one, three);
+    let folder = tempfile::tempdir().unwrap();
+    let options = GpuOptions { pipeline_cache: Some(folder.path().into()), trust: true, ..Default::default() };
+    for (instance, count) in [(&host.instance, 1), (&other, 2), (&host.instance, 2)] {
+        // SAFETY: the host's handles belong together and outlive the `Gpu`.
+        drop(unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), ..host.lend() }, &options) }.unwrap());
+        assert_eq!(files(folder.path()).len(), count);
+    }
 }
 
 #[test]
@@ -55,7 +139,6 @@ fn a_pipeline_cache_that_cannot_be_written_is_no_error() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("a file");
     fs::write(&file, "x").unwrap();
-    let below = file.join("pipelines.bin");
-    drop(Gpu::new(&GpuOptions { pipeline_cache: Some(below), ..Default::default() }).unwrap());
+    drop(Gpu::new(&GpuOptions { pipeline_cache: Some(file.join("below")), ..Default::default() }).unwrap());
     assert_eq!(fs::read(&file).unwrap(), b"x");
 }

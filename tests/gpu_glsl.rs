@@ -10,7 +10,7 @@ use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
-use olbvh::mesh::kuhn_jittered;
+use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{LocateOptions, SILENT, locate, locate_all};
 use submit::submit;
@@ -27,7 +27,7 @@ layout(set = 0, binding = 0) readonly buffer Points { float points[]; };
 layout(set = 0, binding = 1) writeonly buffer Out { uint found[]; };
 ";
 
-/// A kernel that writes five words per point.
+/// A kernel that writes nine words per point.
 const ANSWERS: &str = r#"
 #include "olbvh.glsl"
 // Names that a host may use as well.
@@ -58,11 +58,12 @@ void main() {
     uint owners[OLBVH_OWNERS];
     met = OLBVH_NONE;
     olbvh_traverse();
-    found[5 * i] = owner;
-    found[5 * i + 1] = olbvh_owners(at, owners);
-    found[5 * i + 2] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_value(owner, b));
-    found[5 * i + 3] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_gradient(owner).y);
-    found[5 * i + 4] = met;
+    found[9 * i] = owner;
+    found[9 * i + 1] = olbvh_owners(at, owners);
+    found[9 * i + 2] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_value(owner, b));
+    found[9 * i + 3] = owner == OLBVH_NONE ? 0u : floatBitsToUint(olbvh_gradient(owner).y);
+    found[9 * i + 4] = met;
+    for (uint k = 0u; k < 4u; ++k) found[9 * i + 5 + k] = floatBitsToUint(b[k]);
 }
 "#;
 
@@ -189,16 +190,17 @@ fn check(binding: Binding) {
     points.extend((0..3000).map(|i| [(i % 13) as f32 * 0.81 - 0.5, (i / 13 % 13) as f32 * 0.73 - 0.4, (i / 169) as f32 * 0.47 - 0.3]));
     // A linear field: its value at a point follows from the coordinates, and its gradient is constant.
     let values: Vec<f32> = mesh.points.iter().map(|p| 3.0 + p[0] + 2.0 * p[1] - p[2]).collect();
+    let bits = |numbers: &[f32]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
         let view = device.view();
         let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())));
-        let found = run::<5>(&gpu, ANSWERS, &scene, level, &points);
+        let found = run::<9>(&gpu, ANSWERS, &scene, level, &points);
         let options = LocateOptions::default();
-        let expected = locate(&device, &tree, &points, None, &options, SILENT).unwrap();
+        let expected = locate(&device, &tree, &points, Some((&values, On::Points)), &options, SILENT).unwrap();
         let all = locate_all(&device, &tree, &points, options.tolerance, SILENT).unwrap();
-        for (i, [owner, owners, value, slope, met]) in found.into_iter().enumerate() {
+        for (i, [owner, owners, value, slope, met, weights @ ..]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");
             if owner == u32::MAX {
@@ -206,13 +208,15 @@ fn check(binding: Binding) {
             }
             // A point outside of the surface is owned by the nearest tetrahedron, and no tetrahedron contains it.
             assert!(owners as usize == all[i].len() || owners == 0, "{what}: {owners} owners of {:?}", all[i]);
+            assert_eq!(weights.to_vec(), bits(&expected.barycentrics[i]), "{what}");
+            assert_eq!(value, expected.values[i].to_bits(), "{what}");
             let p = points[i];
             assert!((f32::from_bits(value) - (3.0 + p[0] + 2.0 * p[1] - p[2])).abs() < 1e-3, "{what}: {}", f32::from_bits(value));
             assert!((f32::from_bits(slope) - 2.0).abs() < 1e-2, "{what}: {}", f32::from_bits(slope));
             assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
         }
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
-        let without = run::<5>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
+        let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
         for (i, [all, nearer]) in run(&gpu, NEAREST, &scene, level, &points).into_iter().enumerate() {
             assert_eq!(nearer, all, "{binding:?} {lists:?}: the leaf nearest to point {i} is {} away", f32::from_bits(all));

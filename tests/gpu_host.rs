@@ -139,8 +139,9 @@ fn subgroup_size_control_is_found_and_missed() {
     let mut zero = functions.fp_v1_0().clone();
     zero.enumerate_device_extension_properties = list_nothing;
     let bare = ash::Instance::from_parts_1_3(functions.handle(), zero, one.clone(), functions.fp_v1_3().clone());
-    let (listed, unlisted) = (Requirements::check(functions, host.physical), Requirements::check(&bare, host.physical));
-    // SAFETY: the physical device belongs to this instance.
+    // SAFETY: the physical device belongs to this instance, of which `bare` has other functions.
+    let [listed, unlisted] = [functions, &bare].map(|instance| unsafe { Requirements::check(instance, host.physical) });
+    // SAFETY: as above.
     let version = unsafe { functions.get_physical_device_properties(host.physical) }.api_version;
     assert!(unlisted.extensions.is_empty());
     assert_eq!(unlisted.subgroup_size_control, listed.subgroup_size_control && version >= vk::API_VERSION_1_3);

@@ -82,7 +82,7 @@ impl Subject {
     fn locations(&self, gpu: &Gpu, options: &BuildOptions, n: usize) -> Vec<Location> {
         let (tree, host) = self.tree(gpu, options);
         let (locator, points) = (Locator::new(&self.mesh, &self.topology, &host), self.points(n));
-        let expected = locator.locate_all(&points);
+        let expected = locator.locate_each(&points);
         let what = |i: usize| format!("{} {options:?} point {i} {:?}", self.name, points[i]);
         for method in [LocateMethod::Descent, LocateMethod::Traversal(3)] {
             let found = locate(&self.device, &tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();

@@ -97,6 +97,10 @@ fn wrong_sizes_are_refused() {
     let mut recorder = Recorder::rehearse(&gpu);
     recorder.copy(large.all(), small.all());
     refused("copy", "copy of 128 bytes", recorder.finish());
+    let to_be_read = |bytes: u32, what: &str| format!("{bytes} bytes of the buffer `olbvh.test.copied`, to be read as {what}");
+    refused("download", &to_be_read(64, "items of 12"), gpu.download::<[f32; 3]>(&small, small.all()));
+    refused("download", &to_be_read(64, "items of 0"), gpu.download::<()>(&small, small.all()));
+    refused("download_one", &to_be_read(8, "a value of 16"), gpu.download_one::<[u32; 4]>(&small, small.all().part(56, 16)));
     // A stack of any size gives the same owners.
     let located = |stack| {
         let options = LocateOptions { method: LocateMethod::Traversal(stack), ..LocateOptions::default() };

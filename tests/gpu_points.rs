@@ -12,7 +12,8 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::{LocateOptions, SILENT, locate};
+use olbvh::query::{LocateOptions, OwnersMemory, SILENT, locate, locate_all};
+use std::cell::RefCell;
 use std::env;
 
 const FULL: usize = 10_000_000;
@@ -141,4 +142,33 @@ fn alpha_4() {
 #[test]
 fn by_descriptors() {
     no_point_is_lost(Binding::Descriptors, SOME.min(points()) / 4, 1);
+}
+
+/// Where lists are long, few points are asked about at a time, so that all their owners can be numbered. Here, tens of
+/// thousands of tetrahedra share an edge. Most points lie outside, since it would take long if none did.
+#[test]
+fn all_owners_of_points_on_a_crowded_edge() {
+    let n = 66_000_u32;
+    let rim = |i: u32| {
+        let angle = std::f64::consts::TAU * f64::from(i) / f64::from(n);
+        [angle.cos() as f32, angle.sin() as f32, 0.5]
+    };
+    let points = [[0.0; 3], [0.0, 0.0, 1.0]].into_iter().chain((0..n).map(rim)).collect();
+    let mesh = Mesh::new(points, (0..n).map(|i| [0, 1, 2 + i, 2 + (i + 1) % n]).collect());
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let options = BuildOptions { level: Some(2), assign: Assign::Aabb, lists: Lists::All, ..BuildOptions::default() };
+    let tree = Tree::build(&gpu, &device, &options).unwrap();
+    let at_once = OwnersMemory::most_points(tree.status().longest_leaf) as usize;
+    assert!(tree.status().longest_leaf >= n && at_once < 33_000, "{}", tree.status().longest_leaf);
+    let on_edge = |i: usize| i % (at_once / 2) == 7;
+    let points: Vec<_> = (0..2 * at_once + 9).map(|i| if on_edge(i) { [0.0, 0.0, 0.25] } else { [90.0; 3] }).collect();
+    let told = RefCell::new(Vec::new());
+    let found = locate_all(&device, &tree, &points, 0.0, &|done, all| told.borrow_mut().push((done, all))).unwrap();
+    let all = points.len() as u64;
+    assert_eq!(told.into_inner(), [at_once as u64, 2 * at_once as u64, all].map(|done| (done, all)));
+    assert_eq!((0..points.len()).filter(|&i| on_edge(i)).count(), 5);
+    for (i, owners) in found.iter().enumerate() {
+        assert!(if on_edge(i) { owners.iter().copied().eq(0..n) } else { owners.is_empty() }, "point {i}: {} owners", owners.len());
+    }
 }

@@ -198,9 +198,9 @@ fn rounds_go_on_where_they_ended() {
     let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
     let voxels = olbvh::slicing::VoxelGrid {
         origin: [-0.35, -0.35, 0.3],
-        across: axis(0),
-        down: axis(1),
-        up: axis(2),
+        next_voxel: axis(0),
+        next_row: axis(1),
+        next_layer: axis(2),
         half: [axis(0), axis(1), axis(2)].map(|a| a.map(|x| x / 2.0)),
         size: [5, 5],
         layers: 1,
@@ -215,6 +215,11 @@ fn rounds_go_on_where_they_ended() {
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
     let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
     assert!(refused.is_err_and(|e| e.to_string().contains("1 rows of 25 voxels in memory for 25 voxels in 5 runs")));
+    // A row that the layer lacks, although the stack goes on.
+    let two = olbvh::slicing::VoxelGrid { layers: 2, ..voxels };
+    let beyond = SliceInput { voxels: &two, rows: Rows { first: 5, count: 1, ..rows }, ..input };
+    let refused = cmd_slice(&mut olbvh::gpu::Recorder::rehearse(&gpu), &searched, &beyond, &memory, Rounds::begin(1));
+    assert!(refused.is_err_and(|e| e.to_string().contains("1 rows from row 5 of layer 0 on")));
     let (mut rounds, mut submissions) = (Rounds::begin(1), 0);
     let status = loop {
         submit(&gpu, "olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();

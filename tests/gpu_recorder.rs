@@ -1,5 +1,5 @@
 //! The recorder's hazard check objects to whichever barrier is left out. So no barrier is missing where the check
-//! looks, and none is superfluous.
+//! looks, and none is superfluous. Commands that Vulkan does not allow are not recorded.
 
 #![allow(clippy::unwrap_used, unsafe_code)]
 
@@ -194,6 +194,38 @@ fn barriers_of_a_host() {
         Ok(())
     });
     assert_eq!(barriers, 2);
+}
+
+/// Under a validation layer, any of these commands would also fail the test.
+#[test]
+fn what_vulkan_does_not_allow_is_refused() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let buffer = gpu.upload("olbvh.test.words", &[7u32; 16]).unwrap();
+    let all = buffer.all();
+    let refused = |words: &str, work: &dyn Fn(&mut Recorder<'_>)| {
+        let mut rehearsal = Recorder::rehearse(&gpu);
+        work(&mut rehearsal);
+        let recorded = submit(&gpu, "olbvh.test.refused", |r| {
+            work(r);
+            Ok(())
+        });
+        for result in [rehearsal.finish(), recorded.map(|_| ())] {
+            assert!(matches!(&result, Err(Error::Invalid(message)) if message.contains(words)), "{words}: {result:?}");
+        }
+    };
+    refused("fill of 8 bytes at byte 2 of a buffer; both must be multiples of 4", &|r| r.fill(all.part(2, 8), 1));
+    refused("fill of 6 bytes at byte 8", &|r| r.fill(all.part(8, 6), 1));
+    refused("copy of 16 bytes from byte 8 of a buffer to byte 12, which overlap", &|r| r.copy(all.part(8, 16), all.part(12, 16)));
+    refused("copy of 16 bytes from byte 12", &|r| r.copy(all.part(12, 16), all.part(8, 52)));
+    refused("which overlap", &|r| r.copy(all, all));
+    assert_eq!(gpu.download::<u32>(&buffer, all).unwrap(), [7; 16]);
+    let side_by_side = |r: &mut Recorder<'_>| {
+        r.fill(all.part(0, 16), 1);
+        r.copy(all.part(16, 16), all.part(32, 32));
+        r.copy(all.part(52, 1), all.part(51, 1));
+        Ok(())
+    };
+    submit(&gpu, "olbvh.test.side_by_side", side_by_side).unwrap();
 }
 
 /// An address that a host forgot, or that a kernel cannot load from, is refused before a device uses it. A rehearsal

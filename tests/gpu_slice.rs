@@ -105,9 +105,9 @@ fn an_error_of_the_sink_ends_the_stack() {
     let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 1.0 } else { 0.0 });
     let voxels = VoxelGrid {
         origin: [0.5; 3],
-        across: axis(0),
-        down: axis(1),
-        up: axis(2),
+        next_voxel: axis(0),
+        next_row: axis(1),
+        next_layer: axis(2),
         half: [0, 1, 2].map(|c| axis(c).map(|x| x * half)),
         size: [3, 3],
         layers: 3,

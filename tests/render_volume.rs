@@ -239,6 +239,20 @@ fn every_odd_mesh_has_a_picture() {
     }
 }
 
+/// With y up, a mesh looks as it does with its axes exchanged and z up.
+#[test]
+fn meshes_with_y_up_look_alike() {
+    let small = grid([5, 5, 4]);
+    let mut turned = small.clone();
+    turned.points.iter_mut().for_each(|p| *p = [p[0], p[2], -p[1]]);
+    let picture = |mesh: &Mesh, camera: &str| draw(mesh, &topology(mesh).unwrap(), &BuildOptions::default(), &settings(camera)).pixels;
+    for camera in ["iso", "front", "right,ortho", "top,azimuth=20", "azimuth=200,elevation=-35"] {
+        let [expected, got] = [picture(&small, camera), picture(&turned, &format!("{camera},up=0,1,0"))];
+        let off = got.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
+        assert!(off <= 2 && got.iter().any(|&p| p != 255), "{camera}: {off} pixels differ");
+    }
+}
+
 #[test]
 fn size_and_place_of_the_mesh_do_not_matter() {
     let topology_of = |mesh: &Mesh| topology(mesh).unwrap();

@@ -29,8 +29,8 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("query", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing"]),
     ("blocks", &["build", "error", "gpu", "grid", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("baseline", &["build", "error", "gpu", "grid", "kernels", "layout", "primitives", "query", "reference"]),
-    ("conformance", &["build", "error", "gpu", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
-    ("capi", &["build", "error", "glsl", "gpu", "grid", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
+    ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
+    ("capi", &["build", "error", "glsl", "gpu", "grid", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing"]),
     ("tune", &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "tree"]),
 ];

@@ -5,7 +5,9 @@ use anyhow::{Context, Result};
 use ash::vk;
 use glam::Vec3;
 use gpu_allocator::MemoryLocation;
-use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+use olbvh::build::{
+    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
+};
 use olbvh::glsl::SceneBuffers;
 use olbvh::gpu::{BufferRef, Gpu, Recorder, USAGE};
 use olbvh::mesh::Mesh;
@@ -133,12 +135,14 @@ impl Body {
         self.slots[slot].positions.write(&moved);
     }
 
-    /// Records stage 0 and the construction of a slot's tree.
-    pub fn record(&self, r: &mut Recorder<'_>, slot: usize) -> olbvh::Result<()> {
+    /// Records stage 0 and the construction of a slot's tree. Which tetrahedra are neighbours is found out in the
+    /// slot's first frame only: it stays so, however the body moves.
+    pub fn record(&self, r: &mut Recorder<'_>, slot: usize, first: bool) -> olbvh::Result<()> {
         let Deformed { mesh, arrays, .. } = &self.slots[slot];
         // The frame before used the same scratch memory.
         r.barrier("frame.before → frame.mesh");
-        cmd_prepare_mesh(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
+        let prepare = if first { cmd_prepare_mesh } else { cmd_move_mesh };
+        prepare(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
         cmd_build(r, mesh, arrays, &self.options, &self.build_scratch)
     }

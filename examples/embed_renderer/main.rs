@@ -137,9 +137,10 @@ fn animate<'a>(
     encoder.set_frame_delay(1, 20)?;
     let mut writer = encoder.write_header()?;
 
-    // The recording of a frame is rehearsed once, so that nothing is compiled later.
+    // The recording of a slot's first and later frames is rehearsed, so that nothing is compiled later.
     let mut rehearsal = Recorder::rehearse(gpu);
-    body.record(&mut rehearsal, 0)?;
+    body.record(&mut rehearsal, 0, true)?;
+    body.record(&mut rehearsal, 0, false)?;
     rehearsal.finish()?;
 
     // SAFETY: what a slot uses is kept until the device is idle, and used again only after the slot's fence is
@@ -161,7 +162,7 @@ fn animate<'a>(
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             device.begin_command_buffer(commands[slot], &begin)?;
             let mut recorder = Recorder::new(gpu, commands[slot], None);
-            body.record(&mut recorder, slot)?;
+            body.record(&mut recorder, slot, frame < SLOTS as u32)?;
             recorder.finish()?;
             recorders[slot] = Some(recorder);
             let built = [vk::MemoryBarrier::default()

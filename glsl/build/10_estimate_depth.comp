@@ -21,10 +21,12 @@ BUFFER(4, READ_WRITE, BuildStatus, status)
 shared uint low[12];
 shared uint high[12];
 
-void add(uint i, uint lo, uint hi) {
-    uint carry = uint(atomicAdd(low[i], lo) > NONE - lo);
-    if (hi + carry > 0u) atomicAdd(high[i], hi + carry);
-}
+// Adds the 64-bit number (lo, hi) to the one in two words.
+#define ADD_WIDE(low_word, high_word, lo, hi)                     \
+    {                                                             \
+        uint carry = uint(atomicAdd(low_word, lo) > NONE - (lo)); \
+        if ((hi) + carry > 0u) atomicAdd(high_word, (hi) + carry); \
+    }
 
 void main() {
     for (uint i = local_index(); i < 12u; i += WORKGROUP) low[i] = high[i] = 0u;
@@ -53,18 +55,11 @@ void main() {
             sums[1u + level].y += uint(before > NONE - product);
         }
     }
-    for (uint i = 0u; i < 12u; ++i) add(i, sums[i].x, sums[i].y);
+    for (uint i = 0u; i < 12u; ++i) ADD_WIDE(low[i], high[i], sums[i].x, sums[i].y)
     barrier();
     for (uint i = local_index(); i < 12u; i += WORKGROUP) {
-        uint lo = low[i];
-        uint carry, hi = high[i];
-        if (i == 0u) {
-            carry = uint(atomicAdd(status.at[0].sum[0], lo) > NONE - lo);
-            if (hi + carry > 0u) atomicAdd(status.at[0].sum[1], hi + carry);
-        } else {
-            uint k = 2u * (i - 1u);
-            carry = uint(atomicAdd(status.at[0].total[k], lo) > NONE - lo);
-            if (hi + carry > 0u) atomicAdd(status.at[0].total[k + 1u], hi + carry);
-        }
+        uint k = 2u * i;
+        if (i == 0u) ADD_WIDE(status.at[0].sum[0], status.at[0].sum[1], low[i], high[i])
+        else ADD_WIDE(status.at[0].total[k - 2u], status.at[0].total[k - 1u], low[i], high[i])
     }
 }

@@ -16,7 +16,7 @@ ARGUMENTS(4)
     uint box_words; // words of a box, per node
 END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, mesh)
-BUFFER16(1, READ_WRITE, Grid, grid)
+BUFFER16(1, writeonly, Grid, grid)
 BUFFER(2, READ_WRITE, BuildStatus, status)
 BUFFER(3, writeonly, uint, candidates) // word for the scans: candidates of the chosen level
 

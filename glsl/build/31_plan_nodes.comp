@@ -32,8 +32,8 @@ void main() {
     uint runs = n / run + uint(n % run != 0u);
     if (STAGE == 0u) {
         table_length.at[0] = (level + 1u) * runs;
-        status.at[0].entries = n;
         if (n < entries.at[0]) status.at[0].overflow = 1u;
+        status.at[0].entries = status.at[0].overflow != 0u ? 0u : n;
         return;
     }
     bool empty = n == 0u;

@@ -11,7 +11,7 @@ BUFFER(0, readonly, uint, entries)
 BUFFER(1, readonly, uint, p)
 BUFFER(2, readonly, uint, po)
 BUFFER(3, readonly, uint, boundary_cells)
-BUFFER(4, READ_WRITE, BuildStatus, status)
+BUFFER(4, readonly, BuildStatus, status)
 BUFFER(5, READ_WRITE, uint, flags) // zeroed
 
 void set_flag(uint node) { atomicOr(flags.at[node >> 5u], 1u << (node & 31u)); }

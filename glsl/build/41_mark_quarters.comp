@@ -16,6 +16,7 @@ RECORDS(4, uvec4, cells)
 BUFFER16(5, readonly, uvec4, quantized) // vertices; the last word is the cell of the finest grid
 BUFFER(6, READ_WRITE, uint, p)
 #include "shared/quarters.glsl"
+#include "shared/spanned.glsl"
 
 void main() {
     uvec2 items = items_of_share(WORKGROUP * ROWS, min(entries.at[0], capacity));
@@ -24,13 +25,8 @@ void main() {
     Grid g = grid.at[0];
     g.ids = id_mask;
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) {
-        uvec4 ids = words(cells.at[p.at[i]]);
-        uvec3 lo = uvec3(1023u), hi = uvec3(0u);
-        for (uint k = 0u; k < 4u; ++k) {
-            uvec3 q = unpack_cell(quantized.at[ids[k]].w);
-            lo = min(lo, q);
-            hi = max(hi, q);
-        }
+        uvec3 lo, hi;
+        cells_spanned(words(cells.at[p.at[i]]), lo, hi);
         p.at[i] |= quarters_near(g, codes.at[i], lo, hi);
     }
 }

@@ -26,6 +26,7 @@ void main() {
     Grid g = grid.at[0];
     uint shift = 3u * (g.level - 1u - level);
     uint flag = 0u, mask = 0u;
+    vec3 lo = vec3(0.0), hi = vec3(0.0);
     for (uint child = begin; child <= end; ++child) {
         flag |= flags.at[child >> 5u] >> (child & 31u) & 1u;
         uint leaf = child; // the last leaf below the child
@@ -33,11 +34,15 @@ void main() {
         mask |= 1u << (codes.at[po.at[leaf - g.first_leaf + 1u] - 1u] >> shift & 7u);
         if (BOXES != 0u) {
             for (uint c = 0u; c < 3u; ++c) {
-                float lo = boxes.at[6u * child + c], hi = boxes.at[6u * child + 3u + c];
-                boxes.at[6u * node + c] = child == begin ? lo : min(boxes.at[6u * node + c], lo);
-                boxes.at[6u * node + 3u + c] = child == begin ? hi : max(boxes.at[6u * node + 3u + c], hi);
+                float least = boxes.at[6u * child + c], most = boxes.at[6u * child + 3u + c];
+                lo[c] = child == begin ? least : min(lo[c], least);
+                hi[c] = child == begin ? most : max(hi[c], most);
             }
         }
+    }
+    for (uint c = 0u; BOXES != 0u && c < 3u; ++c) {
+        boxes.at[6u * node + c] = lo[c];
+        boxes.at[6u * node + 3u + c] = hi[c];
     }
     if (flag != 0u) atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
     atomicOr(masks.at[node >> 2u], mask << (8u * (node & 3u)));

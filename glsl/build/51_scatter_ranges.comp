@@ -52,7 +52,8 @@ void main() {
         uint node = find_node(top, from, level, morton(at));
         at = next_candidate(box, at);
         if (node == NONE) continue;
-        atomicMax(ranges.at[2u * node], lo);
-        atomicMax(ranges.at[2u * node + 1u], hi);
+        // Most tetrahedra add nothing, and a read costs less than an atomic operation.
+        if (ranges.at[2u * node] < lo) atomicMax(ranges.at[2u * node], lo);
+        if (ranges.at[2u * node + 1u] < hi) atomicMax(ranges.at[2u * node + 1u], hi);
     }
 }

@@ -6,9 +6,9 @@
 #include "shared/grid.glsl"
 ARGUMENTS(2)
     float origin[3];
-    float across[3];
-    float down[3];
-    float up[3];
+    float next_voxel[3];
+    float next_row[3];
+    float next_layer[3];
     float half0[3];
     float half1[3];
     float half2[3];
@@ -51,9 +51,9 @@ void main() {
     Grid g = grid.at[0];
     SlicePlan plan;
     plan.origin = wide(origin);
-    plan.across = wide(across);
-    plan.down = wide(down);
-    plan.up = wide(up);
+    plan.next_voxel = wide(next_voxel);
+    plan.next_row = wide(next_row);
+    plan.next_layer = wide(next_layer);
     plan.width = width;
     plan.height = height;
     plan.layer = layer;
@@ -62,7 +62,7 @@ void main() {
     plan.listed = 0u;
     plan.first_cell = first_cell;
     plan.last_cell = last_cell;
-    // 2 / scale: a larger half axis is more than twice as large as the mesh, and need not be scaled.
+    // 2 / scale: larger half axes are refused as they are, since scaling them could overflow.
     float most = uintBitsToFloat((255u << 23) - floatBitsToUint(g.scale));
     vec4 axes[3] = vec4[3](wide(half0), wide(half1), wide(half2)), normalised[3];
     bool flat_box = false, large = false;

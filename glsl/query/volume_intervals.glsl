@@ -192,7 +192,7 @@ void main() {
     view = frames.at[0].view;
     plan = frames.at[0].plan;
     uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
-    RayState state = RayState(0u, 0u, NONE, 0u, NONE, SMALLEST_FLOAT, NONE, 0.0, 0u);
+    RayState state = RayState(0u, 0u, 0u, NONE, SMALLEST_FLOAT, NONE, 0.0, 0u);
     if (pixel_of(i, size, pixel)) {
         uint place = pixel.y * size.x + pixel.x;
         bool opaque = PART != 0u && colors.at[place].w >= view.termination;

@@ -1,7 +1,8 @@
 // Marching (SPEC 3.3): takes samples at distances (k + 1/2)·Δ from the ray's origin, front to back, until the ray is
-// opaque or the dispatch's budget is spent. With ISO, a ray accumulates the iso-surfaces between two samples, not the
-// samples themselves. With SKIP, the tree is asked for stretches without anything visible as soon as a sample adds
-// nothing. Twin of src/reference/volume/march.rs.
+// opaque or the dispatch's budget is spent. With ISO, a sample does not add a colour of its own, but the iso-surfaces on
+// the ray's stretch in its tetrahedron, and those between this stretch and that of the sample before. With SKIP, the
+// tree is asked for stretches without anything visible as soon as a sample adds nothing. Twin of
+// src/reference/volume/march.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -257,8 +258,8 @@ void main() {
             halfway = unit;
         }
         inverse_direction = inverse_of(direction);
-        bool stands = state.hint != NONE && state.cursor == 0u;
-        if (stands) enter(state.hint);
+        bool stands = state.tet != NONE && state.cursor == 0u;
+        if (stands) enter(state.tet);
         ahead = 1u;
         uint misses = 0u; // steps of the walk to the next sample
         uint known = state.check >> 30u; // flags of the best candidate
@@ -305,10 +306,11 @@ void main() {
             uint owner = NONE;
             // Outside of the bounds there is nothing to find.
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
-                OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, known, state.smallest));
+                OwnerSearch search = no_search();
+                if (state.cursor != 0u) search = OwnerSearch(state.cursor, best_of(state.tet, known, state.smallest));
                 bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
                 state.cursor = search.cursor;
-                state.best = search.best.owner;
+                state.tet = search.best.owner;
                 known = best_bits(search.best);
                 state.smallest = search.best.smallest;
                 if (!ended) break;
@@ -323,7 +325,7 @@ void main() {
         }
         if (ahead > 1u) state.check = state.next; // `ahead` is not stored: the tree is asked again
         state.check |= known << 30u;
-        state.hint = stands ? stand.t : NONE;
+        if (state.cursor == 0u) state.tet = stands ? stand.t : NONE;
         unfinished = uint(state.next < state.end);
         states.at[i] = state;
         colors.at[place] = sum;

@@ -1,6 +1,7 @@
 // The quantized box of a tetrahedron at a level (the paper's Eq. 5). The including kernel declares cells, bad, and
 // `quantized`: the vertices, whose last word is their cell of the finest grid.
 #include "shared/bad.glsl"
+#include "shared/spanned.glsl"
 
 struct CellBox {
     uvec3 lo;   // first cell
@@ -8,20 +9,10 @@ struct CellBox {
 };
 
 CellBox finest_box(uint t) {
-    CellBox box;
-    box.lo = uvec3(0u);
-    box.size = uvec3(0u);
-    if (is_bad(t)) return box;
-    uvec3 lo = uvec3(1023u), hi = uvec3(0u);
-    uvec4 ids = words(cells.at[t]);
-    for (uint i = 0u; i < 4u; ++i) {
-        uvec3 q = unpack_cell(quantized.at[ids[i]].w);
-        lo = min(lo, q);
-        hi = max(hi, q);
-    }
-    box.lo = lo;
-    box.size = hi - lo + 1u;
-    return box;
+    if (is_bad(t)) return CellBox(uvec3(0u), uvec3(0u));
+    uvec3 lo, hi;
+    cells_spanned(words(cells.at[t]), lo, hi);
+    return CellBox(lo, hi - lo + 1u);
 }
 
 // The quantized box at a coarser level.

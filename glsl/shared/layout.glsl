@@ -20,8 +20,8 @@ struct MeshStatus {
     uint boundary;  // Boundary tetrahedra.
     uint zero_volume; // Tetrahedra of zero volume.
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
-    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
+    uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
@@ -77,9 +77,8 @@ struct RenderPlan {
 struct RayState {
     uint next;      // Number of the next sample.
     uint end;       // One past the last sample.
-    uint hint;      // Tetrahedron of the last sample found, or `NONE`.
-    uint cursor;    // Entries of the leaf's list already searched for the next sample.
-    uint best;      // Best candidate owner among them, or `NONE`.
+    uint cursor;    // Not 0: how much of the leaf's list has been searched for the next sample; the search goes on.
+    uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
     uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
     float last_at;  // Distance of that place from the ray's origin in steps.
@@ -112,9 +111,9 @@ struct SlicePlan {
     uint pad1;   // Unused.
     uint pad2;   // Unused.
     vec4 origin; // Centre of voxel (0, 0) of layer 0.
-    vec4 across; // From one voxel of a row to the next.
-    vec4 down;   // From one row to the next.
-    vec4 up;     // From one layer to the next.
+    vec4 next_voxel; // From one voxel of a row to the next.
+    vec4 next_row;   // From one row to the next.
+    vec4 next_layer; // From one layer to the next.
     vec4 half0;  // Half axis of a voxel's box along the row, in normalised coordinates.
     vec4 half1;  // Half axis of the box from row to row.
     vec4 half2;  // Half axis of the box from layer to layer.
@@ -124,14 +123,14 @@ struct SlicePlan {
     uint layer;  // Layer of the first row of the band, the rows that are sliced now.
     uint first;  // Number of that row in its layer.
     uint rows;   // Rows of the band.
-    uint refused; // 1: boxes are flat; 2: boxes are more than twice as large as the mesh; else 0.
+    uint refused; // 1: boxes are flat; 2: boxes are longer along an axis than 4 / scale of the grid; else 0.
     uint first_cell; // First cell of the finest grid that is searched, 10 bits per axis, x lowest.
     uint last_cell;  // Last such cell. The box of the two cells contains a block of the mesh, or all of it.
 };
 
 // State of the search for the tetrahedron closest to a voxel between two dispatches.
 struct TouchState {
-    uint code;    // Morton code of the leaf to resume at; `NONE`: done.
+    uint code;    // Morton code of the leaf to resume at; in a binary tree, the place of a tetrahedron.
     uint entry;   // Entries of that leaf already tested.
     uint owner;   // Closest tetrahedron so far, or `NONE`.
     float square; // Squared distance of that tetrahedron.
@@ -154,7 +153,7 @@ struct RunState {
 struct SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
     uint touching; // Voxels whose boxes need another round. Boxes are tested once all centres are located.
-    uint refused;  // Not 0: boxes are flat (1) or more than twice as large as the mesh (2), and all voxels are empty.
+    uint refused;  // Not 0: boxes are flat (1) or too large, as in `SlicePlan` (2), and all voxels are empty.
     uint inside;   // Voxels with their centre in the mesh. Counted once all centres are located.
     uint touched;  // Voxels that the mesh only touches. Counted once all boxes are tested.
     uint empty;    // Voxels that it does not touch and, until all boxes are tested, those that it may touch.

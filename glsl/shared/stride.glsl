@@ -21,6 +21,9 @@ struct Exchange {
     bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
+// Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
+uint walked_tets = 0u;
+
 Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
 
 vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
@@ -135,6 +138,7 @@ bool stride_to(inout uint t, vec3 x, uint most) {
     Stand s = stand_in(t);
     uint owner = NONE;
     for (uint k = 0u; k < most; ++k) {
+        ++walked_tets;
         Sides at = sides_of(s, x);
         owner = owner_of(s, at, x);
         if (owner != NONE || at.near || !step_on(s, at)) break;

@@ -16,12 +16,18 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     uint leaf = near_bounds(g, at) ? find_leaf(g.level, quantize(g, at)) : NONE;
     if (leaf == NONE) return true;
     uvec2 range = entry_range(leaf);
-    uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
-    if (s.cursor == 0u) s.best = walked(g, leaf, range, at, x);
-    if (!s.best.inside && !walks_in(leaf, range)) search(s.best, begin, end, sought_at(g, at, x, tolerance));
-    work += end - begin;
-    s.cursor = end - range.x;
-    if (!s.best.inside && end < range.y) return false;
+    if (s.cursor == 0u) {
+        uint before = walked_tets;
+        s.best = walked(g, leaf, range, at, x);
+        work += walked_tets - before;
+    }
+    if (!s.best.inside && !walks_in(leaf, range)) {
+        uint begin = range.x + s.cursor, end = min(range.y, begin + max(budget - min(work, budget), 1u));
+        search(s.best, begin, end, sought_at(g, at, x, tolerance));
+        work += end - begin;
+        s.cursor = end - range.x;
+        if (!s.best.inside && end < range.y) return false;
+    }
     owner = decide(s.best, leaf, tolerance);
     s = no_search();
     return true;

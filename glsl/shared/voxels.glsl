@@ -18,13 +18,13 @@ uvec2 rows_of_run(uint run, uint rows, uint height, uint i) {
 
 // The centre of the first voxel of a row.
 vec3 row_origin(SlicePlan plan, uvec2 row) {
-    precise vec3 at = (plan.origin.xyz + float(row.y) * plan.up.xyz) + float(row.x) * plan.down.xyz;
+    precise vec3 at = (plan.origin.xyz + float(row.y) * plan.next_layer.xyz) + float(row.x) * plan.next_row.xyz;
     return at;
 }
 
 // The centre of voxel x of the row that starts at `row`.
 vec3 voxel_centre(SlicePlan plan, vec3 row, uint x) {
-    precise vec3 at = row + float(x) * plan.across.xyz;
+    precise vec3 at = row + float(x) * plan.next_voxel.xyz;
     return at;
 }
 

@@ -35,6 +35,7 @@ void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
         if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
+        ++walked_tets;
         if (near(weights(load_tet(words(cells.at[u])), x))) star[star_size++] = u;
     }
 }
@@ -45,6 +46,7 @@ void arrive(uint first, vec3 x, inout Best best) {
     star_size = 1u;
     for (uint i = 0u; i < star_size; ++i) {
         uint t = star[i];
+        ++walked_tets;
         Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
         consider(best, t, tet, w);
@@ -60,6 +62,7 @@ bool settled(Best best) { return best.inside || (best.in_box && best.smallest >=
 bool walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout Best best) {
     if (arrived) s = max(s, STEPS - ROUND);
     for (; s < STEPS; ++s) {
+        ++walked_tets;
         Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
         if (w.clear) best = Best(t, true, true, 0.0);
@@ -76,6 +79,7 @@ bool walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout Best b
 uint walk_leg(uint t, vec3 a, vec3 b) {
     uint from = NONE;
     for (uint s = 0u; s < LEG; ++s) {
+        ++walked_tets;
         Tet tet = load_tet(words(cells.at[t]));
         vec4 before = own_weights(weights(tet, a), tet), behind = own_weights(weights(tet, b), tet);
         uvec4 beside = words(neighbours.at[t]);

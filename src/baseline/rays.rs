@@ -126,8 +126,10 @@ impl Rays {
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a
-    /// ray-tracing pipeline can launch rays.
+    /// ray-tracing pipeline can launch rays, and those of [`crate::query::cmd_locate`].
     pub fn cmd_locate(&self, r: &mut Recorder<'_>, mesh: &DeviceMesh, input: &PointInput, output: &LocateOutput) -> Result<()> {
+        input.check()?;
+        output.check(input.count)?;
         let (grid, cells, vertices) = (mesh.arrays().grid, mesh.input().cells, mesh.arrays().vertices);
         let (sides, longest, scene) = (self.sides.all(), self.longest, self.structure.address());
         let PointInput { points, stride, count, .. } = *input;

@@ -122,6 +122,7 @@ fn measure(
     };
     let gpu = subject.gpu;
     let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
+    rebuilt()?; // `structure` still holds its memory, so the first one gets memory that the system has yet to give
     add(Quantity::Build, Some(repeat(budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
     for ((quantity, points), owners) in subject.points.iter().zip(&answers.owners) {
         let found = owners.iter().filter(|&&owner| owner != u32::MAX).count();

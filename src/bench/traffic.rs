@@ -56,7 +56,9 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let stages = [
         ("mesh.clear", 36 * t),
         ("mesh.bounds", 16 * t + 24 * p + 16 * p),
-        ("mesh.boundary", 16 * t + 16 * p + 6 * 16 * t),
+        ("mesh.shapes", cells_and_vertices),
+        ("mesh.faces", 4 * 16 * t),
+        ("mesh.boundary", 3 * 16 * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
         ("build.count", cells_and_vertices + 4 * t + SCAN * t),
         ("build.filter", if filtered { filter } else { 0 }),

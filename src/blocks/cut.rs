@@ -170,6 +170,11 @@ impl<'a> Source<'a> {
         neighbours(self.mesh, &self.topology.valid)
     }
 
+    /// Number of bad tetrahedra, which no block has.
+    pub(super) fn bad_cells(&self) -> u32 {
+        self.topology.counts.bad
+    }
+
     /// Whether a tetrahedron is not bad.
     pub(super) fn is_valid(&self, tet: u32) -> bool {
         self.topology.is_valid(tet)

@@ -35,7 +35,7 @@ pub struct Points<'a> {
 ///
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
-/// too small for the smallest blocks.
+/// too small for the smallest blocks, or for 2^32 points and more.
 pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32], On)>, report: Progress<'_>) -> Result<InBlocks<Located>> {
     let (mesh, n) = (asked.mesh, asked.points.len());
     check_field(mesh, field)?;
@@ -59,7 +59,7 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
 }
 
 /// Finds every tetrahedron that contains each point, as [`query::locate_all`] does; of [`Points::how`] only the
-/// tolerance is used.
+/// tolerance is used. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`locate`].
@@ -79,19 +79,25 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'
 /// repeated with a part of the points.
 type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
 
+/// The number of points, which 32 bits number.
+fn numbered(points: usize) -> Result<u32> {
+    u32::try_from(points).map_err(|_| Error::TooLarge(format!("{points} points; ask for {} at most at a time", u32::MAX)))
+}
+
 /// Queries the whole mesh, if it fits, or one block after another.
 fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
     let Points { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
+    let all: Vec<u32> = (0..numbered(points.len())?).collect();
     let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };
-    let all: Vec<u32> = (0..points.len() as u32).collect();
     if least_bytes(gpu, mesh, options)? <= memory {
-        let whole = job.took.build(|| Placed::whole(gpu, mesh, options));
+        let whole = job.took.place(gpu, mesh, options, 0);
         if unless_too_large(whole.and_then(|placed| job.ask(&placed, &all)))?.is_some() {
             return Ok(job.end());
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    job.took.bad_cells[0] = source.bad_cells();
     // The other points lie so far outside that they have no cell.
     let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
     let mut waiting = vec![(source.whole(), near)];
@@ -150,5 +156,17 @@ impl Job<'_> {
 
     fn end(&self) -> InBlocks {
         InBlocks { peak: self.gpu.memory_peak(), ..self.took.clone() }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_points_than_can_be_numbered_are_refused() {
+        assert_eq!(numbered(0xffff_ffff).unwrap(), u32::MAX);
+        let refused = numbered(0x1_0000_0000).unwrap_err();
+        assert!(matches!(&refused, Error::TooLarge(why) if why.contains("4294967296 points; ask for 4294967295 at most")), "{refused}");
     }
 }

@@ -43,7 +43,8 @@ pub use slice::{Stack, slice};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
-use cut::{Block, Source};
+use crate::options::BuildOptions;
+use cut::{Block, Placed, Source};
 use std::time::Instant;
 
 /// An answer, and its cost.
@@ -57,13 +58,15 @@ pub struct InBlocks<T = ()> {
     pub peak: u64,
     /// Seconds spent on building trees, transfers included.
     pub build_seconds: f64,
+    /// Number of bad tetrahedra, which are left out: of the mesh, or of each of two meshes.
+    pub bad_cells: [u32; 2],
 }
 
 impl<T> InBlocks<T> {
     /// Splits off the answer.
     pub fn into_parts(self) -> (T, InBlocks) {
-        let Self { answer, trees, peak, build_seconds } = self;
-        (answer, InBlocks { answer: (), trees, peak, build_seconds })
+        let Self { answer, trees, peak, build_seconds, bad_cells } = self;
+        (answer, InBlocks { answer: (), trees, peak, build_seconds, bad_cells })
     }
 }
 
@@ -71,7 +74,8 @@ impl InBlocks {
     /// Adds an answer.
     #[must_use]
     pub fn with<T>(self, answer: T) -> InBlocks<T> {
-        InBlocks { answer, trees: self.trees, peak: self.peak, build_seconds: self.build_seconds }
+        let Self { answer: (), trees, peak, build_seconds, bad_cells } = self;
+        InBlocks { answer, trees, peak, build_seconds, bad_cells }
     }
 
     /// Builds a tree and adds its cost.
@@ -81,6 +85,13 @@ impl InBlocks {
         self.trees += 1;
         self.build_seconds += start.elapsed().as_secs_f64();
         Ok(built)
+    }
+
+    /// Places the whole of a mesh, which is number `side` of those asked about, and adds its cost.
+    fn place(&mut self, gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, side: usize) -> Result<Placed> {
+        let placed = self.build(|| Placed::whole(gpu, mesh, options))?;
+        self.bad_cells[side] = placed.mesh.status().bad;
+        Ok(placed)
     }
 }
 
@@ -150,9 +161,12 @@ struct Refused<'a, 's> {
 }
 
 impl Refused<'_, '_> {
-    /// The error for a block of `tets` tetrahedra (or one of each mesh) that takes about `bytes`, or more than there
-    /// are for the reason `why`, and is not cut again.
+    /// The error for a block of `tets` tetrahedra (or one of each mesh) that takes about `bytes`, or failed for the
+    /// reason `why`, and is not cut again. If that is not the memory, `why` itself is the error.
     fn error(&self, tets: usize, bytes: u64, why: Option<Error>) -> Error {
+        if let Some(numbers @ Error::TooLarge(_)) = why {
+            return numbers;
+        }
         let limit = self.gpu.memory_limit();
         let why = why.map_or_else(String::new, |e| format!(" ({e})"));
         let finer = tets > LEAST && self.sources.iter().any(Source::has_level_wanted);
@@ -185,6 +199,17 @@ impl Refused<'_, '_> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::gpu::GpuOptions;
+
+    /// More memory would not help a block with more answers than can be numbered.
+    #[test]
+    fn memory_is_no_remedy_for_a_lack_of_numbers() {
+        let gpu = &Gpu::new(&GpuOptions::default()).unwrap().with_memory(1 << 20);
+        let refused = |why| Refused { gpu, sources: &[], beside: 0, may: ANYWHERE }.error(500, 100, Some(why)).to_string();
+        assert_eq!(refused(Error::TooLarge("2147483648 intersecting pairs".into())), "too large: 2147483648 intersecting pairs");
+        let memory = Error::Memory { name: "olbvh.test".into(), bytes: 1 << 21, reason: "none left".into() };
+        assert!(refused(memory).contains("1048576 bytes of device memory are too few"));
+    }
 
     #[test]
     fn pieces_fit_and_there_are_two_at_least() {

@@ -10,7 +10,8 @@ use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::options::BuildOptions;
 use crate::query::{self, OverlapInput, Overlapped, Progress, SILENT};
-use std::cell::OnceCell;
+use crate::reference::overlap::Overlap;
+use std::cell::{Cell, OnceCell};
 use std::rc::Rc;
 
 /// Bytes per tetrahedron of both meshes that the search takes ([`query::OverlapMemory`], [`query::PairMemory`]).
@@ -54,7 +55,8 @@ pub struct Meshes<'a> {
 
 /// Computes the overlap of A and B, as [`query::overlap`] does, within `memory` bytes of device memory. Pairs that are
 /// nearer to touching than 1e-6 of the scene's diagonal may be counted or not, depending on the blocks. The reported
-/// effort is the sum over all pairs of blocks.
+/// effort is the sum over all pairs of blocks. `report` receives how many millionths of the work are done, and a
+/// million.
 ///
 /// # Errors
 /// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
@@ -63,26 +65,36 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
     let Meshes { meshes, ref options, pairs } = *asked;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
+    // If the whole turns out not to fit, the progress stays where it is until the blocks have come as far.
+    let told = Cell::new(0);
+    let tell = |share: f64| {
+        told.set(told.get().max((share * 1e6) as u64));
+        report(told.get(), 1_000_000);
+    };
+    // The second construction can use the scratch memory of the first one again. What it adds, the second mesh itself,
+    // is half of what it takes at the least.
     if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
-        let whole = |mesh| Placed::whole(gpu, mesh, options);
-        let found = took.build(|| whole(meshes[0])).and_then(|a| {
-            let b = took.build(|| whole(meshes[1]))?;
-            query::overlap(input_of(&a), input_of(&b), pairs, report)
+        let found = took.place(gpu, meshes[0], options, 0).and_then(|a| {
+            let b = took.place(gpu, meshes[1], options, 1)?;
+            query::overlap(input_of(&a), input_of(&b), pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
         });
         if let Some(found) = unless_too_large(found)? {
+            tell(1.0);
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(found));
         }
     }
     let [a, b] = meshes.map(|mesh| Source::new(mesh, options)?.within(gpu, memory / 2));
     let sources = [a?, b?];
+    took.bad_cells = sources.each_ref().map(Source::bad_cells);
     let apart = APART * sources.iter().map(Source::extent).sum::<f64>();
-    let mut all = Overlapped::default();
+    let mut all = Overlapped { overlap: Overlap { pairs: pairs.then(Vec::new), ..Overlap::default() }, ..Overlapped::default() };
     let mut placed: [Option<(Rc<Node>, Placed)>; 2] = [None, None];
     let mut waiting = vec![(sources.each_ref().map(|s| Node::new(s.whole())), 1.0)];
     let mut done = 0.0;
     while let Some((nodes, share)) = waiting.pop() {
         if !meet(&sources, &nodes, apart) {
             done += share;
+            tell(done);
             continue;
         }
         let mut need = PER_TET * (nodes[0].tets() + nodes[1].tets()) as u64;
@@ -95,7 +107,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
         })?;
         let Tried::TooLarge(why) = tried else {
             done += share;
-            report((done * 1e6) as u64, 1_000_000);
+            tell(done);
             continue;
         };
         let larger = usize::from(nodes[1].tets() > nodes[0].tets());
@@ -111,6 +123,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
             waiting.push((next, share / 2.0));
         }
     }
+    tell(1.0);
     let overlap = &mut all.overlap;
     for set in [&mut overlap.a, &mut overlap.b] {
         set.sort_unstable();
@@ -165,8 +178,8 @@ fn merge(all: &mut Overlapped, found: Overlapped) {
     all.submissions += found.submissions;
     all.overlap.a.extend(found.overlap.a);
     all.overlap.b.extend(found.overlap.b);
-    if let Some(pairs) = found.overlap.pairs {
-        all.overlap.pairs.get_or_insert_default().extend(pairs);
+    if let Some(pairs) = &mut all.overlap.pairs {
+        pairs.extend(found.overlap.pairs.into_iter().flatten());
     }
     for (sum, effort) in all.overlap.effort.iter_mut().zip(&found.overlap.effort) {
         sum.add(effort);

@@ -12,8 +12,9 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Plan, Prepared, RenderSettings, RenderStats, ValidTets};
+use crate::render::{Plan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
 use rayon::prelude::*;
+use std::ops::Range;
 use std::slice::from_ref;
 
 /// Bytes of device memory that rendering takes beside a block, at the least: for each column of the picture (of which
@@ -45,8 +46,8 @@ pub struct Picture {
     pub range: [f32; 2],
 }
 
-/// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the amount of
-/// work done, and of all.
+/// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the number of
+/// rays done and of all; for a mesh in blocks, how many millionths of the work are done, and a million.
 ///
 /// # Errors
 /// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
@@ -57,19 +58,21 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) ->
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     if least_bytes(gpu, mesh, options)? <= memory {
-        let placed = took.build(|| Placed::whole(gpu, mesh, options));
+        let placed = took.place(gpu, mesh, options, 0);
         if let Some(picture) = unless_too_large(placed.and_then(|placed| render_whole(&placed, asked, report)))? {
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(picture));
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    took.bad_cells[0] = source.bad_cells();
     // Light and opacity of a volume depend on which points are on the mesh surface; those of iso-surfaces do not.
     let neighbours = if settings.iso.is_empty() { source.neighbours() } else { Vec::new() };
     let valid = ValidTets { bounds: (&source.grid).into(), neighbours: &neighbours, is_valid: &|t| source.is_valid(t) };
     let prepared = Prepared::new(settings, mesh, &valid, field)?;
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
-    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, stats: RenderStats::default(), took };
+    let order = Order::new(&prepared.plan, &source.grid);
+    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, order, stats: RenderStats::default(), took };
     let mut waiting = vec![(source.whole(), 1.0)];
     let mut done = 0.0;
     while let Some((block, share)) = waiting.pop() {
@@ -107,6 +110,7 @@ struct Job<'a> {
     source: &'a Source<'a>,
     field: &'a Field,
     prepared: &'a Prepared,
+    order: Order,
     stats: RenderStats,
     took: InBlocks,
 }
@@ -121,8 +125,7 @@ impl Job<'_> {
         }
         let need = block.bytes(self.gpu, &self.source.options)?;
         let Tried::TooLarge(why) = try_block(need, self.memory, || self.draw(block, &met, rays))? else { return Ok(None) };
-        let order = |axis: usize, last: u32| low_first(&self.prepared.plan, &self.source.grid, axis, last);
-        let may = |axis: usize, last: u32| order(axis, last).is_some();
+        let may = |axis: usize, last: u32| self.order.low_first(axis, last).is_some();
         let Some([low, high]) = smaller(self.source, block, pieces(need, self.memory), &may) else {
             let beside = RESERVE + PER_COLUMN * u64::from(self.prepared.plan.size[0]);
             let refused = Refused { gpu: self.gpu, sources: from_ref(self.source), beside, may: &may };
@@ -130,7 +133,7 @@ impl Job<'_> {
         };
         let finest = low.cells.finest(self.source.level).hi;
         let axis = (0..3).find(|&c| low.cells.hi[c] < high.cells.lo[c]).unwrap_or(0);
-        Ok(Some(if order(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
+        Ok(Some(if self.order.low_first(axis, finest[axis]) == Some(false) { [high, low] } else { [low, high] }))
     }
 
     /// Renders a block's part of the picture. Work that was done before a failure is not repeated by the block's parts.
@@ -166,22 +169,9 @@ impl Job<'_> {
         let Some([lo, hi]) = block.bounds(self.source) else { return vec![false; height as usize] };
         // More than the distance by which rounding can move samples out of their cells.
         let more = self.source.extent() / 1024.0;
-        let meets = |x: u32, y: u32| {
-            let (origin, direction) = plan.rays.ray(x, y);
-            let mut reach = [0.0, f64::MAX];
-            for c in 0..3 {
-                let (from, direction) = (f64::from(origin[c]), f64::from(direction[c]));
-                let [a, b] = [lo[c] - more - from, hi[c] + more - from];
-                if direction == 0.0 {
-                    reach[1] = if a <= 0.0 && 0.0 <= b { reach[1] } else { -1.0 };
-                } else {
-                    reach = [reach[0].max((a / direction).min(b / direction)), reach[1].min((a / direction).max(b / direction))];
-                }
-            }
-            reach[0] <= reach[1]
-        };
+        let box_around = [lo.map(|x| x - more), hi.map(|x| x + more)];
         let seen = |x: u32, y: u32| rays.colors[(y as usize) * width as usize + x as usize][3] < plan.termination;
-        (0..height).into_par_iter().map(|y| (0..width).any(|x| seen(x, y) && meets(x, y))).collect()
+        (0..height).into_par_iter().map(|y| any_meets(&plan.rays, box_around, 0..width, y, &|x| seen(x, y))).collect()
     }
 }
 
@@ -192,20 +182,148 @@ fn union(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
 }
 
-/// Whether the cells up to `last` on an axis come before the cells after it on all rays that meet both; `None` if the
-/// order differs between rays.
-fn low_first(plan: &Plan, grid: &Grid, axis: usize, last: u32) -> Option<bool> {
-    let [width, height] = plan.size;
-    // Cells are monotone along a ray, so its origin and direction determine which side it can meet first.
-    let goes = |x: u32, y: u32| {
-        let (origin, direction) = plan.rays.ray(x, y);
-        let low = grid.quantize(origin)[axis] <= last;
-        [direction[axis] > 0.0 && low, direction[axis] < 0.0 && !low]
+/// Whether any of these pixels of a row is `seen` and has a ray that may meet a box. Spans of pixels are halved as long
+/// as one of their rays may meet it.
+fn any_meets(rays: &RayGrid, box_around: [[f64; 3]; 2], pixels: Range<u32>, y: u32, seen: &dyn Fn(u32) -> bool) -> bool {
+    let (first, end) = (pixels.start, pixels.end);
+    if end - first <= 16 {
+        return pixels.into_iter().any(|x| seen(x) && may_meet(rays, box_around, [x, x], y));
+    }
+    let middle = first.midpoint(end);
+    may_meet(rays, box_around, [first, end - 1], y)
+        && [first..middle, middle..end].into_iter().any(|half| any_meets(rays, box_around, half, y, seen))
+}
+
+/// Whether the ray of any of the pixels from the first to the last of these may meet a box. Between the two, origins and
+/// directions lie between theirs on each axis, if a direction may have any length, but for rounding.
+fn may_meet(rays: &RayGrid, [lo, hi]: [[f64; 3]; 2], ends: [u32; 2], y: u32) -> bool {
+    const ROUNDING: f64 = 1e-6;
+    let ends = ends.map(|x| rays.ray(x, y));
+    let mut reach = [0.0, f64::MAX];
+    // Keeps the distances t at which t·speed ≥ way.
+    let mut keep = |speed: f64, way: f64| {
+        if speed > 0.0 {
+            reach[0] = reach[0].max(way / speed);
+        } else if speed < 0.0 {
+            reach[1] = reach[1].min(way / speed);
+        } else if way > 0.0 {
+            reach[1] = -1.0;
+        }
     };
-    let either = |a: [bool; 2], b: [bool; 2]| [a[0] || b[0], a[1] || b[1]];
-    let row = |y: u32| (0..width).fold([false; 2], |all, x| either(all, goes(x, y)));
-    match (0..height).into_par_iter().map(row).reduce(|| [false; 2], either) {
-        [true, true] => None,
-        [_, down] => Some(!down),
+    for c in 0..3 {
+        let [from, speed] = [ends.map(|(origin, _)| f64::from(origin[c])), ends.map(|(_, direction)| f64::from(direction[c]))];
+        keep(speed[0].max(speed[1]) + ROUNDING, lo[c] - from[0].max(from[1]));
+        keep(ROUNDING - speed[0].min(speed[1]), from[0].min(from[1]) - hi[c]);
+    }
+    reach[0] <= reach[1]
+}
+
+/// On each axis, the least cell of the origins of rays that go up, and the greatest cell of those of rays that go down.
+struct Order {
+    least_up: [u32; 3],
+    greatest_down: [Option<u32>; 3],
+}
+
+impl Order {
+    fn new(plan: &Plan, grid: &Grid) -> Self {
+        let [width, height] = plan.size;
+        let none = || Self { least_up: [u32::MAX; 3], greatest_down: [None; 3] };
+        let with = |mut all: Self, (x, y): (u32, u32)| {
+            let (origin, direction) = plan.rays.ray(x, y);
+            let cell = grid.quantize(origin);
+            for c in 0..3 {
+                if direction[c] > 0.0 {
+                    all.least_up[c] = all.least_up[c].min(cell[c]);
+                } else if direction[c] < 0.0 {
+                    all.greatest_down[c] = all.greatest_down[c].max(Some(cell[c]));
+                }
+            }
+            all
+        };
+        let both = |a: Self, b: Self| Self {
+            least_up: [0, 1, 2].map(|c| a.least_up[c].min(b.least_up[c])),
+            greatest_down: [0, 1, 2].map(|c| a.greatest_down[c].max(b.greatest_down[c])),
+        };
+        (0..height).into_par_iter().map(|y| (0..width).fold(none(), |all, x| with(all, (x, y)))).reduce(none, both)
+    }
+
+    /// Whether the cells up to `last` on an axis come before the cells after it on all rays that meet both; `None` if
+    /// the order differs between rays. Cells are monotone along a ray, so its origin and direction determine which side
+    /// it can meet first.
+    fn low_first(&self, axis: usize, last: u32) -> Option<bool> {
+        let (up, down) = (self.least_up[axis] <= last, self.greatest_down[axis].is_some_and(|cell| cell > last));
+        if up && down { None } else { Some(!down) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::render::{Bounds, CameraSpec};
+
+    const BOUNDS: Bounds = Bounds { lo: [0.0; 3], hi: [10.0, 8.0, 6.0] };
+    const SIZE: [u32; 2] = [61, 43];
+
+    /// The rays of pictures from outside, from within, and with a wide angle.
+    fn cameras() -> impl Iterator<Item = RayGrid> {
+        let specs = [
+            "iso",
+            "front,ortho",
+            "azimuth=200,elevation=-35,zoom=3",
+            "azimuth=70,elevation=40,ortho,zoom=0.5",
+            "eye=5,4,3,target=1,2,6,fov=100",
+            "eye=9,1,1,target=0,8,6,fov=170",
+        ];
+        specs
+            .map(|spec| spec.parse::<CameraSpec>().unwrap().resolve(&BOUNDS, [0.0; 3], 61.0 / 43.0).unwrap().rays(SIZE, &BOUNDS))
+            .into_iter()
+    }
+
+    #[test]
+    fn spans_of_pixels_miss_no_ray() {
+        let (mut met, mut clear) = (0, 0);
+        for rays in cameras() {
+            let meets = |[lo, hi]: [[f64; 3]; 2], x: u32, y: u32| {
+                let (from, way) = rays.ray(x, y);
+                let t = |c: usize| [lo[c], hi[c]].map(|side| (side - f64::from(from[c])) / f64::from(way[c]));
+                let [enter, leave] =
+                    [0, 1, 2].map(t).into_iter().fold([0.0, f64::MAX], |[a, b], [s, t]| [s.min(t).max(a), s.max(t).min(b)]);
+                enter <= leave
+            };
+            for i in 0..60 {
+                let lo = [0, 1, 2].map(|c| f64::from((i * 7 + c * 5 + i * c) % 11) * 0.8);
+                let around = [lo, lo.map(|x| x + 0.3 * f64::from(i % 5))];
+                for y in (0..SIZE[1]).step_by(3) {
+                    let is = (0..SIZE[0]).any(|x| meets(around, x, y));
+                    let found = any_meets(&rays, around, 0..SIZE[0], y, &|_| true);
+                    assert!(found || !is, "{around:?}, row {y}");
+                    assert!(!any_meets(&rays, around, 0..SIZE[0], y, &|_| false));
+                    (met, clear) = (met + u32::from(is), clear + u32::from(!found));
+                }
+            }
+        }
+        assert!(met > 200 && clear > 500, "{met} rows met, {clear} found clear");
+    }
+
+    #[test]
+    fn cuts_are_in_the_order_of_all_rays() {
+        let grid = Grid::new([0.0; 3], [10.0, 8.0, 6.0]);
+        // From a single eye, or in a single direction, all rays agree.
+        let mut answers = [0; 2];
+        for rays in cameras() {
+            let settings = RenderSettings { size: SIZE, ..RenderSettings::default() };
+            let plan = Plan { rays, ..Plan::new(&settings, &BOUNDS, [0.0; 3], Some([0.0, 1.0])).unwrap() };
+            let order = Order::new(&plan, &grid);
+            let all: Vec<_> = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| rays.ray(x, y))).collect();
+            for (axis, last) in [0, 1, 2].into_iter().flat_map(|axis| (0..1023).step_by(31).map(move |last| (axis, last))) {
+                let starts = |low: bool| move |origin: [f32; 3]| (grid.quantize(origin)[axis] <= last) == low;
+                let up = all.iter().any(|&(origin, direction)| direction[axis] > 0.0 && starts(true)(origin));
+                let down = all.iter().any(|&(origin, direction)| direction[axis] < 0.0 && starts(false)(origin));
+                let expected = if up && down { None } else { Some(!down) };
+                assert_eq!(order.low_first(axis, last), expected);
+                answers[usize::from(expected.unwrap())] += 1;
+            }
+        }
+        assert!(answers.iter().all(|&n| n > 20), "{answers:?}");
     }
 }

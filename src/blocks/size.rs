@@ -26,11 +26,11 @@ pub(super) struct Extent {
 }
 
 impl Extent {
-    /// Adds a tetrahedron that meets the cells `own`.
-    pub(super) fn with(self, block: CellRange, own: CellRange) -> Self {
-        let (span, candidates) = (block.common(&own), u64::from(own.count()));
-        let crossing = if span == Some(own) { 0 } else { candidates };
-        self.and(Self { span, reach: Some(own), candidates, crossing })
+    /// Adds a tetrahedron that meets the cells `tet`.
+    pub(super) fn with(self, block: CellRange, tet: CellRange) -> Self {
+        let (span, candidates) = (block.common(&tet), u64::from(tet.count()));
+        let crossing = if span == Some(tet) { 0 } else { candidates };
+        self.and(Self { span, reach: Some(tet), candidates, crossing })
     }
 
     pub(super) fn and(self, other: Self) -> Self {

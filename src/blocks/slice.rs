@@ -66,7 +66,7 @@ pub fn slice(
         sink(band)
     };
     if least_bytes(gpu, mesh, options)? <= memory {
-        let whole = took.build(|| Placed::whole(gpu, mesh, options));
+        let whole = took.place(gpu, mesh, options, 0);
         let sliced = whole.and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink));
         // Once the sink has voxels, it is too late to begin again.
         let sliced = if tally.get() == Tally::default() { unless_too_large(sliced)? } else { Some(sliced?) };
@@ -75,6 +75,7 @@ pub fn slice(
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
+    took.bad_cells[0] = source.bad_cells();
     voxels.plan(&source.grid)?;
     let mut job = Job { gpu, memory, asked, source: &source, blocks: vec![source.whole()], placed: None, took, done: 0.0, report };
     for rows in bands(voxels, BATCH) {

@@ -1,7 +1,7 @@
 //! Stage 2, candidates: counts them, decides which are entries, and goes to coarser levels until the entries fit.
 
-use super::mesh::{MeshArrays, MeshInput};
 use super::plan::{Capacity, CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, filtered};
+use super::prepare::{MeshArrays, MeshInput};
 use super::stages::Build;
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};

@@ -1,8 +1,8 @@
 //! Construction of the tree on the device (the paper's §3.2), as a pipeline of recorded stages.
 //!
 //! ```text
-//! 0 mesh     check cells · bounds → grid · normalise vertices · match faces → neighbours, boundary bits
-//!            (once per mesh)
+//! 0 mesh     check cells · bounds → grid · normalise vertices · measure cells
+//!            · match faces → neighbours (once per mesh) · boundary bits
 //! 1 depth    estimate per tetrahedron → level l                                                      Eq. 11–12
 //! 2 codes    count cells per tetrahedron · scan · [mark · filter · settle seeds · fit]               Eq. 1–6
 //!            · emit (code, tetrahedron) · stable radix sort
@@ -19,16 +19,20 @@
 mod candidates;
 mod mesh;
 mod plan;
+mod prepare;
 mod ranges;
 mod stages;
 mod tree;
 
-pub use mesh::{BadCells, DeviceMesh, MAX_TETS, MeshArrays, MeshInput, MeshScratch, MeshView, cmd_prepare_mesh};
-pub(crate) use mesh::{KeptMesh, check_points};
+pub(crate) use mesh::KeptMesh;
+pub use mesh::{BadCells, DeviceMesh};
 pub(crate) use plan::MAX_ENTRIES;
 pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
 #[cfg(feature = "cli")]
 pub(crate) use plan::{SHARE, filtered};
+pub(crate) use prepare::check_points;
+pub use prepare::{MAX_TETS, MeshArrays, MeshInput, MeshScratch, MeshView, cmd_move_mesh, cmd_prepare_mesh};
+pub(crate) use ranges::check_field;
 pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use tree::Tree;
 

@@ -1,6 +1,6 @@
 //! Memory of a build: the arrays of the tree, and scratch memory.
 
-use super::mesh::check_tets;
+use super::prepare::check_tets;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Gpu};
 use crate::grid::MAX_LEVEL;
@@ -30,7 +30,8 @@ pub struct Capacity {
 }
 
 impl Capacity {
-    /// Bounds for at most `entries` entries down to `level`: `n_n ≤ 1 + Σ min(n_m, 8^k)` (SPEC 2.4).
+    /// Bounds for at most `entries` entries, and as many candidates, down to `level`: `n_n ≤ 1 + Σ min(n_m, 8^k)`
+    /// (SPEC 2.4). See [`Capacity::with_candidates`].
     pub fn for_entries(entries: u32, level: u32) -> Self {
         let nodes = (1..=level.min(MAX_LEVEL)).map(|k| u64::from(entries).min(8u64.pow(k))).sum::<u64>() + 1;
         Self { candidates: entries, entries, nodes: u32::try_from(nodes).unwrap_or(u32::MAX - 1), level }
@@ -40,6 +41,16 @@ impl Capacity {
     /// `Lists::Boundary`; trees over other meshes get coarser.
     pub fn usual(tets: u32, level: u32) -> Self {
         Self { candidates: usual_capacity(tets), ..Self::for_entries(tets.saturating_mul(8).min(MAX_ENTRIES), level) }
+    }
+
+    /// With room for [`usual_capacity`] candidates where `options` filter them, so that a recorded build is as deep as
+    /// its entries allow; otherwise candidates, of which there are several times as many, limit it first. The build's
+    /// own options must then have neither capacity nor budget, which limit candidates as well. A capacity of fewer
+    /// entries than tetrahedra, which [`super::BuildScratch::carve`] refuses, stays as it is.
+    #[must_use]
+    pub fn with_candidates(self, tets: u32, options: &BuildOptions) -> Self {
+        let more = if filtered(options) && self.entries >= tets { usual_capacity(tets) } else { 0 };
+        Self { candidates: self.candidates.max(more), ..self }
     }
 
     /// The largest capacity down to `level` whose [`TreeMemory`] takes no more than `bytes`, whatever tree is built.
@@ -307,5 +318,25 @@ impl SortedScratch {
             arguments: arena.words(3)?,
             scan: ScanScratch::carve(gpu, arena, table)?,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn filtered_candidates_do_not_limit_the_entries() {
+        let (tets, options) = (100_000, BuildOptions::default());
+        let sizes = |c: Capacity| [c.candidates, c.entries, c.nodes, c.level];
+        let with = |entries: u32, options: &BuildOptions| sizes(Capacity::for_entries(entries, 7).with_candidates(tets, options));
+        assert_eq!(with(8 * tets, &options), sizes(Capacity::usual(tets, 7)));
+        let whole = Capacity::for_entries(100 * tets, 7);
+        assert_eq!(with(100 * tets, &options), sizes(whole));
+        let few = Capacity::for_entries(tets - 1, 7);
+        assert_eq!(with(tets - 1, &options), sizes(few));
+        // Without a filter, candidates are entries.
+        let paper = BuildOptions { assign: Assign::Aabb, lists: Lists::All, ..options };
+        assert_eq!(with(8 * tets, &paper), sizes(Capacity::for_entries(8 * tets, 7)));
     }
 }

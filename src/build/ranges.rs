@@ -1,7 +1,7 @@
 //! The range of a field's values in every node of a tree (a min–max octree). New values need new ranges, but no new
 //! tree.
 
-use super::{DeviceMesh, MeshView, Tree, TreeMemory};
+use super::{DeviceMesh, MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{MergeRanges, MergeRangesSpec, PushRanges, PushRangesSpec, ScatterRanges, ScatterRangesSpec};
@@ -12,6 +12,11 @@ pub fn range_bytes(nodes: u32) -> u64 {
     8 * u64::from(nodes)
 }
 
+/// Rejects a field with fewer values than the mesh has points, or tetrahedra.
+pub(crate) fn check_field((values, on): (BufferRef, On), mesh: &MeshInput) -> Result<()> {
+    values.check(4 * u64::from(if on == On::Points { mesh.points } else { mesh.tets }), "a field")
+}
+
 /// Records the computation of a field's ranges (one float per point or per tetrahedron of the mesh) into `ranges`,
 /// which has [`range_bytes`] for the nodes of the tree's capacity. Their definition is in
 /// [`mod@crate::reference::ranges`]. Needs no scratch memory.
@@ -20,13 +25,16 @@ pub fn range_bytes(nodes: u32) -> u64 {
 /// compute write, followed by a barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
-/// [`Error::TooLarge`] for more nodes than shaders can number, [`Error::Vulkan`] if a pipeline cannot be made.
+/// [`Error::Invalid`] if the parts are too small for the field or its ranges, [`Error::TooLarge`] for more nodes than
+/// shaders can number, [`Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (field, on): (BufferRef, On), ranges: BufferRef) -> Result<()> {
     let (input, bad, workgroup) = (mesh.input, mesh.arrays.bad, r.gpu().target().each);
     let TreeMemory { capacity, status, grid, co, masks, .. } = *tree;
     if capacity.nodes > i32::MAX.cast_unsigned() / 2 {
         return Err(Error::TooLarge(format!("ranges of {} nodes; shaders number {} at most", capacity.nodes, i32::MAX / 2)));
     }
+    check_field((field, on), &input)?;
+    ranges.check(range_bytes(capacity.nodes), "ranges")?;
     let of_level = |level: u32| Groups::Count(8u64.pow(level).min(u64::from(capacity.nodes)).div_ceil(u64::from(workgroup)) as u32);
     r.stage("build.ranges", |r| {
         r.fill(ranges.part(0, range_bytes(capacity.nodes)), 0);

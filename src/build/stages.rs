@@ -1,8 +1,8 @@
 //! The stages of a build, which append to a recorder. Those that choose the entries are in [`super::candidates`];
 //! [`super`] calls them in order.
 
-use super::mesh::{MeshInput, MeshView, summing_share};
 use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use super::prepare::{MeshInput, MeshView, summing_share};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -12,7 +12,7 @@ use crate::kernels::{
 };
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
-use crate::primitives::{Count, cmd_exclusive_scan, cmd_sort_pairs};
+use crate::primitives::{Count, Unsorted, cmd_exclusive_scan, cmd_sort};
 use crate::reference::boundary::NONE;
 use crate::reference::quarters::id_mask;
 
@@ -82,8 +82,10 @@ impl Build<'_> {
         let Self { mesh, grid, counts, filter, .. } = *self;
         let MeshInput { cells, tets, .. } = mesh.input;
         let (quantized, bad) = (mesh.arrays.vertices, mesh.arrays.bad);
-        let (offsets, candidates, codes) = (counts.offsets, counts.candidates, scratch.codes);
+        let (offsets, candidates) = (counts.offsets, counts.candidates);
         let target = r.gpu().target();
+        let pairs = Unsorted::place(r.gpu(), (scratch.codes, ids), 3 * capacity.level, capacity.entries, &scratch.sort);
+        let Unsorted { keys: codes, values: ids, .. } = pairs;
         r.stage("build.emit", |r| {
             if let Some(filter) = filter {
                 let shares = Count::device(filter.most, counts.total);
@@ -123,7 +125,7 @@ impl Build<'_> {
             }
             Ok(())
         })?;
-        r.stage("build.sort", |r| cmd_sort_pairs(r, codes, ids, 3 * capacity.level, self.entries(capacity), &scratch.sort))
+        r.stage("build.sort", |r| cmd_sort(r, &pairs, self.entries(capacity), &scratch.sort))
     }
 
     /// Stage 3, first part: counts the nodes that end at each run of entries on each level; writes `NO` and the number

@@ -1,7 +1,8 @@
 //! A tree in device memory owned by this crate.
 
-use super::mesh::{DeviceMesh, KeptMesh, MeshView};
-use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use super::mesh::{DeviceMesh, KeptMesh};
+use super::plan::{Capacity, CountScratch, FilterScratch, MAX_ENTRIES, SortedScratch, TreeMemory, filtered};
+use super::prepare::MeshView;
 use super::stages::Build;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
@@ -29,8 +30,8 @@ pub struct Tree {
 }
 
 impl Tree {
-    /// Builds a tree over a mesh in four submissions (three if every candidate is an entry, as with the paper's lists).
-    /// Between them the numbers of candidates, entries and nodes are read back, so that exactly the needed memory is
+    /// Builds a tree over a mesh in four submissions (three if every candidate is an entry, as with the paper's lists),
+    /// not counting those that read numbers back where the host cannot do so itself. Between them the numbers of candidates, entries and nodes are read back, so that exactly the needed memory is
     /// allocated. If [`BuildOptions::fineness`] calls for a finer tree, that is built afterwards, provided there is
     /// memory for both.
     ///
@@ -75,7 +76,8 @@ impl Tree {
         let (counts_buffer, counts) = Arena::reserve(gpu, "olbvh.build.counts", |a| CountScratch::carve(gpu, a, tets))?;
         let build = Build { mesh: &view, options, status, grid, counts: &counts, filter: None };
         let ((), time) = gpu.submit("olbvh.build.counts", |r| {
-            build.depth(r, u32::MAX, MAX_LEVEL)?;
+            // Without a filter, every candidate is an entry.
+            build.depth(r, if filtered(options) { u32::MAX } else { MAX_ENTRIES }, MAX_LEVEL)?;
             build.count(r)
         })?;
         stages.extend(time.stages);

@@ -41,9 +41,9 @@ pub extern "C" fn olbvh_host_check(
         let Some(get) = get_instance_proc_addr.filter(|_| instance != 0 && physical_device != 0) else {
             return Err(missing("the loader's function or a handle"));
         };
-        // SAFETY: the host passes the loader's function and handles of an instance that has not been destroyed.
-        let instance = unsafe { load(get, instance) };
-        let found = Requirements::check(&instance, vk::PhysicalDevice::from_raw(physical_device));
+        // SAFETY: the host passes the loader's function, and handles of an instance that has not been destroyed and of a
+        // physical device of it.
+        let found = unsafe { Requirements::check(&load(get, instance), vk::PhysicalDevice::from_raw(physical_device)) };
         if !found.missing.is_empty() {
             return Err(Error::NoDevice(format!("the physical device lacks {}", found.missing.join(", "))));
         }

@@ -15,10 +15,11 @@ mod record;
 #[cfg(test)]
 mod tests;
 
-use crate::build::{BadCells, DeviceMesh, MeshInput, Tree};
+use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
 use crate::gpu::{Buffer, Gpu, GpuOptions, StageTime};
+use crate::grid::MAX_LEVEL;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use crate::render::Bounds;
@@ -61,6 +62,7 @@ struct HeldMesh {
     device: DeviceMesh,
     /// The caller's number of each tetrahedron and of each point, if the mesh was reordered.
     ids: Option<[Vec<u32>; 2]>,
+    copy: query::HostCopy,
 }
 
 impl HeldMesh {
@@ -71,16 +73,16 @@ impl HeldMesh {
 
     /// The caller's field, brought into the order of the mesh.
     fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
-        let (on, count) = on(on_cells, self.device.input());
-        let values = array(values, count as usize, "values")?;
+        let (on, [points, tets]) = (on(on_cells), self.device.sizes());
+        let values = array(values, if on == On::Points { points } else { tets }, "values")?;
         let ids = self.ids.as_ref().map(|[cells, points]| if on == On::Points { points } else { cells });
         Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().map(|&i| values[i as usize]).collect()), on))
     }
 }
 
-/// What the values of a field belong to, and how many values there must be.
-fn on(on_cells: u32, mesh: &MeshInput) -> (On, u32) {
-    if on_cells == 0 { (On::Points, mesh.points) } else { (On::Cells, mesh.tets) }
+/// What the values of a field belong to.
+fn on(on_cells: u32) -> On {
+    if on_cells == 0 { On::Points } else { On::Cells }
 }
 
 /// The tolerance to use; a negative argument selects the default.
@@ -114,8 +116,9 @@ pub struct OlbvhBuildOptions {
     /// Whether leaves become finer than that. 0: no. 1: yes where lists are long, which suits location of points,
     /// slices and overlap. 2: as fine as suits pictures. A recorded build ignores this.
     pub fineness: u32,
-    /// Maximum number of entries of the tree, which is made coarser until it fits. 0: the usual capacity, 64 entries
-    /// per tetrahedron and at least 2^20.
+    /// Maximum number of entries of the tree, which is made coarser until it fits; `olbvh_tree_build` counts those of
+    /// `assign` 0 with full lists, which are more. 0: the usual capacity, 64 entries per tetrahedron and at least 2^20,
+    /// or that of `olbvh_plan`.
     pub capacity: u32,
     /// Maximum number of bytes of all arrays of the tree together; it is made coarser until it fits. 0: no limit.
     pub budget: u64,
@@ -123,6 +126,7 @@ pub struct OlbvhBuildOptions {
 
 impl OlbvhBuildOptions {
     fn read(&self) -> Result<BuildOptions> {
+        check_level(self.level)?;
         let unknown = |what: &str, n: u32| Error::Invalid(format!("{what} {n} is not known"));
         Ok(BuildOptions {
             alpha: self.alpha,
@@ -135,6 +139,11 @@ impl OlbvhBuildOptions {
             fineness: Fineness::EVERY.into_iter().find(|f| *f as u32 == self.fineness).ok_or_else(|| unknown("fineness", self.fineness))?,
         })
     }
+}
+
+/// Rejects a level that a tree cannot have.
+fn check_level(level: u32) -> Result<()> {
+    if level > MAX_LEVEL { Err(Error::Invalid(format!("level {level}; the deepest is {MAX_LEVEL}"))) } else { Ok(()) }
 }
 
 /// Properties of a tree.
@@ -269,7 +278,7 @@ pub extern "C" fn olbvh_version() -> *const c_char {
 }
 
 /// Version of this interface. A header and a library with different versions are incompatible.
-pub const OLBVH_ABI: u32 = 1;
+pub const OLBVH_ABI: u32 = 2;
 
 /// Returns the `OLBVH_ABI` of the library, for comparison with that of the header.
 #[unsafe(no_mangle)]
@@ -309,12 +318,16 @@ pub extern "C" fn olbvh_mesh_upload(
     out: *mut *mut OlbvhMesh,
 ) -> OlbvhStatus {
     border(|| {
-        let points = array(points.cast::<[f32; 3]>(), point_count, "points")?.to_vec();
-        let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?.to_vec();
-        let mesh = Mesh::new(points, tets);
-        let mesh = if reorder == 0 { mesh } else { mesh.along_curve()? };
-        let device = DeviceMesh::upload(&handle(gpu, "gpu")?.0, &mesh, BadCells::Skip)?;
-        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids: mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from) })))
+        let gpu = &handle(gpu, "gpu")?.0;
+        let points = array(points.cast::<[f32; 3]>(), point_count, "points")?;
+        let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?;
+        let (device, ids) = if reorder == 0 {
+            (DeviceMesh::upload_arrays(gpu, points, tets, None)?, None)
+        } else {
+            let mesh = Mesh::new(points.to_vec(), tets.to_vec()).along_curve()?;
+            (DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?, mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from))
+        };
+        give(out, OlbvhMesh(Arc::new(HeldMesh { device, ids, copy: query::HostCopy::default() })))
     })
 }
 

@@ -3,15 +3,16 @@
 use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, tolerance};
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
-use crate::mesh::{Field, Mesh};
+use crate::mesh::{Field, Mesh, On};
 use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
-use crate::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
+use crate::render::{Bounds, Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
 use std::mem::MaybeUninit;
 use std::slice::IterMut;
+use std::sync::OnceLock;
 
 /// What a picture shows. `olbvh_default_picture_settings` returns the defaults.
 #[repr(C)]
@@ -105,12 +106,49 @@ impl OlbvhPictureSettings {
 
 impl OlbvhVoxels {
     pub(super) fn read(&self) -> VoxelGrid {
-        let Self { origin, across, down, up, half, width, height, layers } = *self;
-        VoxelGrid { origin, across, down, up, half, size: [width, height], layers }
+        let Self { origin, across: next_voxel, down: next_row, up: next_layer, half, width, height, layers } = *self;
+        VoxelGrid { origin, next_voxel, next_row, next_layer, half, size: [width, height], layers }
+    }
+}
+
+/// Arrays of a mesh in host memory, read back when a picture first needs them. They are those of the device, in the
+/// order there.
+#[derive(Default)]
+pub(super) struct HostCopy {
+    pub(super) mesh: OnceLock<Mesh>,
+    pub(super) neighbours: OnceLock<Vec<[u32; 4]>>,
+    pub(super) bad: OnceLock<Vec<u32>>,
+}
+
+/// The content of a cell, which is made first if there is none.
+fn kept<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
+    match cell.get() {
+        Some(value) => Ok(value),
+        None => make().map(|made| cell.get_or_init(|| made)),
     }
 }
 
 impl HeldMesh {
+    /// The plan of a picture, and its normals (none without shading). The mesh is read back only if the settings leave
+    /// open what depends on it.
+    fn prepare(&self, settings: &RenderSettings, bounds: Bounds, field: &Field) -> Result<(Plan, Vec<[f32; 3]>)> {
+        let RenderSettings { camera, transfer, iso, range, shading, .. } = settings;
+        let adapts = iso.is_empty() && !transfer.has_opacity();
+        let frames = camera.eye.is_none() || camera.ortho == Some(None);
+        let needs_mesh = range.or(transfer.range()).is_none() || adapts || frames || *shading;
+        // What is wrong with surfaces of a field of cells, `Prepared` says.
+        if !needs_mesh && (iso.is_empty() || field.on == On::Points) {
+            return Ok((Plan::new(settings, &bounds, [0.0; 3], None)?, Vec::new()));
+        }
+        let bad = if self.device.status().bad == 0 { &[][..] } else { kept(&self.copy.bad, || self.device.bad_cells())? };
+        // Opacity and light of a volume depend on where the surface is.
+        let surface = adapts || iso.is_empty() && *shading;
+        let neighbours = if surface { kept(&self.copy.neighbours, || self.device.neighbours())? } else { &[][..] };
+        let valid = ValidTets { bounds, neighbours, is_valid: &|tet| bad.binary_search(&tet).is_err() };
+        let Prepared { plan, normals, .. } = Prepared::new(settings, kept(&self.copy.mesh, || self.download())?, &valid, field)?;
+        Ok((plan, normals))
+    }
+
     /// The mesh in the order in which it lies on the device.
     fn download(&self) -> Result<Mesh> {
         let input = self.device.input();
@@ -201,7 +239,8 @@ pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
 
 /// Draws a field as a picture. `values` has a float per point, or per tetrahedron if `on_cells` is not 0. `pixels` gets
 /// four floats per pixel, upper row first: colour (sRGB, 0 to 1) multiplied by its opacity, and opacity. The caller
-/// adds the background.
+/// adds the background. The mesh is read back to host memory, once, when settings first need it there: with shading, or
+/// if `opacity`, `range`, or `eye` of `camera` is not given.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_render(
     tree: *const OlbvhTree,
@@ -218,13 +257,9 @@ pub extern "C" fn olbvh_render(
         let mut pixels = array_mut(pixels.cast::<[f32; 4]>(), width * height, "pixels")?.iter_mut();
         let (values, on) = mesh.field(values, on_cells)?;
         let field = Field { name: "values".into(), on, values };
-        let device = &mesh.device;
-        let (neighbours, bad) = (device.neighbours()?, device.bad_cells()?);
-        let is_valid = |tet| bad.binary_search(&tet).is_err();
-        let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
-        let prepared = Prepared::new(&settings, &mesh.download()?, &valid, &field)?;
-        let normals = (!prepared.normals.is_empty()).then_some(&prepared.normals[..]);
-        put(&mut pixels, render(device, tree, &prepared.plan, (&field.values, on), normals, SILENT)?.colors);
+        let (plan, normals) = mesh.prepare(&settings, tree.grid().into(), &field)?;
+        let normals = (!normals.is_empty()).then_some(&normals[..]);
+        put(&mut pixels, render(&mesh.device, tree, &plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())
     })
 }

@@ -16,7 +16,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, DescriptorRoom, Gpu, Recorder};
 use crate::mesh::On;
 use crate::primitives::Arena;
-use crate::query::{Rounds, Scene};
+use crate::query::Rounds;
 use ash::vk::{self, Handle};
 use std::ffi::c_char;
 
@@ -51,17 +51,9 @@ impl OlbvhBuffer {
         Ok(self.part())
     }
 
-    /// The part, which must have at least this many bytes.
-    fn holds(&self, bytes: u64, what: &str) -> Result<BufferRef> {
-        if self.size < bytes {
-            return Err(Error::Invalid(format!("{what} in {} bytes; {bytes} are needed", self.size)));
-        }
-        Ok(self.part())
-    }
-
-    /// The part, or `None` if its size is 0; otherwise it must have at least this many bytes.
-    fn optional(&self, bytes: u64, what: &str) -> Result<Option<BufferRef>> {
-        if self.size == 0 { Ok(None) } else { self.holds(bytes, what).map(Some) }
+    /// The part, or `None` if its size is 0.
+    fn given(&self) -> Option<BufferRef> {
+        (self.size > 0).then(|| self.part())
     }
 
     /// Carves the parts out of this memory.
@@ -96,9 +88,8 @@ pub struct OlbvhField {
 }
 
 impl OlbvhField {
-    fn read(&self, scene: &Scene) -> Result<(BufferRef, On)> {
-        let (on, count) = super::on(self.on_cells, &scene.mesh.input);
-        Ok((self.values.holds(4 * u64::from(count), "a field")?, on))
+    fn read(&self) -> (BufferRef, On) {
+        (self.values.part(), super::on(self.on_cells))
     }
 }
 

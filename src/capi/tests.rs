@@ -2,6 +2,8 @@
 
 #[path = "../../tests/host/mod.rs"]
 mod host;
+mod pictures;
+mod plans;
 mod queries;
 
 use super::host::{LentQueue, OlbvhHostDevice, OlbvhHostRequirements, olbvh_gpu_from_host, olbvh_host_check};
@@ -84,6 +86,8 @@ fn frames(gpu: *mut OlbvhGpu) {
         owners: owners_of,
         barycentrics: weights,
     };
+    // With the owners so far as hints, in place.
+    let hinted = OlbvhLocation { hints: owners_of, ..location };
     // The host's own barrier, which it may report to olbvh or not.
     let own_barrier = |commands: u64, told: bool| {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
@@ -101,11 +105,12 @@ fn frames(gpu: *mut OlbvhGpu) {
     let record = |commands: u64, queries: vk::QueryPool, told: bool| {
         ok(olbvh_recording_begin(recording, commands, queries.as_raw(), QUERIES));
         ok(olbvh_cmd_build(recording, scene));
+        ok(olbvh_cmd_rebuild(recording, scene));
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
         ok(olbvh_cmd_barrier(recording));
         ok(olbvh_cmd_locate(recording, scene, &raw const location));
         own_barrier(commands, told);
-        ok(olbvh_cmd_locate(recording, scene, &raw const location));
+        ok(olbvh_cmd_locate(recording, scene, &raw const hinted));
         olbvh_recording_end(recording)
     };
     assert_eq!(record(0, vk::QueryPool::null(), false), OlbvhStatus::Invalid);
@@ -224,7 +229,9 @@ fn a_c_host_records_by_address_and_asks() {
     assert_eq!((needs.queue_family, told), (host.family, [host.addresses, host.int64, host.control]));
     // SAFETY: `extension_count` entries are static C strings.
     let names = needs.extensions[..needs.extension_count as usize].iter().map(|&name| unsafe { CStr::from_ptr(name) });
-    assert!(names.eq(Requirements::check(&host.instance, host.physical).extensions_without_rays()), "{needs:?}");
+    // SAFETY: the physical device belongs to this instance.
+    let known = unsafe { Requirements::check(&host.instance, host.physical) };
+    assert!(names.eq(known.extensions_without_rays()), "{needs:?}");
     assert_eq!(olbvh_host_check(None, instance, physical, std::ptr::from_ref(&needs).cast_mut()), OlbvhStatus::Invalid);
     let held = Held::default();
     let mut lent = OlbvhHostDevice {

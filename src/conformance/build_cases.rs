@@ -48,8 +48,10 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
         for (alpha, way) in [(0.0, Way::Owned), (2.0, Way::Owned), (0.0, Way::Tight), (0.0, Way::Clipped), (0.0, Way::Shallow)] {
             build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { alpha, way, boxes: true, ..case });
         }
-        // A build that marks cells at several levels.
-        build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { way: Way::Narrow, ..case });
+        // Narrow: a build that marks cells at several levels.
+        for way in [Way::Narrow, Way::Root, Way::Nothing] {
+            build(cases, if thorough { mesh.group } else { Group::Full }, BuildCase { way, ..case });
+        }
         let case = BuildCase { lists: Lists::All, ..case };
         let group = if thorough { mesh.group } else { Group::Full };
         for way in [Way::Tight, Way::Clipped, Way::Narrow, Way::Root, Way::Nothing, Way::Shallow] {

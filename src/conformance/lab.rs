@@ -97,7 +97,10 @@ impl Lab {
             Work::Reduce(case) => primitives::reduce(&self.gpu(case.target)?, *case),
             Work::Scan(case) => primitives::scan(&self.gpu(case.target)?, *case),
             Work::Sort(case) => primitives::sort(&self.gpu(case.target)?, *case),
-            Work::Topology(recipe) => self.over(recipe, |_, twin, device| topology::check(twin, device)),
+            Work::Topology(recipe) => self.over(recipe, |gpu, twin, device| {
+                topology::check(twin, device)?;
+                topology::check_moved(gpu, twin, device)
+            }),
             Work::Build(case) if case.target != TargetKind::Device => {
                 let gpu = self.gpu(case.target)?;
                 self.over(&case.mesh, |_, twin, _| build::check(&gpu, case, twin, &DeviceMesh::upload(&gpu, &twin.mesh, BadCells::Skip)?))
@@ -113,7 +116,8 @@ impl Lab {
 
     /// Runs a check over a mesh. The mesh is kept, on host and device, until a case of another mesh follows.
     fn over(&mut self, recipe: &MeshRecipe, check: impl FnOnce(&Gpu, &mut Twin, &DeviceMesh) -> Verdict) -> Verdict {
-        let subject = if let Some(kept) = self.subject.take().filter(|(twin, _)| twin.name == recipe.name) {
+        // Two meshes of the caller may have equal names, but not the same one.
+        let subject = if let Some(kept) = self.subject.take().filter(|(twin, _)| std::ptr::eq(twin.name, recipe.name)) {
             kept
         } else {
             let twin = Twin::new(recipe)?;

@@ -120,6 +120,7 @@ fn compare_overlaps(a: Sides<'_>, b: Sides<'_>) -> Verdict<usize> {
         let stage = if pairs { "query.overlap_pairs" } else { "query.overlap_search" };
         compare(stage, "a", &expected.a, &found.a)?;
         compare(stage, "b", &expected.b, &found.b)?;
+        compare_one(stage, "pairs are listed", &expected.pairs.is_some(), &found.pairs.is_some())?;
         compare(stage, "pairs", expected.pairs.as_deref().unwrap_or_default(), found.pairs.as_deref().unwrap_or_default())?;
         compare_one(stage, "narrow tests", &expected.effort[0].narrow, &found.effort[0].narrow)?;
         if !pairs {

@@ -5,9 +5,10 @@ use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
 use crate::gpu::Gpu;
+use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::{SILENT, render};
+use crate::query::{Canvas, Rays, SILENT, render};
 use crate::reference::volume::{Scene, render as draw};
 use crate::render::{Plan, RenderSettings, TransferFunction};
 
@@ -22,6 +23,8 @@ pub(crate) struct PictureCase {
     pub opacity: Option<&'static str>,
     /// Values of iso-surfaces to draw instead of the volume; empty: the volume.
     pub iso: &'static [f32],
+    /// Whether the same picture is also drawn in two parts, as two blocks of a mesh draw it.
+    pub parts: bool,
 }
 
 /// A field with a wave through the mesh.
@@ -66,13 +69,24 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         compare_one(&stage, "found samples", &expected.stats.found_samples, &drawn.stats.found_samples)?;
         compare_one(&stage, "skipped samples", &expected.stats.skipped_samples, &drawn.stats.skipped_samples)?;
         near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
+        // The colours must equal, to the bit, those of pictures that are drawn in other ways.
+        let mut others = Vec::new();
         let hides = plan.hides(&field.values);
         if hides {
-            // The colours must equal, to the bit, those of a picture in which nothing is skipped.
             let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
-            let all = render(device, &tree, &all, (&field.values, field.on), normals, SILENT)?;
-            let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
-            let same = compare(&stage, "colours compared with those of every sample", &bits(&all.colors), &bits(&drawn.colors));
+            others.push(("every sample", render(device, &tree, &all, (&field.values, field.on), normals, SILENT)?.colors));
+        }
+        if case.parts {
+            let mut rays = Rays::new(plan.size)?;
+            for cells in halves(plan) {
+                let canvas = Canvas::new(device, &tree, plan, (&field.values, field.on), normals, true)?;
+                canvas.draw_part(cells, &vec![true; plan.size[1] as usize], &mut rays)?;
+            }
+            others.push(("two parts", rays.colors));
+        }
+        let bits = |colors: &[[f32; 4]]| colors.iter().map(|c| c.map(f32::to_bits)).collect::<Vec<_>>();
+        for (of, colors) in others {
+            let same = compare(&stage, &format!("colours compared with those of {of}"), &bits(&colors), &bits(&drawn.colors));
             twin.same_unless_tangled(same)?;
         }
         if let Some(first) = &first {
@@ -83,6 +97,18 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         first.get_or_insert(pixels);
     }
     Ok(())
+}
+
+/// Two halves of the finest grid in the order in which all rays of a picture meet them. Both are whole leaves of every
+/// tree but one that is a single leaf.
+fn halves(plan: &Plan) -> [CellRange; 2] {
+    let [right, bottom] = plan.size.map(|n| n - 1);
+    let ways = [(0, 0), (right, 0), (0, bottom), (right, bottom)].map(|(x, y)| plan.rays.ray(x, y).1);
+    let [mut low, mut high] = [CellRange::WHOLE; 2];
+    // The rays of the cases that are drawn in halves agree in the sign of one axis.
+    let axis = (0..3).find(|&c| ways.iter().all(|way| way[c] * ways[0][c] > 0.0)).unwrap_or(0);
+    (low.hi[axis], high.lo[axis]) = (511, 512);
+    if ways[0][axis] > 0.0 { [low, high] } else { [high, low] }
 }
 
 /// Checks that two pictures are similar: at most `of_thousand` thousandths of the channels differ by more than `most`.

@@ -35,6 +35,8 @@ const RANGED: [(&str, f32, Assign, Lists, On); 8] = [
 /// because kernels take long to compile.
 const PEAK: &str = "0:0,0.3:0,0.33:0.8,0.36:0,0.7:0,0.7:0.1,0.72:0.1,0.72:0,1:0";
 const PEAKED: &str = "jitter-12x13x11";
+/// A camera in this mesh, with a wide angle.
+const WITHIN: &str = "eye=6.3,6.1,5.2,target=1,2,11,fov=110";
 /// Meshes that are drawn.
 const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
 
@@ -64,12 +66,20 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         for (_, alpha, assign, lists, on) in RANGED.into_iter().filter(|of| of.0 == mesh.name) {
             add_ranges(cases, RangesCase { mesh, alpha, assign, lists, on });
         }
-        for camera in ["iso", "top,ortho"].into_iter().filter(|_| mesh.name == PEAKED) {
-            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity: Some(PEAK), iso: &[] });
-        }
         // Iso-surfaces that are seen through one another, and opaque ones.
-        for (camera, opacity) in [("iso", Some("0.4")), ("top,ortho", None)].into_iter().filter(|_| mesh.name == PEAKED) {
-            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity, iso: &[0.2, -0.3, 0.9] });
+        let surfaces: &[f32] = &[0.2, -0.3, 0.9];
+        for (camera, opacity, iso, parts) in [
+            ("iso", Some(PEAK), &[][..], false),
+            ("top,ortho", Some(PEAK), &[], false),
+            (WITHIN, Some(PEAK), &[], false),
+            ("front", Some(PEAK), &[], true),
+            ("iso", Some("0.4"), surfaces, true),
+            ("top,ortho", None, surfaces, false),
+        ]
+        .into_iter()
+        .filter(|_| mesh.name == PEAKED)
+        {
+            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity, iso, parts });
         }
     }
 }
@@ -81,7 +91,11 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
             add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
         }
     }
-    add_picture(cases, Group::Quick, PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None, iso: &[] });
+    add_picture(
+        cases,
+        Group::Quick,
+        PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None, iso: &[], parts: false },
+    );
     add_ranges(cases, RangesCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, on: On::Points });
     add_slices(cases, mesh);
     for lists in Lists::EVERY {
@@ -105,14 +119,15 @@ fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for camera in ["iso", "top,ortho"] {
         for (on, shading) in [(On::Points, true), (On::Points, false), (On::Cells, false)] {
             let group = if camera == "iso" && shading { mesh.group } else { Group::Full };
-            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None, iso: &[] });
+            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None, iso: &[], parts: false });
         }
     }
 }
 
 fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
-    let PictureCase { mesh, camera, on, shading, opacity, iso } = case;
-    let camera = camera.split(',').next().unwrap_or(camera);
+    let PictureCase { mesh, camera, on, shading, opacity, iso, parts } = case;
+    let camera = if camera == WITHIN { "within" } else { camera.split(',').next().unwrap_or(camera) };
+    let parts = if parts { "/parts" } else { "" };
     let light = if shading { "/shaded" } else { "" };
     let transfer = if !iso.is_empty() {
         "/surfaces"
@@ -121,7 +136,7 @@ fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
     } else {
         ""
     };
-    push(cases, format!("render/{}/{camera}/{}{light}{transfer}", mesh.name, values(on)), group, Work::Picture(case));
+    push(cases, format!("render/{}/{camera}/{}{light}{transfer}{parts}", mesh.name, values(on)), group, Work::Picture(case));
 }
 
 fn values(on: On) -> &'static str {

@@ -1,9 +1,12 @@
 //! Cases that compare stage 0 with the reference implementation: bad cells, bounds, normalised vertices, neighbours,
-//! boundary.
+//! boundary; and the same for a mesh that had other positions before.
 
 use super::failure::{Verdict, compare, compare_one};
 use super::twin::Twin;
-use crate::build::DeviceMesh;
+use crate::build::{DeviceMesh, MeshArrays, MeshInput, MeshScratch, cmd_move_mesh, cmd_prepare_mesh};
+use crate::gpu::Gpu;
+use crate::layout::{Grid, MeshStatus};
+use crate::primitives::Arena;
 
 /// Compares a prepared mesh with its topology.
 pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
@@ -22,11 +25,37 @@ pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
     let expected_words = placed(vertices.normalised.iter().zip(&vertices.cell).map(pack).collect());
     let words = placed(found.vertices()?.into_iter().map(|v| v.map(f32::to_bits)).collect());
     compare("build.normalise_vertices", "vertices", &expected_words, &words)?;
-    compare_one("build.match_faces", "status.crowded", &counts.crowded, &status.crowded)?;
-    compare_one("build.match_faces", "status.zero_volume", &counts.flat, &status.zero_volume)?;
-    compare_one("build.match_faces", "status.negative", &counts.negative, &status.negative)?;
+    compare_one("build.measure_cells", "status.crowded", &counts.crowded, &status.crowded)?;
+    compare_one("build.measure_cells", "status.zero_volume", &counts.flat, &status.zero_volume)?;
+    compare_one("build.measure_cells", "status.negative", &counts.negative, &status.negative)?;
     compare_one("build.match_faces", "status.overflow", &0, &status.overflow)?;
-    compare("build.find_neighbours", "neighbours", &expected.neighbours, &found.neighbours()?)?;
-    compare("build.find_neighbours", "boundary", &expected.boundary, &found.boundary_bits()?)?;
-    compare_one("build.find_neighbours", "status.boundary", &counts.boundary, &status.boundary)
+    compare("build.match_faces", "neighbours", &expected.neighbours, &found.neighbours()?)?;
+    compare("build.find_boundary", "boundary", &expected.boundary, &found.boundary_bits()?)?;
+    compare_one("build.find_boundary", "status.boundary", &counts.boundary, &status.boundary)
+}
+
+/// Prepares the mirror image of a mesh, moves its points to those of the mesh, and compares what results with the mesh
+/// as it was prepared at once.
+pub(crate) fn check_moved(gpu: &Gpu, twin: &Twin, prepared: &DeviceMesh) -> Verdict {
+    let input = *prepared.input();
+    let mirrored: Vec<[f32; 3]> = twin.mesh.points.iter().map(|&[x, y, z]| [z, y, x]).collect();
+    let positions = gpu.upload("olbvh.conformance.mirrored", &mirrored)?;
+    let carve = |a: &mut Arena| Ok((MeshArrays::carve(a, input.points, input.tets)?, MeshScratch::carve(a, input.points, input.tets)?));
+    let (memory, (arrays, scratch)) = Arena::reserve(gpu, "olbvh.conformance.moved", carve)?;
+    gpu.submit("olbvh.conformance.moved", |r| {
+        cmd_prepare_mesh(r, &MeshInput { positions: positions.all(), ..input }, &arrays, &scratch)?;
+        r.barrier("conformance.prepared → conformance.moved");
+        cmd_move_mesh(r, &input, &arrays, &scratch)
+    })?;
+    let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
+    compare("build.move", "status", bytemuck::cast_slice::<_, u32>(&[*prepared.status()]), bytemuck::cast_slice(&[status]))?;
+    let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
+    compare("build.move", "grid", bytemuck::cast_slice::<_, u32>(&[*prepared.grid()]), bytemuck::cast_slice(&[grid]))?;
+    let words = u64::from(input.tets).div_ceil(32);
+    compare("build.move", "boundary", &prepared.boundary_bits()?, &gpu.download(&memory, arrays.boundary.part(0, 4 * words))?)?;
+    let bits = |v: Vec<[f32; 4]>| v.into_iter().map(|v| v.map(f32::to_bits)).collect::<Vec<_>>();
+    let vertices = gpu.download(&memory, arrays.vertices.part(0, 16 * u64::from(input.points)))?;
+    compare("build.move", "vertices", &bits(prepared.vertices()?), &bits(vertices))?;
+    let neighbours = gpu.download(&memory, arrays.neighbours.part(0, 16 * u64::from(input.tets)))?;
+    compare("build.move", "neighbours", &prepared.neighbours()?, &neighbours)
 }

@@ -101,7 +101,7 @@ impl Twin {
 
     /// Locations of these points.
     pub(crate) fn locations<'a>(&self, built: &'a Built) -> &'a [Location] {
-        built.locations.get_or_init(|| self.locator(built).locate_all(self.points().0))
+        built.locations.get_or_init(|| self.locator(built).locate_each(self.points().0))
     }
 
     /// The reference implementation of point location over a tree.

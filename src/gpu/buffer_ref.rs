@@ -1,5 +1,6 @@
 //! References to parts of buffers.
 
+use crate::error::{Error, Result};
 use ash::vk;
 
 /// Usage flags of every buffer that kernels access, on any device. A host's buffers need those of
@@ -59,6 +60,14 @@ impl BufferRef {
         let size = size.min(self.size - offset);
         let address = if self.address == 0 { 0 } else { self.address + offset };
         Self { buffer: self.buffer, offset: self.offset + offset, size, address }
+    }
+
+    /// Rejects a part of fewer bytes. `what` names its content in the error.
+    pub(crate) fn check(self, bytes: u64, what: &str) -> Result<()> {
+        if self.size >= bytes {
+            return Ok(());
+        }
+        Err(Error::Invalid(format!("{what} in a part of {} bytes; {bytes} are needed", self.size)))
     }
 
     /// The 4-byte word at index `i`; empty if it is not within this part.

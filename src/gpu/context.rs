@@ -6,7 +6,7 @@ use super::constants::Constants;
 use super::foundation::Foundation;
 use super::heap::Heap;
 use super::ledger::Ledger;
-use super::pipelines::Pipelines;
+use super::pipelines::{Pipelines, cache_file};
 use super::pool::Pool;
 use super::queue::HostQueue;
 use super::ray_functions::Acceleration;
@@ -37,7 +37,7 @@ pub struct GpuOptions {
     pub binding: Option<Binding>,
     /// Tuning parameters of the kernels; `None`: those of the kind of device, see [`Row`].
     pub target: Option<Target>,
-    /// File of the pipeline cache; `None`: no cache on disk.
+    /// Folder in which compiled pipelines are kept, in one file per device and driver; `None`: they are not kept.
     pub pipeline_cache: Option<PathBuf>,
     /// Skip the start-up self-test.
     pub trust: bool,
@@ -90,7 +90,8 @@ impl Gpu {
             None => Binding::Descriptors,
         };
         // SAFETY: the handle is one of this instance.
-        let limits = unsafe { instance.get_physical_device_properties(*physical) }.limits;
+        let vk::PhysicalDeviceProperties { limits, pipeline_cache_uuid, .. } =
+            unsafe { instance.get_physical_device_properties(*physical) };
         let (buffers, bound) = (ALL.iter().map(|k| k.buffers.len()).max().unwrap_or(0), limits.max_per_stage_descriptor_storage_buffers);
         if binding == Binding::Descriptors && buffers > bound as usize {
             let text = format!("{} binds {bound} storage buffers to a shader; kernels need {buffers}, or buffer addresses", report.name);
@@ -115,7 +116,8 @@ impl Gpu {
         let debug_device = foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device));
         let heap = Heap::new(&foundation)?;
         let constants = Constants::new(&heap, debug_device.as_ref())?;
-        let pipelines = Pipelines::new(&foundation, options.pipeline_cache.clone())?;
+        let file = options.pipeline_cache.as_ref().map(|folder| cache_file(folder, pipeline_cache_uuid));
+        let pipelines = Pipelines::new(&foundation, file)?;
         let traced = requirements.ray_tracing;
         let acceleration = traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines));
         let inner = Inner { constants, heap, foundation, pipelines, binding, limits, debug_device, acceleration };

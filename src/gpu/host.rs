@@ -76,17 +76,19 @@ impl Gpu {
     /// these is dropped, nothing recorded through it is being executed.
     pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
         let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;
-        let mut requirements = Requirements::check(&instance, physical);
+        // SAFETY: the caller promises that the handles are valid and belong together.
+        let mut requirements = unsafe { Requirements::check(&instance, physical) };
         requirements.buffer_addresses &= enabled.buffer_addresses;
         requirements.shader_int64 &= enabled.shader_int64;
         requirements.subgroup_size_control &= enabled.subgroup_size_control;
         requirements.ray_tracing.queries &= enabled.ray_tracing.queries && requirements.buffer_addresses;
         requirements.ray_tracing.pipelines &= enabled.ray_tracing.pipelines && requirements.buffer_addresses;
-        let mut report = DeviceReport::of(&instance, physical, requirements);
+        // SAFETY: as above.
+        let mut report = unsafe { DeviceReport::of(&instance, physical, requirements) };
         if !report.requirements.missing.is_empty() {
             return Err(Error::NoDevice(format!("{} lacks {}", report.name, report.requirements.missing.join(", "))));
         }
-        // SAFETY: the handle is one of this instance.
+        // SAFETY: as above.
         let families = unsafe { instance.get_physical_device_queue_family_properties(physical) };
         let Some(of_family) = families.get(family as usize).filter(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE)) else {
             return Err(Error::NoDevice(format!("queue family {family} of {} has no compute", report.name)));

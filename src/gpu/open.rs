@@ -57,21 +57,23 @@ fn open_instance() -> Result<Session> {
 /// [`Error::NoVulkan`] if there is no loader or driver.
 pub fn list_devices() -> Result<Vec<DeviceReport>> {
     let session = open_instance()?;
-    // SAFETY: the instance is alive, and destroyed once.
-    let devices = unsafe { session.instance.enumerate_physical_devices() };
-    let reports = devices
-        .map(|d| d.into_iter().map(|d| DeviceReport::new(&session.instance, d)).collect())
-        .map_err(failed("vkEnumeratePhysicalDevices"));
+    let reports = devices(&session.instance).map(|all| all.into_iter().map(|(_, report)| report).collect());
     // SAFETY: nothing made from the instance is left.
     unsafe { session.instance.destroy_instance(None) };
     reports
 }
 
-/// The requested device, or the best one that meets the requirements.
-fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceReport)> {
+/// The physical devices of an instance, with their properties.
+fn devices(instance: &ash::Instance) -> Result<Vec<(vk::PhysicalDevice, DeviceReport)>> {
     // SAFETY: the instance is alive.
     let devices = unsafe { instance.enumerate_physical_devices() }.map_err(failed("vkEnumeratePhysicalDevices"))?;
-    let all: Vec<_> = devices.into_iter().map(|d| (d, DeviceReport::new(instance, d))).collect();
+    // SAFETY: the handles are those of the instance.
+    Ok(devices.into_iter().map(|d| (d, unsafe { DeviceReport::new(instance, d) })).collect())
+}
+
+/// The requested device, or the best one that meets the requirements.
+fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::PhysicalDevice, DeviceReport)> {
+    let all = devices(instance)?;
     let names = || all.iter().enumerate().map(|(i, (_, r))| format!("{i} {}", r.name)).collect::<Vec<_>>().join(", ");
     if all.is_empty() {
         return Err(Error::NoDevice(NO_DRIVER.into()));

@@ -6,7 +6,7 @@ use crate::error::Result;
 use ash::vk;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::{PoisonError, RwLock};
 
@@ -40,6 +40,31 @@ pub(super) type PipelineKey = (&'static str, Vec<(u32, u32)>);
 /// Number of files that this process has written, so that each has a temporary file of its own.
 static WRITTEN: AtomicU32 = AtomicU32::new(0);
 
+/// A hash of these bytes (FNV-1a, 64 bits).
+fn checksum(bytes: &[u8]) -> u64 {
+    bytes.iter().fold(0xcbf2_9ce4_8422_2325, |hash, &b| (hash ^ u64::from(b)).wrapping_mul(0x0100_0000_01b3))
+}
+
+/// Length and checksum of the data of a pipeline cache, which its file begins with. Drivers are given only what they
+/// have written: few check more than the device that data is for.
+fn seal(data: &[u8]) -> [u8; 16] {
+    let mut seal = [0; 16];
+    seal[..8].copy_from_slice(&(data.len() as u64).to_le_bytes());
+    seal[8..].copy_from_slice(&checksum(data).to_le_bytes());
+    seal
+}
+
+/// The data in a file of a pipeline cache; none if the file is not as it was written.
+fn unsealed(file: &[u8]) -> &[u8] {
+    file.split_at_checked(16).filter(|(head, data)| *head == seal(data)).map_or(&[], |(_, data)| data)
+}
+
+/// The file of a device and its driver in the folder of pipeline caches.
+pub(super) fn cache_file(folder: &Path, uuid: [u8; vk::UUID_SIZE]) -> PathBuf {
+    let uuid = format!("{:032x}", u128::from_be_bytes(uuid));
+    folder.join(format!("pipelines-{}-{uuid}.bin", env!("CARGO_PKG_VERSION")))
+}
+
 /// The pipelines compiled so far.
 pub(super) struct Pipelines {
     made: RwLock<HashMap<PipelineKey, Pipeline>>,
@@ -56,8 +81,8 @@ impl Pipelines {
             cache
         } else {
             let stored = file.as_ref().and_then(|f| std::fs::read(f).ok()).unwrap_or_default();
-            let info = vk::PipelineCacheCreateInfo::default().initial_data(&stored);
-            // SAFETY: drivers check the header of the data and ignore what is not theirs.
+            let info = vk::PipelineCacheCreateInfo::default().initial_data(unsealed(&stored));
+            // SAFETY: the data, if any, was read from a pipeline cache; drivers ignore data of another device.
             unsafe { foundation.device.create_pipeline_cache(&info, None) }.map_err(failed("vkCreatePipelineCache"))?
         };
         Ok(Self { made: RwLock::default(), cache, file })
@@ -86,14 +111,18 @@ impl Pipelines {
         let file = self.file.as_ref()?;
         // SAFETY: the cache belongs to this device, which is alive.
         let data = unsafe { device.get_pipeline_cache_data(self.cache) }.ok()?;
-        if std::fs::read(file).is_ok_and(|stored| stored == data) {
+        let content = [&seal(&data)[..], &data].concat();
+        if std::fs::read(file).is_ok_and(|stored| stored == content) {
             return None;
         }
         std::fs::create_dir_all(file.parent()?).ok()?;
         let (process, number) = (std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
         let temporary = file.with_extension(format!("{process}.{number}.tmp"));
-        std::fs::write(&temporary, data).ok()?;
-        std::fs::rename(&temporary, file).ok()
+        let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, file));
+        if written.is_err() {
+            let _ = std::fs::remove_file(&temporary);
+        }
+        written.ok()
     }
 
     /// Destroys the pipelines, and the cache if this crate owns it.

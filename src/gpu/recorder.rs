@@ -3,7 +3,7 @@
 //!
 //! The recorder knows from reflection which buffers each kernel reads and writes. While recording it checks that no
 //! command reads or writes what an earlier one wrote, or writes what an earlier one read, without a barrier between
-//! them.
+//! them. It sees its own commands only, not those of other recordings or of the host.
 
 use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
@@ -49,7 +49,8 @@ pub struct Recorder<'a> {
     gpu: &'a Gpu,
     pub(super) commands: vk::CommandBuffer,
     uses: Vec<Use>,
-    hazard: Option<String>,
+    /// The first thing wrong with what was recorded.
+    fault: Option<String>,
     timestamps: Option<(vk::QueryPool, u32)>,
     /// Names of the timed stages so far, with the timestamp slots of start and end.
     stages: Vec<(String, u32, u32)>,
@@ -72,15 +73,22 @@ impl<'a> Recorder<'a> {
     /// [`Recorder::with_pools`]).
     ///
     /// # Safety
-    /// `commands` is in the recording state, outside a render pass, from a command pool of a family with compute, and
-    /// belongs to `gpu`'s device. All buffers whose parts are recorded live until it has been executed. They are as
-    /// large as the recording functions require, and their contents are valid: hints and orders are numbers of this
-    /// mesh, and a tree is one over this mesh.
+    /// - `commands` is in the recording state, outside a render pass, from a command pool of `gpu`'s queue family, and
+    ///   belongs to `gpu`'s device.
+    /// - `timestamps` is a pool of timestamp queries of this device, of at least that size. All are reset, and nothing
+    ///   else uses them until the commands have been executed.
+    /// - Until then, all buffers whose parts are recorded live. Where the device binds buffers by descriptors, the
+    ///   recorder is kept as well, or else the pools lent to it, which are not reset before.
+    /// - Buffers are as large as the recording functions require, and their contents are valid: hints and orders are
+    ///   numbers of this mesh, and a tree is one over this mesh. Scratch memory was carved with the target of `gpu`.
+    /// - A barrier lies between all that other recordings and the host's own commands do with a buffer, and what these
+    ///   commands do with it. That includes a recording of the same frame, submitted before. The recorder sees its own
+    ///   commands only, so [`Recorder::finish`] cannot name a barrier that is missing there.
     pub unsafe fn new(gpu: &'a Gpu, commands: vk::CommandBuffer, timestamps: Option<(vk::QueryPool, u32)>) -> Self {
         let timestamps = timestamps.filter(|_| gpu.timestamp_bits() > 0);
         let (pools, room) = (Pools::Own(DescriptorPools::new(gpu)), DescriptorRoom::default());
         let (uses, stages, barriers) = (Vec::new(), Vec::new(), Vec::new());
-        Self { gpu, commands, uses, hazard: None, timestamps, stages, next_slot: 0, pools, room, barriers, drop_barrier: None }
+        Self { gpu, commands, uses, fault: None, timestamps, stages, next_slot: 0, pools, room, barriers, drop_barrier: None }
     }
 
     /// Takes descriptor sets from the caller's pools instead of the recorder's own. The pools must be kept until the
@@ -234,34 +242,48 @@ impl<'a> Recorder<'a> {
         }
     }
 
-    /// Fills a range, whose size is a multiple of 4 bytes, with a word.
+    /// Notes that a command cannot be recorded, or that the commands would not do what they should.
+    fn fault(&mut self, text: impl FnOnce() -> String) {
+        self.fault.get_or_insert_with(text);
+    }
+
+    /// Fills a range with a word. An offset in the buffer or a size that is not a multiple of 4 bytes is an error of
+    /// [`Recorder::finish`].
     pub fn fill(&mut self, range: BufferRef, word: u32) {
         if range.size == 0 {
             return;
+        }
+        if !range.offset.is_multiple_of(4) || !range.size.is_multiple_of(4) {
+            let at = range.offset;
+            return self.fault(|| format!("fill of {} bytes at byte {at} of a buffer; both must be multiples of 4", range.size));
         }
         self.touch(&[(range, true)], "fill");
         if self.is_rehearsal() {
             return;
         }
-        // SAFETY: ranges are aligned to 4 bytes by construction.
-        unsafe { self.gpu.device().cmd_fill_buffer(self.commands, range.buffer, range.offset, range.size.next_multiple_of(4), word) };
+        // SAFETY: the range lies in its buffer, and consists of whole words.
+        unsafe { self.gpu.device().cmd_fill_buffer(self.commands, range.buffer, range.offset, range.size, word) };
     }
 
-    /// Copies the bytes of `from` to the start of `to`; a smaller `to` is an error of [`Recorder::finish`].
+    /// Copies the bytes of `from` to the start of `to`. It is an error of [`Recorder::finish`] if `to` is smaller, or
+    /// if the bytes overlap those that they are copied to.
     pub fn copy(&mut self, from: BufferRef, to: BufferRef) {
         if from.size == 0 {
             return;
         }
         if to.size < from.size {
-            self.hazard.get_or_insert_with(|| format!("copy of {} bytes to a place of {}", from.size, to.size));
-            return;
+            return self.fault(|| format!("copy of {} bytes to a place of {}", from.size, to.size));
+        }
+        if from.buffer == to.buffer && from.offset.abs_diff(to.offset) < from.size {
+            let [a, b] = [from.offset, to.offset];
+            return self.fault(|| format!("copy of {} bytes from byte {a} of a buffer to byte {b}, which overlap", from.size));
         }
         self.touch(&[(from, false), (to.part(0, from.size), true)], "copy");
         if self.is_rehearsal() {
             return;
         }
         let region = [vk::BufferCopy { src_offset: from.offset, dst_offset: to.offset, size: from.size }];
-        // SAFETY: both ranges lie in their buffers.
+        // SAFETY: both ranges lie in their buffers, and do not overlap.
         unsafe { self.gpu.device().cmd_copy_buffer(self.commands, from.buffer, to.buffer, &region) };
     }
 
@@ -290,10 +312,10 @@ impl<'a> Recorder<'a> {
     /// Ends the recording and reports the result of its checks.
     ///
     /// # Errors
-    /// [`Error::Invalid`] with two commands that need a barrier between them, or a copy that does not fit its
-    /// destination.
+    /// [`Error::Invalid`] with two commands of this recorder that need a barrier between them, or with a fill or copy
+    /// that cannot be recorded.
     pub fn finish(&mut self) -> Result<()> {
-        self.hazard.take().map_or(Ok(()), |h| Err(Error::Invalid(h)))
+        self.fault.take().map_or(Ok(()), |fault| Err(Error::Invalid(fault)))
     }
 
     fn timestamp(&mut self, stage: vk::PipelineStageFlags) -> Option<u32> {
@@ -321,9 +343,9 @@ impl<'a> Recorder<'a> {
         for &(range, writes) in ranges {
             let (buffer, begin, end) = (range.buffer, range.offset, range.offset + range.size);
             let clash = |u: &&Use| u.buffer == buffer && u.begin < end && begin < u.end && (u.writes || writes);
-            if let (None, Some(earlier)) = (&self.hazard, self.uses[..before].iter().find(clash)) {
+            if let (None, Some(earlier)) = (&self.fault, self.uses[..before].iter().find(clash)) {
                 let verb = |w| if w { "writes" } else { "reads" };
-                self.hazard =
+                self.fault =
                     Some(format!("{by} {} what {} {} with no barrier between them", verb(writes), earlier.by, verb(earlier.writes)));
             }
             self.uses.push(Use { buffer, begin, end, writes, by });

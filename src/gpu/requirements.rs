@@ -146,10 +146,13 @@ impl Requirements {
     /// Checks a physical device. Required are Vulkan 1.2, a compute queue, basic, vote, arithmetic and ballot subgroup
     /// operations in compute shaders, 256 invocations per workgroup, and 16 KiB of shared memory. Buffer addresses are
     /// preferred, subgroup size control is wanted where sizes vary, and ray tracing is optional.
-    pub fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+    ///
+    /// # Safety
+    /// `device` is a physical device of `instance`, which has not been destroyed.
+    pub unsafe fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
-        // SAFETY: the handle is one of this instance; the structs live until the calls return.
+        // SAFETY: the caller promises that the handle is one of this instance; the structs live until the calls return.
         let (properties, listed, families) = unsafe {
             let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut control);
             instance.get_physical_device_properties2(device, &mut properties);
@@ -174,8 +177,8 @@ impl Requirements {
         let mut size_control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default();
         // Part of Vulkan 1.3, so a driver of that version need not list the extension.
         let can_control = properties.api_version >= vk::API_VERSION_1_3 || has(ash::ext::subgroup_size_control::NAME);
-        // SAFETY: the handle is one of this instance; the structs live until the call returns, and the one of size
-        // control is chained only if the device knows it.
+        // SAFETY: the caller promises that the handle is one of this instance; the structs live until the call returns,
+        // and the one of size control is chained only if the device knows it.
         let core = unsafe {
             let mut features = vk::PhysicalDeviceFeatures2::default().push_next(&mut addresses);
             if can_control {
@@ -190,7 +193,8 @@ impl Requirements {
             queries: can_trace && has(ash::khr::ray_query::NAME),
             pipelines: can_trace && has(ash::khr::ray_tracing_pipeline::NAME),
         };
-        let ray_tracing = traces_rays(instance, device, listed_ways);
+        // SAFETY: the caller promises that the handle is one of this instance.
+        let ray_tracing = unsafe { traces_rays(instance, device, listed_ways) };
         // Metal chooses subgroup sizes itself: MoltenVK reports the features, but no stage accepts a required size.
         let can_require = control.required_subgroup_size_stages.contains(vk::ShaderStageFlags::COMPUTE);
         let subgroup_size_control =
@@ -225,7 +229,10 @@ impl Requirements {
 }
 
 /// The listed ways of ray tracing whose features are supported as well.
-fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: RayTracing) -> RayTracing {
+///
+/// # Safety
+/// As for [`Requirements::check`].
+unsafe fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: RayTracing) -> RayTracing {
     let mut structures = vk::PhysicalDeviceAccelerationStructureFeaturesKHR::default();
     let mut queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default();
     let mut pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default();
@@ -239,8 +246,8 @@ fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: Ray
     if listed.pipelines {
         features = features.push_next(&mut pipelines);
     }
-    // SAFETY: the handle is one of this instance; the structs live until the call returns, and are chained only where
-    // the extension exists.
+    // SAFETY: the caller promises that the handle is one of this instance; the structs live until the call returns, and
+    // are chained only where the extension exists.
     unsafe { instance.get_physical_device_features2(device, &mut features) };
     let structures = structures.acceleration_structure != 0;
     RayTracing { queries: structures && queries.ray_query != 0, pipelines: structures && pipelines.ray_tracing_pipeline != 0 }
@@ -248,14 +255,21 @@ fn traces_rays(instance: &ash::Instance, device: vk::PhysicalDevice, listed: Ray
 
 impl DeviceReport {
     /// Reads a device's properties and checks its requirements.
-    pub(crate) fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
-        Self::of(instance, device, Requirements::check(instance, device))
+    ///
+    /// # Safety
+    /// As for [`Requirements::check`].
+    pub(super) unsafe fn new(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
+        // SAFETY: the caller promises that the handle is one of this instance.
+        unsafe { Self::of(instance, device, Requirements::check(instance, device)) }
     }
 
     /// Reads a device's properties, with requirements that were reduced to what is enabled.
-    pub(super) fn of(instance: &ash::Instance, device: vk::PhysicalDevice, requirements: Requirements) -> Self {
+    ///
+    /// # Safety
+    /// As for [`Requirements::check`].
+    pub(super) unsafe fn of(instance: &ash::Instance, device: vk::PhysicalDevice, requirements: Requirements) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        // SAFETY: the handle is one of this instance; the structs live until the calls return.
+        // SAFETY: the caller promises that the handle is one of this instance; the structs live until the calls return.
         let (properties, memory) = unsafe {
             let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
             instance.get_physical_device_properties2(device, &mut properties);

@@ -207,8 +207,8 @@ impl Gpu {
     /// Writes by a command buffer of the host must be available to `HOST_READ`: mapped memory is read without a copy.
     ///
     /// # Errors
-    /// [`Error::Invalid`] for a part that does not lie in the buffer, a failed Vulkan call, or no memory for the
-    /// transfer.
+    /// [`Error::Invalid`] for a part that does not lie in the buffer or is no whole number of items, a failed Vulkan
+    /// call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
         // The range is checked as well: the part may be of an earlier buffer whose handle the driver gave out again.
         let within = part.offset.checked_add(part.size).is_some_and(|end| end <= buffer.size());
@@ -216,8 +216,12 @@ impl Gpu {
             let text = format!("the part to be read does not lie in the buffer `{}`, or that is on another device", buffer.name());
             return Err(Error::Invalid(text));
         }
-        let count = part.size as usize / size_of::<T>();
-        let mut data = vec![T::zeroed(); count];
+        let item = size_of::<T>() as u64;
+        if part.size.checked_rem(item) != Some(0) {
+            let text = format!("{} bytes of the buffer `{}`, to be read as items of {item}", part.size, buffer.name());
+            return Err(Error::Invalid(text));
+        }
+        let mut data = vec![T::zeroed(); (part.size / item) as usize];
         let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
         if let Some(mapped) = buffer.cached() {
             let at = part.offset as usize;
@@ -231,10 +235,12 @@ impl Gpu {
     /// Reads back the value at the beginning of a part of a buffer.
     ///
     /// # Errors
-    /// As [`Gpu::download`].
+    /// As [`Gpu::download`], and [`Error::Invalid`] for a part that is smaller than the value.
     pub fn download_one<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<T> {
-        let found = self.download::<T>(buffer, part.part(0, size_of::<T>() as u64))?;
-        Ok(found.first().copied().unwrap_or_else(T::zeroed))
+        let bytes = size_of::<T>() as u64;
+        let found = if part.size < bytes { Vec::new() } else { self.download::<T>(buffer, part.part(0, bytes))? };
+        let too_small = || format!("{} bytes of the buffer `{}`, to be read as a value of {bytes}", part.size, buffer.name());
+        found.first().copied().ok_or_else(|| Error::Invalid(too_small()))
     }
 
     /// Reads back a range of any buffer through staging memory.

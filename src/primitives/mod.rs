@@ -15,6 +15,7 @@ pub use reduce::{REDUCE_SCRATCH, Reduction, cmd_reduce};
 pub use scan::{ScanScratch, cmd_exclusive_scan};
 pub(crate) use selftest::self_test;
 pub use sort::{SortScratch, cmd_sort_pairs};
+pub(crate) use sort::{Unsorted, cmd_sort};
 
 use crate::error::{Error, Result};
 use crate::gpu::{ALIGNMENT, Buffer, BufferRef, Gpu, Groups, Recorder};
@@ -114,7 +115,7 @@ impl Arena {
             }
             None => Ok(BufferRef { buffer: ash::vk::Buffer::null(), offset: begin, size: bytes.max(16), address: 0 }),
             Some(memory) if begin + bytes.max(16) <= memory.size => Ok(memory.part(begin, bytes.max(16))),
-            Some(memory) => Err(Error::Invalid(format!("{} bytes of scratch memory are too few: {} are needed", memory.size, self.used))),
+            Some(memory) => Err(Error::Invalid(format!("{} bytes of memory are too few: at least {} are needed", memory.size, self.used))),
         }
     }
 

@@ -50,10 +50,36 @@ impl SortScratch {
             scan: ScanScratch::carve(gpu, arena, u32::try_from(table).unwrap_or(u32::MAX))?,
         })
     }
+
+    /// The places for keys and for values, one after the other.
+    fn apart(&self, max: u32) -> (BufferRef, BufferRef) {
+        (self.pairs.part(0, 4 * u64::from(max)), self.values.part(0, 4 * u64::from(max)))
+    }
 }
 
-/// Sorts `keys` and `values` in place by the low `bits` bits of the keys; pairs with equal keys keep their order. The
-/// contents after the true number of pairs, up to `count.max`, become undefined.
+/// Pairs to sort by the low `bits` bits of their keys: where they will be, and where they are at first.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Unsorted {
+    pub keys: BufferRef,
+    pub values: BufferRef,
+    sorted: (BufferRef, BufferRef),
+    bits: u32,
+}
+
+impl Unsorted {
+    /// Where to write up to `max` pairs so that no copy is needed to have them in `keys` and `values` after the sort:
+    /// there, or, if every pass of an odd number moves them from one place to another, in the scratch memory.
+    pub fn place(gpu: &Gpu, (keys, values): (BufferRef, BufferRef), bits: u32, max: u32, scratch: &SortScratch) -> Self {
+        let target = gpu.target().sort;
+        let sorted = (keys, values);
+        let elsewhere = !target.serial && bits > 0 && max > 1 && target.passes(bits).0 % 2 == 1;
+        let (keys, values) = if elsewhere { scratch.apart(max) } else { sorted };
+        Self { keys, values, sorted, bits }
+    }
+}
+
+/// Sorts `keys` and `values` in place by the low `bits` bits of the keys, at most 32; pairs with equal keys keep their
+/// order. The contents after the true number of pairs, up to `count.max`, become undefined.
 ///
 /// Starts with a barrier, so `keys` and `values` need none before, unless there is nothing to sort (fewer than two
 /// pairs, or no bits). A count in device memory must be visible before. Ends without a barrier; the last writes are
@@ -69,6 +95,19 @@ pub fn cmd_sort_pairs(
     count: Count,
     scratch: &SortScratch,
 ) -> Result<()> {
+    let pairs = Unsorted::place(r.gpu(), (keys, values), bits, count.max, scratch);
+    if pairs.keys != keys {
+        let bytes = 4 * u64::from(count.max);
+        r.barrier("keys → sort.copy");
+        r.copy(keys.part(0, bytes), pairs.keys);
+        r.copy(values.part(0, bytes), pairs.values);
+    }
+    cmd_sort(r, &pairs, count, scratch)
+}
+
+/// Sorts pairs that were written to their first place, as [`cmd_sort_pairs`] does.
+pub(crate) fn cmd_sort(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch) -> Result<()> {
+    let bits = pairs.bits.min(u32::BITS);
     if bits == 0 || count.max < 2 {
         return Ok(());
     }
@@ -94,14 +133,13 @@ pub fn cmd_sort_pairs(
         Some(_) => Count::device(table_max, scratch.table_length),
         None => Count::host(table_max),
     };
-    let sort = PairSort { keys, values, count, live, passes, digit_bits, bits, groups, table, scratch };
+    let sort = PairSort { pairs, count, live, passes, digit_bits, bits, groups, table, scratch };
     if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target) }
 }
 
 /// What all passes of a sort have in common.
 struct PairSort<'a> {
-    keys: BufferRef,
-    values: BufferRef,
+    pairs: &'a Unsorted,
     count: Count,
     live: BufferRef,
     passes: u32,
@@ -131,7 +169,7 @@ impl PairSort<'_> {
     /// Serial tiles. Even passes write pairs of a key and a value, half as many scattered writes as of keys and values
     /// apart; odd passes read these pairs.
     fn cmd_serial(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
-        let Self { keys, values, live, passes, digit_bits, groups, .. } = *self;
+        let Self { pairs: &Unsorted { keys, values, .. }, live, passes, digit_bits, groups, .. } = *self;
         let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
         let SortScratch { pairs, table: places, .. } = *self.scratch;
         for pass in 0..passes {
@@ -154,12 +192,12 @@ impl PairSort<'_> {
 
     /// Tiles of whole workgroups.
     fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
-        let Self { keys, values, live, passes, digit_bits, groups, .. } = *self;
+        let Self { pairs, live, passes, digit_bits, groups, .. } = *self;
         let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
         let max_subgroups = workgroup / r.gpu().subgroup_size().max(1);
-        let (counts, bytes) = (self.scratch.table, 4 * u64::from(count));
-        let copy = (self.scratch.pairs.part(0, bytes), self.scratch.values);
-        let (mut from, mut to) = ((keys, values), copy);
+        let counts = self.scratch.table;
+        let mut from = (pairs.keys, pairs.values);
+        let mut to = if passes % 2 == 1 { pairs.sorted } else { self.scratch.apart(count) };
         for pass in 0..passes {
             let (shift, mask) = self.digit(pass);
             r.barrier("keys → sort.histogram");
@@ -172,11 +210,6 @@ impl PairSort<'_> {
                 SortScatterBallot { live, keys: from.0, values: from.1, places: counts, sorted_keys, sorted_values, count, shift, mask };
             r.dispatch(&scatter, spec, groups)?;
             std::mem::swap(&mut from, &mut to);
-        }
-        if passes % 2 == 1 {
-            r.barrier("sort.scatter → sort.copy");
-            r.copy(copy.0, keys);
-            r.copy(copy.1.part(0, bytes), values);
         }
         Ok(())
     }

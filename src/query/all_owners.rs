@@ -3,11 +3,12 @@
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
 use super::{Progress, Scene, capacity_of, list_parts};
 use crate::build::{DeviceMesh, Tree};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::reference::locate::CHUNK;
+use crate::reference::walk::STAR;
 
 /// Answers and scratch memory for all owners: 28 bytes per point, and the scratch memory of a scan.
 #[derive(Clone, Copy, Debug)]
@@ -17,13 +18,21 @@ pub struct OwnersMemory {
     /// One word per point: after [`cmd_list_owners`], the end of its owners in `found`. They start where those of the
     /// point before end; the first point's start at 0.
     pub ends: BufferRef,
-    /// One word: the number of owners of all points together, whether or not there was room for them.
+    /// One word: the number of owners of all points together, whether or not there was room for them. It is correct,
+    /// and so are `ends`, for up to [`OwnersMemory::most_points`]; they count modulo 2^32.
     pub total: BufferRef,
     counts: BufferRef,
     scan: ScanScratch,
 }
 
 impl OwnersMemory {
+    /// The most points whose owners are certain to be numbered, whatever points these are: together they have fewer
+    /// than 2^31 owners. `longest_leaf` is that of the [`Scene`]; no point has more owners than that, or than the
+    /// 128 tetrahedra of a star.
+    pub fn most_points(longest_leaf: u32) -> u32 {
+        i32::MAX.cast_unsigned() / longest_leaf.max(STAR as u32)
+    }
+
     /// Carves the memory for `count` points.
     ///
     /// # Errors
@@ -42,7 +51,8 @@ impl OwnersMemory {
 
 /// Records how many tetrahedra contain each point. A point that no tetrahedron contains counts its owner within the
 /// tolerance, if there is one. This call only records: nothing is submitted, waited for, allocated or read back.
-/// [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete once these commands have been executed.
+/// [`OwnersMemory::located`] and [`OwnersMemory::total`] are complete once these commands have been executed; for more
+/// than [`OwnersMemory::most_points`] the total may be too small by a multiple of 2^32.
 ///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: transfer writes. Last use: compute
 /// reads and writes; no barrier before or after.
@@ -70,8 +80,11 @@ pub fn cmd_count_owners(
 /// Starts with a barrier. Last use: compute reads and writes; no barrier after.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if the pipeline cannot be made.
+/// [`crate::Error::Invalid`] for fewer points or memory for fewer, [`crate::Error::Vulkan`] if the pipeline cannot be
+/// made.
 pub fn cmd_list_owners(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memory: &OwnersMemory, found: BufferRef) -> Result<()> {
+    input.check()?;
+    memory.located.check(input.count)?;
     r.barrier("scan → locate_all");
     cmd_walk_lists(r, scene, input, memory, Some(found))
 }
@@ -116,15 +129,15 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
 }
 
 /// Every tetrahedron that contains each point, ascending; for a point that none contains, the owner within the
-/// tolerance alone, if there is one.
+/// tolerance alone, if there is one. `report` receives the number of points done and their total.
 ///
 /// # Errors
-/// As [`super::locate`]; and [`Error::TooLarge`] for 2^31 owners and more in one chunk of points.
+/// As [`super::locate`].
 pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<Vec<Vec<u32>>> {
     let gpu = tree.gpu();
     let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
     let mut all = Vec::with_capacity(points.len());
-    for chunk in points.chunks(CHUNK) {
+    for chunk in points.chunks(CHUNK.min(OwnersMemory::most_points(scene.longest_leaf) as usize)) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
@@ -132,12 +145,6 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
         let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.lists", carve)?;
         gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
         let total: u32 = gpu.download_one(&buffer, memory.total)?;
-        if total > i32::MAX.cast_unsigned() {
-            return Err(Error::TooLarge(format!(
-                "{total} owners of {count} points; shaders number {} at most: ask for fewer points",
-                i32::MAX
-            )));
-        }
         let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
         gpu.submit("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
         let ends: Vec<u32> = gpu.download(&buffer, memory.ends.part(0, 4 * u64::from(count)))?;
@@ -151,4 +158,20 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
         report(all.len() as u64, points.len() as u64);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn all_owners_of_the_most_points_can_be_numbered() {
+        for longest in [0, 1, 128, 2047, 2048, 4100, 1 << 20, crate::build::MAX_TETS] {
+            let (points, each) = (OwnersMemory::most_points(longest), u64::from(longest.max(128)));
+            assert!(points > 0 && i32::try_from(u64::from(points) * each).is_ok(), "{points} points in lists of {longest}");
+            assert!(i32::try_from(u64::from(points + 1) * each).is_err(), "{points} points in lists of {longest}");
+        }
+        // Usual lists do not shorten the chunks.
+        assert!(OwnersMemory::most_points(2047) as usize >= CHUNK);
+    }
 }

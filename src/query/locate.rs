@@ -2,7 +2,7 @@
 
 use super::order::{PointOrder, cmd_sort_points};
 use super::{Progress, Scene, list_parts, upload_field};
-use crate::build::{DeviceMesh, Tree, check_points};
+use crate::build::{DeviceMesh, Tree, check_field, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
@@ -85,11 +85,24 @@ pub struct PointInput {
     /// Number of points.
     pub count: u32,
     /// For [`LocateMethod::Descent`]: one tetrahedron per point from which its search starts, such as its last owner,
-    /// or `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed.
+    /// or `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed. It may be the same part as
+    /// [`LocateOutput::owners`]: a point's hint is read before its owner is written, and no other point reads it.
     pub hints: Option<BufferRef>,
     /// For [`LocateMethod::Sorted`]: one word per place, the point that is located there; every point occurs once.
     /// Answers are stored by point, not by place.
     pub order: Option<BufferRef>,
+}
+
+impl PointInput {
+    /// Rejects points that overlap or are too many, and parts that hold fewer.
+    pub(crate) fn check(&self) -> Result<()> {
+        check_points("points", self.count, self.stride)?;
+        let Some(others) = self.count.checked_sub(1) else { return Ok(()) };
+        self.points.check(4 * (u64::from(self.stride) * u64::from(others) + 3), "points")?;
+        let words = 4 * u64::from(self.count);
+        self.hints.map_or(Ok(()), |hints| hints.check(words, "hints"))?;
+        self.order.map_or(Ok(()), |order| order.check(words, "an order of points"))
+    }
 }
 
 /// Where [`cmd_locate`] writes its answers.
@@ -100,6 +113,14 @@ pub struct LocateOutput {
     /// 16 bytes per point, aligned to 16: barycentric coordinates in the order of the tetrahedron's vertices; zeros
     /// without an owner.
     pub barycentrics: BufferRef,
+}
+
+impl LocateOutput {
+    /// Rejects parts for the answers of fewer points.
+    pub(crate) fn check(&self, count: u32) -> Result<()> {
+        self.owners.check(4 * u64::from(count), "owners")?;
+        self.barycentrics.check(16 * u64::from(count), "barycentrics")
+    }
 }
 
 /// What the kernel's buffer of guides holds.
@@ -114,13 +135,14 @@ enum Guide {
 /// after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, or for [`LocateMethod::Sorted`] without an order; [`Error::TooLarge`] for
-/// points of more than 2^31 floats.
+/// [`Error::Invalid`] for a stride below 3, for parts of fewer points, or for [`LocateMethod::Sorted`] without an order;
+/// [`Error::TooLarge`] for points of more than 2^31 floats.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
     let tolerance = options.tolerance;
-    check_points("points", count, stride)?;
+    input.check()?;
+    output.check(count)?;
     let (grid, masks, co, po, p, flags) = (scene.tree.grid, scene.tree.masks, scene.tree.co, scene.tree.po, scene.tree.p, scene.tree.flags);
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
@@ -199,7 +221,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
 /// is no barrier before or after: the caller records one between `cmd_locate` and this function.
 ///
 /// # Errors
-/// [`Error::Vulkan`] if the pipeline cannot be made.
+/// [`Error::Invalid`] if a part is too small, [`Error::Vulkan`] if the pipeline cannot be made.
 pub fn cmd_interpolate(
     r: &mut Recorder<'_>,
     scene: &Scene,
@@ -209,6 +231,9 @@ pub fn cmd_interpolate(
     values: BufferRef,
     count: u32,
 ) -> Result<()> {
+    check_field((field, on), &scene.mesh.input)?;
+    located.check(count)?;
+    values.check(4 * u64::from(count), "values")?;
     let workgroup = r.gpu().target().query;
     let LocateOutput { owners, barycentrics } = *located;
     let spec = InterpolateSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };

@@ -207,7 +207,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn few_slices_hold_the_longest_list() {
+    fn few_parts_hold_the_longest_list() {
         for longest in [0, 1, LIST_PART, LIST_PART + 1, MAX_LIST_PARTS * LIST_PART, MAX_LIST_PARTS * LIST_PART + 1, 12_290_298, 536_870_911]
         {
             let (part, count) = list_parts(longest);

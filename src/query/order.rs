@@ -1,11 +1,10 @@
 //! The order in which [`super::LocateMethod::Sorted`] locates points: along the Morton curve.
 
 use super::PointInput;
-use crate::build::check_points;
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{PointCodes, PointCodesSpec};
-use crate::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
+use crate::primitives::{Arena, Count, SortScratch, Unsorted, cmd_sort};
 use crate::reference::locate::CODE_BITS;
 
 /// An order of points, and the scratch memory of the sort: 16 bytes per point, and the sort's tables of counts.
@@ -37,16 +36,19 @@ impl PointOrder {
 /// transfer writes; no barrier before or after.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if a pipeline cannot be made; [`crate::Error::Invalid`] and [`crate::Error::TooLarge`] as
-/// [`super::cmd_locate`].
+/// [`crate::Error::Vulkan`] if a pipeline cannot be made; [`crate::Error::Invalid`] if the points or the memory are
+/// fewer than `count`; [`crate::Error::TooLarge`] as [`super::cmd_locate`].
 pub fn cmd_sort_points(r: &mut Recorder<'_>, grid: BufferRef, input: &PointInput, memory: &PointOrder) -> Result<()> {
     let PointInput { points, stride, count, .. } = *input;
     let PointOrder { order, codes, ref sort } = *memory;
-    check_points("points", count, stride)?;
+    input.check()?;
+    order.check(4 * u64::from(count), "an order of points")?;
     let workgroup = r.gpu().target().query;
     r.stage("query.sort_points", |r| {
         let spec = PointCodesSpec { workgroup, code_bits: CODE_BITS, ..Default::default() };
+        let pairs = Unsorted::place(r.gpu(), (codes, order), CODE_BITS, count, sort);
+        let Unsorted { keys: codes, values: order, .. } = pairs;
         r.dispatch(&PointCodes { grid, points, codes, order, count, stride }, spec, Groups::Count(count.div_ceil(workgroup)))?;
-        cmd_sort_pairs(r, codes, order, CODE_BITS, Count::host(count), sort)
+        cmd_sort(r, &pairs, Count::host(count), sort)
     })
 }

@@ -21,7 +21,7 @@ pub use sets::{OverlapMemory, cmd_overlap};
 use super::{Progress, Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Recorder, StageTime};
+use crate::gpu::{Gpu, Recorder, StageTime};
 use crate::layout::{OverlapStatus, wide};
 use crate::primitives::Arena;
 use crate::reference::boundary::set_bits;
@@ -65,17 +65,12 @@ struct Job<'a> {
 }
 
 impl Job<'_> {
-    /// Submits what `record` records, waits for it, and returns the counters.
-    fn submit(
-        &mut self,
-        memory: &Buffer,
-        status: &[BufferRef],
-        record: impl FnOnce(&mut Recorder<'_>, &[Scene; 2]) -> Result<()>,
-    ) -> Result<Vec<OverlapStatus>> {
+    /// Submits what `record` records, and waits for it.
+    fn submit(&mut self, record: impl FnOnce(&mut Recorder<'_>, &[Scene; 2]) -> Result<()>) -> Result<()> {
         let ((), time) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
         self.done.submissions += 1;
         self.done.stages.extend(time.stages);
-        status.iter().map(|&part| self.gpu.download_one(memory, part)).collect()
+        Ok(())
     }
 
     fn sets(&mut self) -> Result<()> {
@@ -84,7 +79,8 @@ impl Job<'_> {
         let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap", carve)?;
         let mut rounds = Rounds::begin(ROUNDS);
         let statuses = loop {
-            let statuses = self.submit(&buffer, &memory.status, |r, [a, b]| cmd_overlap(r, a, b, &memory, rounds))?;
+            self.submit(|r, [a, b]| cmd_overlap(r, a, b, &memory, rounds))?;
+            let statuses = memory.frames.statuses(self.gpu, &buffer)?;
             rounds = Rounds::resume(ROUNDS);
             let sum = |pick: fn(&OverlapStatus) -> u32| statuses.iter().map(|s| u64::from(pick(s))).sum::<u64>();
             let (waiting, unfinished) = (sum(|s| s.waiting), sum(|s| s.unfinished));
@@ -109,12 +105,15 @@ impl Job<'_> {
         let tets = self.scenes[0].mesh.input.tets;
         let carve = |arena: &mut Arena| PairMemory::carve(self.gpu, arena, tets);
         let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap_counts", carve)?;
-        let told = |left: u32| u64::from(tets) - u64::from(left);
+        // In the first pass pairs are counted, in the second they are written.
+        let (report, n) = (self.report, u64::from(tets));
+        let tell = |passes: u64, left: u32| report(passes * n - u64::from(left), 2 * n);
         let mut rounds = Rounds::begin(1);
         let status = loop {
-            let status = self.submit(&buffer, &[memory.status], |r, [a, b]| cmd_count_pairs(r, a, b, &memory, rounds))?[0];
+            self.submit(|r, [a, b]| cmd_count_pairs(r, a, b, &memory, rounds))?;
+            let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
             rounds = Rounds::resume(1);
-            (self.report)(told(status.unfinished), u64::from(tets));
+            tell(1, status.unfinished);
             if status.unfinished == 0 {
                 break status;
             }
@@ -126,9 +125,10 @@ impl Job<'_> {
         let found = self.gpu.buffer("olbvh.query.overlap_found", 8 * u64::from(status.pairs[0]))?;
         let mut rounds = Rounds::begin(1);
         loop {
-            let status = self.submit(&buffer, &[memory.status], |r, [a, b]| cmd_list_pairs(r, a, b, &memory, found.all(), rounds))?[0];
+            self.submit(|r, [a, b]| cmd_list_pairs(r, a, b, &memory, found.all(), rounds))?;
+            let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
             rounds = Rounds::resume(1);
-            (self.report)(told(status.unfilled), u64::from(tets));
+            tell(2, status.unfilled);
             if status.unfilled == 0 {
                 break;
             }
@@ -145,7 +145,8 @@ impl Job<'_> {
 }
 
 /// Overlap of A and B, whose points lie in one space, on one device: all pairs if `pairs` is true, else the two sets
-/// alone. `report` receives how many of the tetrahedra that need a search are done, and how many there are.
+/// alone. `report` receives how many of the tetrahedra that need a search are done, and how many there are; for pairs,
+/// every tetrahedron of A, twice: its pairs are counted first, then written.
 ///
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`] for 2^31 pairs and more, a failed Vulkan call, or [`Error::Invalid`] for

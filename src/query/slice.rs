@@ -14,6 +14,7 @@ pub(crate) use stack::Slicing;
 pub use stack::{Sliced, slice};
 
 use super::{Rounds, Structure, StructureView, dispatch};
+use crate::build::check_field;
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
@@ -114,9 +115,9 @@ impl SliceMemory {
 /// shader writes (and transfer writes of the status) to whatever reads the answers.
 ///
 /// # Errors
-/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, or
-/// for a part of a binary tree. Only the device knows whether boxes are flat or too large for the mesh;
-/// [`SliceStatus::refused`] reports that.
+/// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, for
+/// a field of too few values, or for a part of a binary tree. Only the device knows whether boxes are flat or too large
+/// for the mesh; [`SliceStatus::refused`] reports that.
 pub fn cmd_slice(
     r: &mut Recorder<'_>,
     searched: &StructureView,
@@ -127,13 +128,14 @@ pub fn cmd_slice(
     input.voxels.check()?;
     let ([width, height], Rows { layer, first, count }) = (input.voxels.size, input.rows);
     let rows = u64::from(layer) * u64::from(height) + u64::from(first) + u64::from(count);
-    if count == 0 || rows > u64::from(height) * u64::from(input.voxels.layers) {
+    if count == 0 || first >= height || rows > u64::from(height) * u64::from(input.voxels.layers) {
         return Err(Error::Invalid(format!("{count} rows from row {first} of layer {layer} on, which the stack does not have")));
     }
     let fits = (memory.answers.size / 4, memory.runs.size / size_of::<RunState>() as u64);
     if u64::from(width) * u64::from(count) > fits.0 || u64::from(input.runs()) > fits.1 {
         return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels in {} runs", fits.0, fits.1)));
     }
+    input.field.map_or(Ok(()), |field| check_field(field, &searched.mesh.input))?;
     if input.part.is_some() && matches!(searched.structure, Structure::Binary(_)) {
         return Err(Error::Invalid("a part of a binary tree, which has no cells".into()));
     }
@@ -154,11 +156,27 @@ pub fn cmd_slice(
 }
 
 fn cmd_plan(r: &mut Recorder<'_>, searched: &StructureView, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
-    let VoxelGrid { origin, across, down, up, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
+    let VoxelGrid { origin, next_voxel, next_row, next_layer, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
     let Rows { layer, first, count: rows } = input.rows;
     let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, input.part.unwrap_or(CellRange::WHOLE).words());
-    let arguments =
-        PlanKernel { grid, plans, origin, across, down, up, half0, half1, half2, width, height, layer, first, rows, first_cell, last_cell };
+    let arguments = PlanKernel {
+        grid,
+        plans,
+        origin,
+        next_voxel,
+        next_row,
+        next_layer,
+        half0,
+        half1,
+        half2,
+        width,
+        height,
+        layer,
+        first,
+        rows,
+        first_cell,
+        last_cell,
+    };
     r.dispatch(&arguments, SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
 }
 

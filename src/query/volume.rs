@@ -13,7 +13,7 @@ pub(crate) use picture::{Canvas, Rays};
 pub use picture::{Rendered, render};
 
 use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_bytes};
-use crate::build::Capacity;
+use crate::build::{Capacity, MeshInput, check_field};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
@@ -27,7 +27,7 @@ use crate::primitives::Arena;
 use crate::render::TABLE_SIZE;
 use std::mem::offset_of;
 
-/// Entries, nodes and steps of walks that one ray may test in one dispatch, roughly.
+/// Entries, nodes, and tetrahedra on and around walks that one ray may test in one dispatch, roughly.
 const BUDGET: u32 = 1024;
 /// Nodes on the short stack of the traversal.
 const STACK: u32 = 8;
@@ -54,20 +54,36 @@ pub struct RenderInput {
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
     /// picture is the same either way. With a binary tree nothing is skipped.
     pub visibility: Option<Visibility>,
-    /// Given if the mesh is a block of another one, and other blocks draw their parts of the picture.
+    /// Given if this is a part of a picture: some rows of it, or the part of one block of a mesh.
     pub part: Option<RenderPart>,
 }
 
-/// A part of a picture, drawn by one block of a mesh. Blocks draw one after the other, in an order in which every ray
-/// that meets two of them meets the earlier one first. Each block continues the colours and rays in [`RenderMemory`]
-/// instead of starting new ones. Before the first block, colours must be 0, and rays must be 0 except for
-/// [`RayState::last`], which must be `u32::MAX`.
+impl RenderInput {
+    /// The cells of the block of a mesh that draws its part of the picture.
+    fn cells(&self) -> Option<CellRange> {
+        self.part.and_then(|part| part.cells)
+    }
+
+    /// Rejects parts that are too small for a picture of this mesh.
+    fn check(&self, mesh: &MeshInput) -> Result<()> {
+        self.view.check(size_of::<RenderView>() as u64, "a view")?;
+        self.table.check(16 * TABLE_SIZE as u64, "a transfer function")?;
+        check_field(self.field, mesh)?;
+        self.normals.map_or(Ok(()), |normals| normals.check(12 * u64::from(mesh.points), "normals"))
+    }
+}
+
+/// A part of a picture.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderPart {
-    /// Only samples in these cells of the finest grid, whole leaves of an octree, are taken.
-    pub cells: CellRange,
     /// The row of the view that is row 0 of this part.
     pub row: u32,
+    /// Given if the mesh is a block of another one, and other blocks draw their parts of the same rows. Blocks draw one
+    /// after the other, in an order in which every ray that meets two of them meets the earlier one first. Each block
+    /// continues the colours and rays in [`RenderMemory`] instead of starting new ones. Before the first block, colours
+    /// must be 0, and rays must be 0 except for [`RayState::last`], which must be `u32::MAX`. Only samples in these
+    /// cells of the finest grid, whole leaves of an octree, are taken.
+    pub cells: Option<CellRange>,
 }
 
 /// The values that are visible; nodes of an octree without any of them are skipped.
@@ -140,8 +156,8 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 
 /// Records the drawing of a picture. This call only records: nothing is submitted, waited for, allocated or read back.
 ///
-/// Each round takes a limited number of samples of each ray (1,024, fewer if lists are searched) and skips rays that
-/// are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture
+/// Each round takes a limited number of samples of each ray (1,024, fewer if the structure is searched for them) and
+/// skips rays that are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture
 /// holds what has been gathered so far. Recording again with [`Rounds::resume`] (same input, same memory) continues the
 /// work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished.
 ///
@@ -152,8 +168,8 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// transfers and compute shaders.
 ///
 /// # Errors
-/// [`Error::Invalid`] for memory of fewer pixels, or without room for the nodes to be skipped; [`Error::TooLarge`] as
-/// [`RenderMemory::carve`].
+/// [`Error::Invalid`] for memory of fewer pixels, or without room for the nodes to be skipped, or if a part of the input
+/// is too small; [`Error::TooLarge`] as [`RenderMemory::carve`].
 pub fn cmd_render(
     r: &mut Recorder<'_>,
     searched: &StructureView,
@@ -161,16 +177,32 @@ pub fn cmd_render(
     memory: &RenderMemory,
     rounds: Rounds,
 ) -> Result<()> {
+    cmd_render_marked(r, searched, input, memory, rounds, false)
+}
+
+/// [`cmd_render`]. If nodes are skipped, and `marked`, `memory` has the marks of the visible nodes already.
+fn cmd_render_marked(
+    r: &mut Recorder<'_>,
+    searched: &StructureView,
+    input: &RenderInput,
+    memory: &RenderMemory,
+    rounds: Rounds,
+    marked: bool,
+) -> Result<()> {
     let [width, height] = input.size;
     let rays = rays(input.size)?;
     if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.rays.size {
         return Err(Error::Invalid(format!("a picture of {width}×{height} pixels in memory of fewer")));
     }
+    input.check(&searched.mesh.input)?;
     let visible = visible(searched, input, memory)?;
     let unfinished = memory.status.part(offset_of!(RenderStatus, unfinished) as u64, 4);
     if !rounds.resume {
         r.fill(memory.status.part(0, offset_of!(RenderStatus, unfinished) as u64), 0);
         r.fill(unfinished, width * height);
+        if !marked {
+            cmd_marks(r, searched, input, visible)?;
+        }
         cmd_plan(r, searched, input, memory, visible)?;
         r.barrier("render.plan → render.intervals");
         // With iso-surfaces the intervals use the boundary flags, not the marks: where the mesh has a crack, the field
@@ -199,7 +231,17 @@ fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory)
     }
 }
 
-/// Records the preparation of the view for the kernels, and the marks of the visible nodes.
+/// Records the marks of the visible nodes, if nodes are to be skipped.
+fn cmd_marks(r: &mut Recorder<'_>, searched: &StructureView, input: &RenderInput, visible: Option<Visible>) -> Result<()> {
+    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.visibility, &searched.structure) {
+        let bits = visible_bytes(tree.capacity.nodes);
+        r.copy(tree.flags.part(0, bits), flags);
+        cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), marks)?;
+    }
+    Ok(())
+}
+
+/// Records the preparation of the view for the kernels.
 fn cmd_plan(
     r: &mut Recorder<'_>,
     searched: &StructureView,
@@ -207,12 +249,7 @@ fn cmd_plan(
     memory: &RenderMemory,
     visible: Option<Visible>,
 ) -> Result<()> {
-    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.visibility, &searched.structure) {
-        let bits = visible_bytes(tree.capacity.nodes);
-        r.copy(tree.flags.part(0, bits), flags);
-        cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), marks)?;
-    }
-    let [first_cell, last_cell] = input.part.map_or(CellRange::WHOLE, |part| part.cells).words();
+    let [first_cell, last_cell] = input.cells().unwrap_or(CellRange::WHOLE).words();
     let arguments = VolumePlan {
         grid: searched.mesh.arrays.grid,
         views: input.view,
@@ -238,7 +275,7 @@ fn cmd_intervals(
     visible: Option<Visible>,
 ) -> Result<()> {
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
-    let (mesh, arrays, stack, part) = (&searched.mesh.input, &searched.mesh.arrays, STACK, u32::from(input.part.is_some()));
+    let (mesh, arrays, stack, part) = (&searched.mesh.input, &searched.mesh.arrays, STACK, u32::from(input.cells().is_some()));
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
         dispatch!(r, groups, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {

@@ -166,7 +166,7 @@ impl<'a> Locator<'a> {
     }
 
     /// [`Locator::locate`] for many points, in parallel.
-    pub fn locate_all(&self, points: &[[f32; 3]]) -> Vec<Location> {
+    pub fn locate_each(&self, points: &[[f32; 3]]) -> Vec<Location> {
         points.par_iter().map(|&p| self.locate(p)).collect()
     }
 

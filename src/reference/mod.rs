@@ -1,6 +1,7 @@
 //! The reference implementation of every stage and query, in plain safe Rust; files name the kernels they are twins of.
 //! It is the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
+pub mod along_curve;
 pub mod assign;
 pub mod boundary;
 pub mod brute;
@@ -14,7 +15,6 @@ pub mod leaves;
 pub mod levels;
 pub mod locate;
 pub mod marks;
-pub mod order;
 pub mod overlap;
 pub mod quarters;
 pub mod ranges;

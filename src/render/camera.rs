@@ -5,7 +5,7 @@ mod spec;
 use crate::error::{Error, Result};
 use crate::grid::MIN_EXTENT;
 use crate::layout::Grid;
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 pub use spec::{CameraSpec, HELP};
 
@@ -73,7 +73,8 @@ pub const DEFAULT_FOV: f64 = 30.0;
 const FILL: f64 = 0.94;
 
 impl Camera {
-    /// A camera at `eye` that looks at `target`. If `up` is parallel to the view, another axis replaces it.
+    /// A camera at `eye` that looks at `target`. If `up` is parallel to the view, the back of the mesh is up (see
+    /// [`upright`]).
     ///
     /// # Errors
     /// [`Error::Invalid`] if eye and target are the same point, a coordinate is not finite, or the projection has no
@@ -90,8 +91,9 @@ impl Camera {
         if !(size > 0.0 && size <= limit) {
             return Err(Error::Invalid("a camera's fov lies between 0 and 179 degrees, its ortho height above 0".into()));
         }
-        let side = |up: DVec3| up.try_normalize().map(|up| forward.cross(up)).filter(|s| s.length_squared() > 1e-12);
-        let right = side(up).or_else(|| side(DVec3::Z)).or_else(|| side(DVec3::Y)).unwrap_or(DVec3::X).normalize();
+        let up = up.try_normalize().unwrap_or(DVec3::Z);
+        let across = forward.cross(up);
+        let right = if across.length_squared() > 1e-12 { across } else { forward.cross(upright(up).y_axis) }.normalize();
         Ok(Self { eye, forward, right, up: right.cross(forward), projection })
     }
 
@@ -128,6 +130,19 @@ impl Camera {
         camera
     }
 
+    /// The height of an orthographic picture with its centre on the view axis that all `points` just fit into.
+    fn height_around(&self, bounds: &Bounds, points: &[DVec3], aspect: f64) -> f64 {
+        let corners = bounds.corners();
+        let points = if points.is_empty() { &corners[..] } else { points };
+        let half = |p: &DVec3| (p - self.eye).dot(self.up).abs().max((p - self.eye).dot(self.right).abs() / aspect);
+        (points.iter().map(half).fold(0.0, f64::max) * 2.0 / FILL).max(bounds.diagonal() * 1e-6)
+    }
+
+    /// The largest distance from the eye to a point of the box.
+    pub(crate) fn distance(&self, bounds: &Bounds) -> f64 {
+        bounds.corners().into_iter().map(|p| p.distance(self.eye)).fold(0.0, f64::max)
+    }
+
     /// An upper bound on the distance from the origin of a ray of [`Camera::rays`] at which it can meet the box.
     pub(crate) fn reach(&self, size: [u32; 2], bounds: &Bounds) -> f64 {
         let depth = |p: DVec3| (p - self.eye).dot(self.forward);
@@ -139,8 +154,7 @@ impl Camera {
             return 0.0;
         }
         let slope = (degrees.to_radians() * 0.5).tan() * (w / h).hypot(1.0);
-        let distance = corners.into_iter().map(|p| p.distance(self.eye)).fold(0.0, f64::max);
-        (distance * (1.0 - near / far)).min(slope.hypot(1.0) * (far - near))
+        (self.distance(bounds) * (1.0 - near / far)).min(slope.hypot(1.0) * (far - near))
     }
 
     /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the
@@ -184,12 +198,22 @@ impl Camera {
     }
 }
 
-/// The direction of the default view, from the mesh to the eye: front, right and top sides are visible, larger sides
-/// more.
-pub fn three_quarter(bounds: &Bounds) -> DVec3 {
-    let e = [0, 1, 2].map(|c| f64::from(bounds.hi[c]) - f64::from(bounds.lo[c]));
-    let largest = e.into_iter().fold(0.0, f64::max);
-    let e = e.map(|x| if largest > 0.0 { (x / largest).max(0.02) } else { 1.0 });
+/// The axes of a mesh with this vertical axis, to its right, to its back, and up: x, y and z turned by the least angle
+/// that brings z to `up`, a unit vector. So with y up, the front is towards +z.
+pub fn upright(up: DVec3) -> DMat3 {
+    let DVec3 { x, y, z } = up;
+    if z < -1.0 + 1e-12 {
+        return DMat3::from_diagonal(DVec3::new(1.0, -1.0, -1.0)); // any half turn will do
+    }
+    let k = 1.0 / (1.0 + z);
+    DMat3::from_cols(DVec3::new(1.0 - x * x * k, -x * y * k, -x), DVec3::new(-x * y * k, 1.0 - y * y * k, -y), up)
+}
+
+/// The direction of the default view, from the mesh to the eye, along the axes of [`upright`]: front, right and top
+/// sides are visible, larger sides more. `extent` is the size of the mesh along these axes.
+pub fn three_quarter(extent: DVec3) -> DVec3 {
+    let largest = extent.max_element().max(0.0);
+    let e = extent.to_array().map(|x| if largest > 0.0 { (x / largest).max(0.02) } else { 1.0 });
     let sides = [e[1] * e[2], e[0] * e[2], e[0] * e[1]];
     let mean = (sides[0] * sides[1] * sides[2]).cbrt();
     let weight = sides.map(|side| (side / mean).powf(0.35).clamp(0.5, 2.0));
@@ -223,6 +247,12 @@ impl RayGrid {
         let w = [0, 1, 2].map(|c| (self.direction[c] + x * self.direction_x[c]) + y * self.direction_y[c]);
         let r = super::inverse_sqrt((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]);
         (origin, w.map(|v| v * r))
+    }
+
+    /// Whether the rays of all pixels of a picture of this size are finite.
+    pub(super) fn is_finite(&self, [width, height]: [u32; 2]) -> bool {
+        let corners = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)].map(|(x, y)| self.ray(x, y));
+        corners.iter().all(|(origin, direction)| origin.iter().chain(direction).all(|v| v.is_finite()))
     }
 }
 

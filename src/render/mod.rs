@@ -17,10 +17,11 @@
 //!   the opacity scale s.
 //! - With shading, c is lit and a grows on surfaces seen from the side, as defined by [`Lighting::shade`], using the
 //!   normals that [`shading_normals`] computes for the vertices.
-//! - Iso-surfaces replace the volume: between two successive samples that both have a value, each iso-value that
-//!   separates the two values adds the colour and opacity at its place as one surface, in the order along the ray. The
-//!   surface lies where the value, taken as linear between the two samples, equals the iso-value. This is exact if both
-//!   samples lie in one tetrahedron. The normals are those of the second sample's tetrahedron ([`gradient_normals`]).
+//! - Iso-surfaces replace the volume. A sample with a value shows the stretch of the ray in its tetrahedron, where the
+//!   value is linear: forwards up to the next sample at most, and backwards to the one before if that has no value.
+//!   Between the stretches of consecutive samples the value is taken as linear, too. Of each such piece, each iso-value
+//!   that only one end is below adds the colour and opacity at its place as one surface, in the order along the ray,
+//!   lit by the normals ([`gradient_normals`]) of a tetrahedron there.
 
 pub mod auto;
 pub mod camera;

@@ -4,7 +4,8 @@
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::visible_values::visible_values;
 use super::{
-    Background, Bounds, Camera, Lighting, OPACITY_UNIT, RayGrid, RenderSettings, ValidTets, auto_opacity, gradient_normals, shading_normals,
+    Background, Bounds, Camera, Lighting, OPACITY_UNIT, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity, gradient_normals,
+    shading_normals,
 };
 use crate::error::{Error, Result};
 use crate::grid::{canonical, two_to};
@@ -16,6 +17,8 @@ use glam::DVec3;
 pub const TABLE_SIZE: usize = 1024;
 /// Smallest step as a part of the diagonal, which keeps sample numbers exact in single precision.
 const MIN_STEP: f64 = 1.0 / 65_536.0;
+/// Largest distance of the eye, in diagonals: rays start near the mesh, but where is known to 2^-53 of that distance.
+const MAX_DISTANCE: f64 = 1e9;
 /// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
 /// flags from bit 30 on.
 pub const MAX_SAMPLES: u32 = 1 << 23;
@@ -53,8 +56,9 @@ impl Plan {
     /// this range.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if a setting is out of its limits, if the step is below 1/65,536 of the diagonal, or if the
-    /// camera sees the mesh at so flat an angle that a ray would have more than [`MAX_SAMPLES`] samples.
+    /// [`Error::Invalid`] if a setting is out of its limits, if the step is below 1/65,536 of the diagonal or above the
+    /// diagonal, if rays are no finite numbers or the eye is farther than 10^9 diagonals, or if the camera sees the
+    /// mesh at so flat an angle that a ray would have more than [`MAX_SAMPLES`] samples.
     pub fn new(settings: &RenderSettings, bounds: &Bounds, origin: [f64; 3], field_range: Option<[f32; 2]>) -> Result<Self> {
         settings.check()?;
         let [width, height] = settings.size.map(f64::from);
@@ -70,20 +74,39 @@ impl Plan {
         settings.check()?;
         let diagonal = bounds.diagonal();
         let step = settings.step.unwrap_or(diagonal / DEFAULT_STEPS);
+        let wrong = |why: String| Err(Error::Invalid(why));
+        if step > diagonal {
+            return wrong(format!("a step of {step:e} is longer than the diagonal of the mesh; take {diagonal:e} at most"));
+        }
         if step < diagonal * MIN_STEP || !(step as f32).is_normal() {
-            return Err(Error::Invalid(format!(
-                "a step of {step} is too small for a mesh of diagonal {diagonal}; take at least {}",
-                diagonal * MIN_STEP
-            )));
+            let least = (diagonal * MIN_STEP).max(f64::from(f32::MIN_POSITIVE));
+            return wrong(format!("a step of {step:e} is too small for a mesh of diagonal {diagonal:e}; take at least {least:e}"));
+        }
+        let distance = camera.distance(bounds);
+        if distance > diagonal * MAX_DISTANCE {
+            return wrong(format!(
+                "an eye at a distance of {distance:.1e} from the mesh, whose diagonal is {diagonal:.1e}; rays are exact up to 10^9 diagonals"
+            ));
+        }
+        let rays = camera.rays(settings.size, bounds);
+        if !rays.is_finite(settings.size) {
+            let high = match camera.projection {
+                Projection::Perspective(degrees) => format!("{degrees} degrees"),
+                Projection::Orthographic(height) => format!("{height:e}"),
+            };
+            return wrong(format!(
+                "a picture {high} high, with rays beyond single precision; take a smaller fov or ortho height, or a larger zoom (the mesh's \
+                 diagonal is {diagonal:.1e})"
+            ));
         }
         let reach = camera.reach(settings.size, bounds);
         if reach > step * f64::from(MAX_SAMPLES) {
-            return Err(Error::Invalid(format!(
-                "rays that reach the mesh after {:.0} steps of {step}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a \
-                 smaller angle or a step of {} or more",
+            return wrong(format!(
+                "rays that reach the mesh after {:.1e} steps of {step:e}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a \
+                 smaller angle or a step of {:e} or more",
                 reach / step,
                 reach / f64::from(MAX_SAMPLES)
-            )));
+            ));
         }
         let [right, up, back] = settings.light.map(f64::from);
         let to_light = (camera.right * right + camera.up * up - camera.forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
@@ -94,8 +117,9 @@ impl Plan {
         let surfaces = !iso.is_empty();
         let exponent = f64::from(settings.opacity_scale) * if surfaces { 1.0 } else { step / (diagonal * OPACITY_UNIT) };
         let opaque = surfaces && !settings.transfer.has_opacity();
+        let transfer = settings.transfer.over(range);
         let entry = |i: usize| {
-            let [r, g, b, a] = settings.transfer.at(i as f32 / (TABLE_SIZE - 1) as f32);
+            let [r, g, b, a] = transfer.at(i as f32 / (TABLE_SIZE - 1) as f32);
             let a = if opaque { 1.0 } else { a };
             [r, g, b, (1.0 - (1.0 - f64::from(a)).powf(exponent)) as f32]
         };
@@ -105,7 +129,7 @@ impl Plan {
         let table: Vec<_> = (0..TABLE_SIZE).map(entry).collect();
         Ok(Self {
             size: settings.size,
-            rays: camera.rays(settings.size, bounds),
+            rays,
             step: step as f32,
             value_lo,
             value_scale,
@@ -265,67 +289,4 @@ fn value_range(range: Option<[f32; 2]>) -> [f64; 2] {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::render::{Projection, TransferFunction};
-
-    const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
-
-    #[test]
-    fn opacity_is_independent_of_the_step() {
-        let through = |step: f64| {
-            let settings = RenderSettings { step: Some(step), ..RenderSettings::default() };
-            let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([0.0, 1.0])).unwrap();
-            // Transparency of one unit (1/100 of 13) at the top of the range.
-            (1.0 - plan.lookup(1.0)[3]).powf(0.13 / plan.step)
-        };
-        let expected = 1.0 - TransferFunction::default().at(1.0)[3];
-        for step in [0.13, 0.01, 0.001] {
-            assert!((through(step) - expected).abs() < 1e-3, "{step}: {} {expected}", through(step));
-        }
-    }
-
-    #[test]
-    fn lookups_follow_the_function_and_clamp() {
-        let settings = RenderSettings { step: Some(0.13), ..RenderSettings::default() };
-        let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([100.0, 300.0])).unwrap();
-        for (value, place) in [(100.0, 0.0), (150.0, 0.25), (213.0, 0.565), (300.0, 1.0), (99.0, 0.0), (f32::MAX, 1.0), (f32::MIN, 0.0)] {
-            let (got, expected) = (plan.lookup(value), settings.transfer.at(place));
-            assert!((0..4).all(|c| (got[c] - expected[c]).abs() < 2e-3), "{value}: {got:?} {expected:?}");
-        }
-    }
-
-    #[test]
-    fn constant_and_odd_ranges_have_lookups() {
-        for range in [None, Some([5.0, 5.0]), Some([0.0, 0.0]), Some([f32::MIN, f32::MAX]), Some([1e-40, 2e-40])] {
-            let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], range).unwrap();
-            for v in [0.0, 5.0, f32::MAX, f32::MIN] {
-                assert!(plan.lookup(v).iter().all(|c| (0.0..=1.0).contains(c)), "{range:?} {v} {:?}", plan.lookup(v));
-            }
-        }
-        let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], Some([5.0, 5.0])).unwrap();
-        assert_eq!(((5.0 - plan.value_lo) * plan.value_scale * 10.0).round(), 5.0);
-    }
-
-    #[test]
-    fn sample_numbers_are_held_down() {
-        let camera = |eye: [f64; 3], target: [f64; 3]| {
-            Camera::look_at(DVec3::from_array(eye), DVec3::from_array(target), DVec3::Z, Projection::Perspective(179.0)).unwrap()
-        };
-        let plan = |camera: &Camera, step: f64| {
-            let settings = RenderSettings { size: [16_384, 1], step: Some(step), ..RenderSettings::default() };
-            Plan::with_camera(&settings, camera, &BOX, None)
-        };
-        // One camera is far beside the box, which appears at the edge of a very wide picture; the other is equally far
-        // in front of it.
-        let (beside, before) = (camera([1e7, 0.0, 6.0], [1e7, 1.0, 6.0]), camera([1e7, 2.0, 6.0], [0.0, 2.0, 6.0]));
-        assert!(plan(&beside, 0.1).unwrap_err().to_string().contains("step of 0.89"));
-        assert!(plan(&beside, 0.9).is_ok() && plan(&before, 0.1).is_ok());
-    }
-
-    #[test]
-    fn tiny_steps_are_refused() {
-        let settings = RenderSettings { step: Some(1e-5), ..RenderSettings::default() };
-        assert!(Plan::new(&settings, &BOX, [0.0; 3], None).unwrap_err().to_string().contains("0.000198"));
-    }
-}
+mod tests;

@@ -39,7 +39,7 @@ pub struct RenderSettings {
     /// function, or else the whole range of the field.
     pub range: Option<[f32; 2]>,
     /// Distance Δ of two samples in mesh units; by default 1/512 of the diagonal. [`super::suited_step`]
-    /// is finer for thin parts and layers.
+    /// is finer for thin walls and layers.
     pub step: Option<f64>,
     /// What is behind the mesh.
     pub background: Background,

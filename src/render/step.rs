@@ -1,31 +1,41 @@
 //! A distance of samples that suits a mesh.
 
 use super::settings::DEFAULT_STEPS;
+use rayon::prelude::*;
 
 /// Tetrahedra that are looked at, spread evenly over the mesh.
 const SAMPLES: usize = 1 << 17;
 /// How many times finer than by default samples are at most.
 const FINEST: f64 = 16.0;
+/// Samples through a wall. With fewer, their number differs visibly from pixel to pixel: walls show grain like wood.
+const IN_WALLS: f64 = 12.0;
+/// How many times finer than one per layer samples are at most for the sake of walls.
+const FINER: f64 = 4.0;
 
 /// How thin a mesh is, and the step that this suggests.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SuitedStep {
-    /// Step for [`super::RenderSettings::step`], in mesh units: the thickness, at least 1/8192 of the diagonal. `None`
-    /// where that is no less than the default step, 1/512 of the diagonal.
+    /// Step for [`super::RenderSettings::step`], in mesh units. `None` where nothing is gained over the default step,
+    /// 1/512 of the diagonal. A layer gets one step; a wall gets 12, if they are no finer than a quarter of the default
+    /// step or of the layer. No step is below 1/8192 of the diagonal.
     pub step: Option<f64>,
-    /// Median thickness of the tetrahedra, weighted by the areas of their largest faces, since that is what a picture
-    /// shows of them. Parts that are thinner than the step show rings, or are missed.
+    /// Thickness of layers: the median smallest altitude of the tetrahedra, weighted by the areas of their largest
+    /// faces, since that is what a picture shows of them. Layers that are thinner than the step show rings, or are
+    /// missed.
     pub thickness: f64,
+    /// Mean thickness of walls: twice the volume over the area of the surface.
+    pub wall: f64,
 }
 
-/// The step that suits a mesh which may be thinner than the default step, such as a plate, or consist of thin layers.
-/// The thickness of a tetrahedron is its smallest altitude. `None` for a mesh without volume.
+/// The step that suits a mesh which may have thin walls, such as a plate or a pot, or consist of thin layers. `None`
+/// for a mesh without volume.
 pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep> {
+    let corner = |v: u32| points.get(v as usize).map(|p| p.map(f64::from));
     let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     let mut found: Vec<[f64; 2]> = Vec::new();
-    for tet in tets.iter().step_by(tets.len().div_ceil(SAMPLES).max(1)) {
-        let corners = tet.map(|v| points.get(v as usize).map(|p| p.map(f64::from)));
-        let [Some(a), Some(b), Some(c), Some(d)] = corners else { continue };
+    let every = tets.len().div_ceil(SAMPLES).max(1);
+    for tet in tets.iter().step_by(every) {
+        let [Some(a), Some(b), Some(c), Some(d)] = tet.map(corner) else { continue };
         let [altitude, area] = smallest_altitude([a, b, c, d]);
         if !(altitude > 0.0 && altitude.is_finite()) {
             continue;
@@ -45,20 +55,56 @@ pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep>
         below >= half
     })?;
     let default = (0..3).map(|k| (hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt() / DEFAULT_STEPS;
-    Some(SuitedStep { step: (thickness < default).then(|| thickness.max(default / FINEST)), thickness })
+    // An altitude times twice the area of its face is six times the volume.
+    let volume = found.iter().map(|[altitude, area]| altitude * area).sum::<f64>() / 6.0 * every as f64;
+    let wall = 2.0 * volume / surface(&corner, tets);
+    let layer = thickness.min(default);
+    let step = layer.min((wall / IN_WALLS).max(layer / FINER)).max(default / FINEST);
+    Some(SuitedStep { step: (step < default).then_some(step), thickness, wall })
+}
+
+/// The area of the faces that only one tetrahedron has. In large meshes, faces are taken by their lowest vertex, and
+/// stand for the others.
+fn surface(corner: &(impl Fn(u32) -> Option<[f64; 3]> + Sync), tets: &[[u32; 4]]) -> f64 {
+    let one_in = tets.len().div_ceil(SAMPLES).max(1) as u32;
+    let is_taken = |v: u32| (v.wrapping_mul(0x9e37_79b9) >> 8).is_multiple_of(one_in);
+    let faces = |&[a, b, c, d]: &[u32; 4]| {
+        let taken = [[a, b, c], [a, b, d], [a, c, d], [b, c, d]].into_iter().filter(|&[p, q, r]| is_taken(p.min(q).min(r)));
+        taken.map(|mut face| {
+            face.sort_unstable();
+            face
+        })
+    };
+    let mut all: Vec<[u32; 3]> = tets.par_iter().flat_map_iter(faces).collect();
+    all.par_sort_unstable();
+    let area = |face: &[u32; 3]| {
+        let [Some(p), Some(q), Some(r)] = face.map(corner) else { return 0.0 };
+        double_area(p, q, r) / 2.0
+    };
+    all.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| area(&same[0])).sum::<f64>() * f64::from(one_in)
+}
+
+fn sub(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
+    [0, 1, 2].map(|k| p[k] - q[k])
+}
+
+fn cross(u: [f64; 3], v: [f64; 3]) -> [f64; 3] {
+    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
+}
+
+fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
+    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
+}
+
+fn double_area(p: [f64; 3], q: [f64; 3], r: [f64; 3]) -> f64 {
+    let normal = cross(sub(q, p), sub(r, p));
+    dot(normal, normal).sqrt()
 }
 
 /// The smallest altitude, three times the volume by the area of the largest face, and twice that area.
 fn smallest_altitude([a, b, c, d]: [[f64; 3]; 4]) -> [f64; 2] {
-    let sub = |p: [f64; 3], q: [f64; 3]| [0, 1, 2].map(|k| p[k] - q[k]);
-    let cross = |u: [f64; 3], v: [f64; 3]| [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
-    let dot = |u: [f64; 3], v: [f64; 3]| u[0] * v[0] + u[1] * v[1] + u[2] * v[2];
-    let area = |p, q, r| {
-        let normal = cross(sub(q, p), sub(r, p));
-        dot(normal, normal).sqrt()
-    };
     let volume = dot(cross(sub(b, a), sub(c, a)), sub(d, a)).abs();
-    let largest = area(a, b, c).max(area(a, b, d)).max(area(a, c, d)).max(area(b, c, d));
+    let largest = double_area(a, b, c).max(double_area(a, b, d)).max(double_area(a, c, d)).max(double_area(b, c, d));
     [volume / largest, largest]
 }
 
@@ -67,22 +113,48 @@ mod tests {
     use super::*;
 
     /// A flat box of Kuhn tetrahedra, `height` thick.
-    fn plate(height: f32) -> SuitedStep {
-        let mut mesh = crate::mesh::kuhn([32, 32, 1]).unwrap();
-        mesh.points.iter_mut().for_each(|p| p[2] *= height);
+    fn plate(layers: u32, height: f32) -> SuitedStep {
+        let mut mesh = crate::mesh::kuhn([32, 32, layers]).unwrap();
+        mesh.points.iter_mut().for_each(|p| p[2] *= height / layers as f32);
         suited_step(&mesh.points, &mesh.tets).unwrap()
+    }
+
+    fn near(a: f64, b: f64) -> bool {
+        (a / b - 1.0).abs() < 2e-3
     }
 
     #[test]
     fn thin_plates_get_finer_steps() {
         let diagonal = 2f64.sqrt() * 32.0;
-        let near = |a: f64, b: f64| (a / b - 1.0).abs() < 1e-3;
-        assert_eq!(plate(1.0).step, None);
         // Half as thick as the default step: the altitude of these tetrahedra is nearly the height.
-        let thin = plate(diagonal as f32 / 1024.0);
-        assert!(near(thin.step.unwrap(), diagonal / 1024.0) && near(thin.thickness, diagonal / 1024.0), "{thin:?}");
-        let film = plate(1e-4);
+        let thin = plate(1, diagonal as f32 / 1024.0);
+        assert!(near(thin.step.unwrap(), diagonal / 4096.0) && near(thin.thickness, diagonal / 1024.0), "{thin:?}");
+        let film = plate(1, 1e-4);
         assert!(near(film.step.unwrap(), diagonal / 8192.0) && near(film.thickness, 1e-4), "{film:?}");
         assert_eq!(suited_step(&[[0.0; 3]; 4], &[[0, 1, 2, 3], [0, 1, 2, 9]]), None);
+    }
+
+    /// Walls of a few default steps get twelve steps, however they are cut into cells; thick ones keep the default.
+    #[test]
+    fn walls_get_twelve_steps() {
+        let diagonal = 2f64.sqrt() * 32.0;
+        let height = diagonal as f32 / 512.0 * 5.0;
+        for layers in [1, 3] {
+            let wall = plate(layers, height);
+            assert!((wall.wall / f64::from(height) - 1.0).abs() < 0.05 && wall.step == Some(wall.wall / 12.0), "{layers}: {wall:?}");
+        }
+        for layers in [1, 16] {
+            assert_eq!(plate(layers, 4.0).step, None, "{layers}");
+        }
+    }
+
+    /// In large meshes a part of the faces stands for all.
+    #[test]
+    fn large_surfaces_are_estimated() {
+        let mesh = crate::mesh::kuhn([64, 64, 16]).unwrap();
+        assert!(mesh.tets.len() > 2 * SAMPLES);
+        let wall = suited_step(&mesh.points, &mesh.tets).unwrap().wall;
+        let exact = 2.0 * 65_536.0 / (2.0 * 4096.0 + 4.0 * 1024.0);
+        assert!((wall / exact - 1.0).abs() < 0.1, "{wall} {exact}");
     }
 }

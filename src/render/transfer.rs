@@ -10,6 +10,8 @@ pub struct TransferFunction {
     colors: Vec<(f32, [f32; 3])>,
     opacity: Option<Vec<(f32, f32)>>,
     range: Option<[f32; 2]>,
+    /// Whether the places of colours and of opacities are values of the field; there is a range then.
+    in_values: [bool; 2],
 }
 
 /// Name of the default map.
@@ -26,7 +28,7 @@ pub const JSON_HELP: &str = concat!(
     "\n\n",
     r##""map" names a colour map; instead, "colors" has a place and a colour for each point. "opacity" has a place and an opacity "##,
     r##"for each point. Places go from 0 to 1 over the range of the field or, with "positions": "values", are values of the "##,
-    r##"field. Colours are sRGB. An opacity, from 0 to 1, is that of a layer as thick as 1/100 of the diagonal of the mesh's "##,
+    r##"field, which no range moves. Colours are sRGB. An opacity, from 0 to 1, is that of a layer as thick as 1/100 of the diagonal of the mesh's "##,
     r##"bounds; without "opacity", opacities are chosen so that rare values show through common ones. "range": [LO, HI] sets the "##,
     r##"values at places 0 and 1."##,
 );
@@ -41,7 +43,7 @@ impl TransferFunction {
     /// A function with the colours of a map and no opacities.
     pub fn from_map(map: &maps::ColorMap) -> Self {
         let colors = map.points.iter().map(|&(place, rgb)| (f32::from(place) / 255.0, from_hex(rgb))).collect();
-        Self { colors, opacity: None, range: None }
+        Self { colors, opacity: None, range: None, in_values: [false; 2] }
     }
 
     /// A built-in map by name, in upper or lower case; the suffix `_r` reverses it.
@@ -71,9 +73,9 @@ impl TransferFunction {
     /// # Errors
     /// [`Error::Invalid`] if a list is empty, places descend, or a place or channel lies outside 0…1.
     pub fn new(colors: Vec<(f32, [f32; 3])>, opacity: Vec<(f32, f32)>) -> Result<Self> {
-        check("colours", colors.iter().map(|(place, c)| (*place, &c[..])))?;
-        check("opacities", opacity.iter().map(|(place, a)| (*place, std::slice::from_ref(a))))?;
-        Ok(Self { colors, opacity: Some(opacity), range: None })
+        check_colors(&colors, false)?;
+        check_opacity(&opacity, false)?;
+        Ok(Self { colors, opacity: Some(opacity), range: None, in_values: [false; 2] })
     }
 
     /// Replaces the opacities.
@@ -81,7 +83,8 @@ impl TransferFunction {
     /// # Errors
     /// As [`TransferFunction::new`].
     pub fn with_opacity(self, opacity: Vec<(f32, f32)>) -> Result<Self> {
-        Ok(Self { range: self.range, ..Self::new(self.colors, opacity)? })
+        check_opacity(&opacity, false)?;
+        Ok(Self { opacity: Some(opacity), in_values: [self.in_values[0], false], ..self })
     }
 
     /// Opacity points from text: one number for all places, or `PLACE:OPACITY,…` as in `0:0,0.5:0.1,1:0.8`.
@@ -112,10 +115,31 @@ impl TransferFunction {
         self.range
     }
 
+    /// The function with these values at places 0 and 1. Where places are values of the field, it keeps its colours and
+    /// opacities at them.
+    #[must_use]
+    pub fn over(&self, [lo, hi]: [f64; 2]) -> Self {
+        let mut function = Self { range: Some([lo as f32, hi as f32]), in_values: [false; 2], ..self.clone() };
+        // A range of a single value has that value in its middle.
+        let (lo, width) = if hi > lo { (lo, hi - lo) } else { (lo - 0.5, 1.0) };
+        let place = |value: &mut f32| *value = ((f64::from(*value) - lo) / width) as f32;
+        if self.in_values[0] {
+            function.colors.iter_mut().for_each(|(value, _)| place(value));
+        }
+        if self.in_values[1] {
+            function.opacity.iter_mut().flatten().for_each(|(value, _)| place(value));
+        }
+        function
+    }
+
     /// Colour and opacity at place `x`, 0…1.
     pub fn at(&self, x: f32) -> [f32; 4] {
-        let [r, g, b] = interpolate(&self.colors, x, |a, b, t| [0, 1, 2].map(|c| a[c] + (b[c] - a[c]) * t));
-        [r, g, b, interpolate(self.opacity.as_deref().unwrap_or(DEFAULT_OPACITY), x, |a, b, t| a + (b - a) * t)]
+        let [color, opacity] = self.in_values.map(|in_values| match self.range {
+            Some([lo, hi]) if in_values => (f64::from(lo) + f64::from(x) * (f64::from(hi) - f64::from(lo))) as f32,
+            _ => x,
+        });
+        let [r, g, b] = interpolate(&self.colors, color, |a, b, t| [0, 1, 2].map(|c| a[c] + (b[c] - a[c]) * t));
+        [r, g, b, interpolate(self.opacity.as_deref().unwrap_or(DEFAULT_OPACITY), opacity, |a, b, t| a + (b - a) * t)]
     }
 }
 
@@ -129,19 +153,31 @@ fn interpolate<T: Copy>(points: &[(f32, T)], x: f32, mix: impl Fn(T, T, f32) -> 
     mix(a.1, b.1, t)
 }
 
-/// Checks that the places ascend within 0…1 and that the channels lie in 0…1.
-fn check<'a>(what: &str, points: impl Iterator<Item = (f32, &'a [f32])>) -> Result<()> {
+fn check_colors(colors: &[(f32, [f32; 3])], in_values: bool) -> Result<()> {
+    check("colours", in_values, colors.iter().map(|(place, c)| (*place, &c[..])))
+}
+
+fn check_opacity(opacity: &[(f32, f32)], in_values: bool) -> Result<()> {
+    check("opacities", in_values, opacity.iter().map(|(place, a)| (*place, std::slice::from_ref(a))))
+}
+
+/// Checks that the places ascend, within 0…1 unless they are values of the field, and that the channels lie in 0…1.
+fn check<'a>(what: &str, in_values: bool, points: impl Iterator<Item = (f32, &'a [f32])>) -> Result<()> {
     let wrong = |why: String| Err(Error::Invalid(format!("{what} of a transfer function: {why}")));
+    let place_is = if in_values { "the field's value" } else { "place" };
     let mut last = None;
     for (place, channels) in points {
-        if !(0.0..=1.0).contains(&place) {
+        if !in_values && !(0.0..=1.0).contains(&place) {
             return wrong(format!("the place {place} lies outside 0 to 1"));
         }
+        if !place.is_finite() {
+            return wrong(format!("{place_is} {place} is beyond single precision"));
+        }
         if let Some(bad) = channels.iter().find(|v| !(0.0..=1.0).contains(*v)) {
-            return wrong(format!("at place {place}, the value {bad} lies outside 0 to 1"));
+            return wrong(format!("at {place_is} {place}, the value {bad} lies outside 0 to 1"));
         }
         if let Some(last) = last.filter(|&last| place < last) {
-            return wrong(format!("places must ascend, but {place} follows {last}"));
+            return wrong(format!("{} must ascend, but {place} follows {last}", if in_values { "values" } else { "places" }));
         }
         last = Some(place);
     }

@@ -2,8 +2,7 @@
 //! reference slice a [`VoxelGrid`] with the same operations in the same order.
 //!
 //! # Definition
-//! - The centre of voxel (x, y) of layer k is `((origin + k·up) + y·down) + x·across`; row 0 of a layer has the lowest
-//!   coordinate.
+//! - The centre of voxel (x, y) of layer k is `((origin + k·next_layer) + y·next_row) + x·next_voxel`.
 //! - The box of a voxel is the closed set of its centre ± the three half axes of [`VoxelGrid::half`]; on an oblique
 //!   plane it is rotated with the plane. The box is tested in normalised coordinates, in which its half axes are
 //!   rounded to multiples of 2^-42.
@@ -37,8 +36,12 @@ pub const INSIDE: u8 = 2;
 pub const VOXEL_RUN: u32 = 64;
 /// Most tetrahedra of a walk across faces before the tree is searched.
 pub const WALK: u32 = 6;
+/// Most voxels that are sliced at a time, unless a single row has more.
+pub const BAND_VOXELS: u64 = 1 << 20;
 /// Most voxels along an axis; numbers up to this are exact in single precision.
-pub const MOST: u32 = 1 << 24;
+pub const MOST_PER_AXIS: u32 = 1 << 24;
+/// Most voxels of a stack, so that their numbers and bytes can be counted with 64 bits.
+pub const MOST_VOXELS: u64 = 1 << 48;
 
 /// The value that a touched voxel gets.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -59,11 +62,11 @@ pub struct VoxelGrid {
     /// Centre of voxel (0, 0) of layer 0.
     pub origin: [f32; 3],
     /// Vector from one voxel to the next in a row.
-    pub across: [f32; 3],
+    pub next_voxel: [f32; 3],
     /// Vector from one row to the next.
-    pub down: [f32; 3],
+    pub next_row: [f32; 3],
     /// Vector from one layer to the next.
-    pub up: [f32; 3],
+    pub next_layer: [f32; 3],
     /// Half axes of a voxel's box.
     pub half: [[f32; 3]; 3],
     /// Voxels per row, and rows per layer.
@@ -76,7 +79,7 @@ impl VoxelGrid {
     /// Centre of a voxel.
     pub fn centre(&self, [x, y, k]: [u32; 3]) -> [f32; 3] {
         let (x, y, k) = (x as f32, y as f32, k as f32);
-        [0, 1, 2].map(|c| ((self.origin[c] + k * self.up[c]) + y * self.down[c]) + x * self.across[c])
+        [0, 1, 2].map(|c| ((self.origin[c] + k * self.next_layer[c]) + y * self.next_row[c]) + x * self.next_voxel[c])
     }
 
     /// Whether the boxes of these voxels may meet the closed box `[lo, hi]` in a mesh with this grid, that is, whether
@@ -86,13 +89,19 @@ impl VoxelGrid {
         let [x, y] = self.size.map(|n| f64::from(n) - 1.0);
         let ([first, layer], [last, top]) = (rows.row(0, self.size[1]), rows.row(rows.count.saturating_sub(1), self.size[1]));
         let [low, high] = if layer == top { [first, last].map(f64::from) } else { [0.0, y] };
-        let sides = [wide(self.across) * x, wide(self.down) * (high - low), wide(self.up) * f64::from(top - layer)];
-        let corner = wide(self.origin) + wide(self.up) * f64::from(layer) + wide(self.down) * low;
+        let (top_layer, layer) = (f64::from(top), f64::from(layer));
+        let [origin, next_voxel, next_row, next_layer] = [self.origin, self.next_voxel, self.next_row, self.next_layer].map(wide);
+        let sides = [next_voxel * x, next_row * (high - low), next_layer * (top_layer - layer)];
+        let corner = origin + next_layer * layer + next_row * low;
         let (lo, hi) = (DVec3::from_array(lo), DVec3::from_array(hi));
         let largest = (0..3).map(|c| f64::from(grid.hi[c]) - f64::from(grid.lo[c])).fold(0.0, f64::max);
-        // The allowance exceeds the rounding errors of centres and boxes, and the distance that the tolerance adds to
-        // owners.
-        let half = (hi - lo) * 0.5 + DVec3::splat(largest / 1024.0) + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
+        // A centre is summed in single precision: no term passes through more than four roundings, each of which adds
+        // 2^-24 of it at most. A term may be much larger than the sum. The fifth part exceeds products of errors.
+        let terms = origin.abs() + next_layer.abs() * top_layer + next_row.abs() * high + next_voxel.abs() * x;
+        let rounding = terms * (5.0 / f64::from(1 << 24));
+        // The other allowance exceeds the rounding errors of boxes, and the distance that the tolerance adds to owners.
+        let more = rounding + DVec3::splat(largest / 1024.0);
+        let half = (hi - lo) * 0.5 + more + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
         let from_middle = corner - (lo + hi) * 0.5;
         let normals = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| self.half_normal(i, j));
         DVec3::AXES.into_iter().chain(normals).all(|d| {
@@ -115,23 +124,27 @@ impl VoxelGrid {
         u64::from(self.size[0]) * u64::from(self.size[1])
     }
 
-    /// Number of voxels of all layers.
+    /// Number of voxels of all layers; `u64::MAX` if there are more than that, which [`VoxelGrid::check`] refuses.
     pub fn voxels(&self) -> u64 {
-        self.layer_voxels() * u64::from(self.layers)
+        self.layer_voxels().saturating_mul(self.layers.into())
     }
 
     /// Checks that this is a stack of voxels.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if there are no voxels or too many along an axis, or if coordinates are not finite or 1e37 or
-    /// more.
+    /// [`Error::Invalid`] if there are no voxels, more than [`MOST_PER_AXIS`] along an axis, more than
+    /// [`MOST_VOXELS`] in all, or if coordinates are not finite or 1e37 or more.
     pub fn check(&self) -> Result<()> {
         let [w, h] = self.size;
-        if w == 0 || h == 0 || self.layers == 0 || w.max(h).max(self.layers) > MOST {
-            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST} along each axis", self.layers)));
+        if w == 0 || h == 0 || self.layers == 0 || w.max(h).max(self.layers) > MOST_PER_AXIS {
+            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST_PER_AXIS} along each axis", self.layers)));
+        }
+        if self.voxels() > MOST_VOXELS {
+            let text = format!("{w}×{h} voxels in {} layers, more than 2^48 in all; take fewer layers or larger voxels", self.layers);
+            return Err(Error::Invalid(text));
         }
         let last = self.centre([w - 1, h - 1, self.layers - 1]);
-        let vectors = [self.origin, self.across, self.down, self.up, last, self.half[0], self.half[1], self.half[2]];
+        let vectors = [self.origin, self.next_voxel, self.next_row, self.next_layer, last, self.half[0], self.half[1], self.half[2]];
         if vectors.iter().flatten().any(|x| !x.is_finite() || x.abs() >= 1e37) {
             return Err(Error::Invalid("voxels with coordinates that are not finite or beyond 1e37".into()));
         }
@@ -141,7 +154,7 @@ impl VoxelGrid {
     /// What the kernels and the reference need to know of these voxels over a mesh with grid `grid`. Twin of
     /// `glsl/query/slice_plan`.
     pub fn over(&self, grid: &Grid) -> SlicePlan {
-        // Twice the mesh. Larger half axes need not be scaled, which could overflow.
+        // 2·2^e, see `plan`. Larger half axes are refused as they are, since scaling them could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
         let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
         let normalise = |x: f32| {
@@ -157,9 +170,9 @@ impl VoxelGrid {
         let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
         SlicePlan {
             origin: pad(self.origin),
-            across: pad(self.across),
-            down: pad(self.down),
-            up: pad(self.up),
+            next_voxel: pad(self.next_voxel),
+            next_row: pad(self.next_row),
+            next_layer: pad(self.next_layer),
             half0: pad(normalised[0]),
             half1: pad(normalised[1]),
             half2: pad(normalised[2]),
@@ -175,14 +188,19 @@ impl VoxelGrid {
     /// As [`VoxelGrid::over`], but checks that the voxels can be sliced.
     ///
     /// # Errors
-    /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or more than twice as large as the mesh.
+    /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or too large: along each axis a box
+    /// measures at most 4·2^e, where the largest extent of the mesh lies in [2^e, 2^(e+1)).
     pub fn plan(&self, grid: &Grid) -> Result<SlicePlan> {
         self.check()?;
         let plan = self.over(grid);
         match plan.refused {
             0 => Ok(plan),
             1 => Err(Error::Invalid("voxels without volume; size and thickness must be above 0".into())),
-            _ => Err(Error::Invalid("voxels more than twice as large as the mesh; take a smaller thickness or more voxels".into())),
+            _ => Err(Error::Invalid(format!(
+                "voxels that measure more than {} along an axis, which is 2 to 4 times the size of the mesh; take a smaller thickness or \
+                 more voxels",
+                4.0 / grid.scale
+            ))),
         }
     }
 }
@@ -199,11 +217,19 @@ pub struct Rows {
 }
 
 impl Rows {
-    /// Divides the rows into parts of at most `most` rows, in a stack with layers of `height` rows.
+    /// Divides the rows into parts of at most `most` rows, in a stack with layers of `height` rows. A part has several
+    /// layers only if they are whole, and parts of a layer are multiples of [`VOXEL_RUN`] rows if that many fit: the runs
+    /// of the parts are then those of the rows.
     pub fn parts(self, most: u32, height: u32) -> impl Iterator<Item = Self> + use<> {
-        (0..self.count).step_by(most.max(1) as usize).map(move |i| {
-            let [first, layer] = self.row(i, height);
-            Self { layer, first, count: most.min(self.count - i) }
+        let unit = if most >= height { height.max(1) } else { VOXEL_RUN };
+        let step = if most > unit { most / unit * unit } else { most }.max(1);
+        let group = if most >= height { self.count } else { self.count.min(height) };
+        (0..self.count).step_by(group.max(1) as usize).flat_map(move |begin| {
+            let end = self.count.min(begin.saturating_add(group));
+            (begin..end).step_by(step as usize).map(move |i| {
+                let [first, layer] = self.row(i, height);
+                Self { layer, first, count: step.min(end - i) }
+            })
         })
     }
 
@@ -219,13 +245,13 @@ impl Rows {
     pub fn run(self, i: u32, height: u32) -> Range<u32> {
         let most = self.count.min(height).max(1);
         let (of_layer, in_layer) = (i / most.div_ceil(VOXEL_RUN) * most, i % most.div_ceil(VOXEL_RUN) * VOXEL_RUN);
-        of_layer + in_layer..self.count.min(of_layer + most.min(in_layer + VOXEL_RUN))
+        of_layer + in_layer..self.count.min(of_layer.saturating_add(most.min(in_layer + VOXEL_RUN)))
     }
 
     /// Row and layer of the `i`-th row.
     pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
-        let at = self.first + i;
-        [at % height, self.layer + at / height]
+        let (at, height) = (u64::from(self.first) + u64::from(i), u64::from(height));
+        [(at % height) as u32, self.layer + (at / height) as u32]
     }
 }
 
@@ -266,61 +292,16 @@ impl Tally {
     }
 }
 
-/// The parts in which a stack is sliced, each with as many rows as make at most `most` voxels, but at least one row. A
-/// part has several layers only if they are whole, and parts of a layer are multiples of [`VOXEL_RUN`] rows if that
-/// many fit. Then runs start at the same rows whatever `most` is, and owners are the same even where tetrahedra
-/// overlap.
+/// The parts in which a stack is sliced, each with as many rows as make at most `most` voxels, but at least one row, and
+/// divided as by [`Rows::parts`]. The first part is the largest. If [`VOXEL_RUN`] rows fit, runs start at the same rows
+/// whatever `most` is, and owners are the same even where tetrahedra overlap.
 pub fn bands(grid: &VoxelGrid, most: u64) -> impl Iterator<Item = Rows> + use<> {
-    let [w, h] = grid.size;
-    let layers = grid.layers;
-    let whole = (most / grid.layer_voxels().max(1)).min(u64::from(u32::MAX / h.max(1))).min(u64::from(layers)) as u32;
-    let fit = (most / u64::from(w.max(1))).clamp(1, u64::from(h.max(1))) as u32;
-    let rows = if fit < h && fit > VOXEL_RUN { fit / VOXEL_RUN * VOXEL_RUN } else { fit };
-    let step = whole.max(1);
-    (0..layers).step_by(step as usize).flat_map(move |layer| {
-        let of_layer = move |first| Rows { layer, first, count: if step > 1 { h * step.min(layers - layer) } else { rows.min(h - first) } };
-        (0..h).step_by(rows.max(1) as usize).map(of_layer)
-    })
+    let ([w, h], layers) = (grid.size, grid.layers);
+    let rows = (most / u64::from(w.max(1))).clamp(1, u64::from(u32::MAX)) as u32;
+    let whole = (rows / h.max(1)).clamp(1, layers.max(1));
+    let of_layers = move |layer: u32| Rows { layer, first: 0, count: h * whole.min(layers - layer) }.parts(rows, h);
+    (0..layers).step_by(whole as usize).flat_map(of_layers)
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn bands_cover_a_stack_once() {
-        for (size, layers) in [([7, 5], 11), ([1, 1], 1), ([300, 200], 3), ([1000, 1], 4)] {
-            let voxels = VoxelGrid { origin: [0.0; 3], across: [1.0; 3], down: [1.0; 3], up: [1.0; 3], half: [[1.0; 3]; 3], size, layers };
-            for most in [1, 10, 35, 40, 100, 1000, 100_000] {
-                let rows: Vec<[u32; 2]> = bands(&voxels, most).flat_map(|b| (0..b.count).map(move |i| b.row(i, size[1]))).collect();
-                let expected: Vec<[u32; 2]> = (0..layers).flat_map(|k| (0..size[1]).map(move |y| [y, k])).collect();
-                assert_eq!(rows, expected, "{size:?} {layers} {most}");
-                let largest = bands(&voxels, most).map(|b| u64::from(b.count) * u64::from(size[0])).max();
-                assert!(largest.is_some_and(|n| n <= most.max(u64::from(size[0]))));
-            }
-        }
-    }
-
-    #[test]
-    fn runs_take_every_row_once_and_are_the_same_in_all_bands() {
-        for (size, layers) in [([1, 7], 40), ([2, 64], 3), ([3, 65], 5), ([1, 200], 4), ([5, 1], 3)] {
-            let voxels = VoxelGrid { origin: [0.0; 3], across: [1.0; 3], down: [1.0; 3], up: [1.0; 3], half: [[1.0; 3]; 3], size, layers };
-            let runs = |most| -> Vec<Vec<[u32; 2]>> {
-                let of_band =
-                    |rows: Rows| (0..rows.runs(size[1])).map(move |i| rows.run(i, size[1]).map(|y| rows.row(y, size[1])).collect());
-                bands(&voxels, most).flat_map(of_band).collect()
-            };
-            let whole = runs(u64::from(u32::MAX));
-            let all: Vec<[u32; 2]> = (0..layers).flat_map(|k| (0..size[1]).map(move |y| [y, k])).collect();
-            assert_eq!(whole.concat(), all);
-            assert!(whole.iter().all(|run| !run.is_empty() && run.len() <= VOXEL_RUN as usize && run.iter().all(|at| at[1] == run[0][1])));
-            for rows in [64, 65, 127, 128, 199, 200, 399, 400, 1000] {
-                assert_eq!(runs(rows * u64::from(size[0])), whole, "{size:?}, {layers} layers, {rows} rows at a time");
-            }
-            for rows in (0..400).map(|first| Rows { layer: 0, first, count: 50 + first }) {
-                let run = |i| rows.run(i, size[1]);
-                assert!((0..rows.runs(size[1])).flat_map(run).eq(0..rows.count), "{rows:?} of {size:?}");
-            }
-        }
-    }
-}
+mod tests;

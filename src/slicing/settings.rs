@@ -1,6 +1,6 @@
 //! Converts what a user asks for (plane, place, layers, size, thickness) to a [`VoxelGrid`].
 
-use super::{MOST, VoxelGrid};
+use super::{MOST_PER_AXIS, VoxelGrid};
 use crate::error::{Error, Result};
 use glam::DVec3;
 
@@ -94,13 +94,14 @@ impl SliceSettings {
         let (wide, high) = (wide.max(largest * 1e-6), high.max(largest * 1e-6));
         let [w, h] = match self.size {
             [0, 0] => return invalid("a layer needs at least one voxel"),
-            [w, 0] => [w, (f64::from(w) * high / wide).ceil().clamp(1.0, f64::from(MOST)) as u32],
-            [0, h] => [(f64::from(h) * wide / high).ceil().clamp(1.0, f64::from(MOST)) as u32, h],
-            size => size,
+            [w, 0] => [u64::from(w), (f64::from(w) * high / wide).ceil() as u64],
+            [0, h] => [(f64::from(h) * wide / high).ceil() as u64, u64::from(h)],
+            size => size.map(u64::from),
         };
-        if w > MOST || h > MOST || self.layers == 0 || self.layers > MOST {
-            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST} along each axis", self.layers)));
+        if self.layers == 0 || w.max(h).max(self.layers.into()) > u64::from(MOST_PER_AXIS) {
+            return Err(Error::Invalid(format!("{w}×{h} voxels in {} layers; 1 to {MOST_PER_AXIS} along each axis", self.layers)));
         }
+        let [w, h] = [w, h].map(|n| n as u32);
         let (du, dv) = if self.size.contains(&0) {
             let side = if self.size[1] == 0 { wide / f64::from(w) } else { high / f64::from(h) };
             (side, side)
@@ -127,9 +128,9 @@ impl SliceSettings {
         let single = |d: DVec3| d.as_vec3().to_array();
         Ok(VoxelGrid {
             origin: single(corner),
-            across: single(u * du),
-            down: single(v * dv),
-            up: single(n * spacing),
+            next_voxel: single(u * du),
+            next_row: single(v * dv),
+            next_layer: single(n * spacing),
             half: [single(u * (0.5 * du)), single(v * (0.5 * dv)), single(n * (0.5 * thickness))],
             size: [w, h],
             layers: self.layers,
@@ -147,7 +148,7 @@ impl SliceSettings {
         let mut cubes = Self { size: [self.size[0], 0], plane, ..*self };
         let flat = cubes.voxels(lo, hi, origin)?;
         let length = |v: [f32; 3]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt();
-        let side = length(flat.across);
+        let side = length(flat.next_voxel);
         let differs = |given: Option<f64>| given.is_some_and(|t| (t - side).abs() > 1e-3 * side);
         if differs(self.thickness) || differs(self.spacing) || self.size[1] != 0 {
             let text = format!("voxels of this package are cubes, here of {side}; leave thickness, spacing and the height out");
@@ -157,7 +158,7 @@ impl SliceSettings {
         if fill {
             let unit = DVec3::from_array(flat.half[2].map(f64::from)).normalize_or_zero().abs();
             let deep = (0..3).map(|c| (f64::from(hi[c]) - f64::from(lo[c])) * unit[c]).sum::<f64>();
-            cubes.layers = (deep / side - 1e-6).ceil().clamp(1.0, f64::from(MOST)) as u32;
+            cubes.layers = (deep / side - 1e-6).ceil().max(1.0) as u32;
         }
         Ok(cubes)
     }
@@ -180,8 +181,8 @@ mod tests {
         for plane in [Plane::Axis(0), Plane::Axis(1), Plane::Axis(2), Plane::Normal([1.0, -2.0, 0.5]), Plane::Normal([0.0, -1.0, 0.0])] {
             let cubes = SliceSettings { plane, size: [16, 0], ..SliceSettings::default() }.cubes(BOX.0, BOX.1, BOX.2, true).unwrap();
             let grid = voxels(cubes).unwrap();
-            let [across, down, up] = [grid.across, grid.down, grid.up].map(wide);
-            assert!(across.cross(down).dot(up) > 0.99 * across.length().powi(3), "{plane:?}");
+            let [x, y, z] = [grid.next_voxel, grid.next_row, grid.next_layer].map(wide);
+            assert!(x.cross(y).dot(z) > 0.99 * x.length().powi(3), "{plane:?}");
         }
     }
 
@@ -189,9 +190,25 @@ mod tests {
     fn layers_may_go_downwards() {
         let settings = SliceSettings { layers: 3, at: Some(1.0), spacing: Some(-0.5), ..SliceSettings::default() };
         let grid = voxels(settings).unwrap();
-        assert_eq!((grid.up, grid.half[2]), ([0.0, 0.0, -0.5], [0.0, 0.0, 0.25]));
+        assert_eq!((grid.next_layer, grid.half[2]), ([0.0, 0.0, -0.5], [0.0, 0.0, 0.25]));
         // Layers at the same place, each as thick as a voxel is wide.
         let grid = voxels(SliceSettings { spacing: Some(0.0), size: [8, 0], ..settings }).unwrap();
-        assert_eq!((grid.up[2], grid.half[2]), (0.0, [0.0, 0.0, 0.25]));
+        assert_eq!((grid.next_layer[2], grid.half[2]), (0.0, [0.0, 0.0, 0.25]));
+    }
+
+    /// A layer that would be cropped at the most voxels along an axis is refused instead.
+    #[test]
+    fn layers_cover_the_mesh_or_are_refused() {
+        let settings = |size| SliceSettings { size, ..SliceSettings::default() };
+        let of = |size, hi| settings(size).voxels([0.0; 3], hi, [0.0; 3]);
+        assert_eq!(of([16_384, 0], [1.0, 1024.0, 1.0]).unwrap().size, [16_384, MOST_PER_AXIS]);
+        assert_eq!(of([0, 16_384], [1024.0, 1.0, 1.0]).unwrap().size, [MOST_PER_AXIS, 16_384]);
+        for (size, hi) in [([16_385, 0], [1.0, 1024.0, 1.0]), ([0, 16_385], [1024.0, 1.0, 1.0]), ([1 << 24, 0], [1.0, 1e6, 1.0])] {
+            let error = of(size, hi).unwrap_err().to_string();
+            assert!(error.contains("1 to 16777216 along each axis"), "{error}");
+        }
+        let filled = |width, hi| settings([width, 0]).cubes([0.0; 3], hi, [0.0; 3], true)?.voxels([0.0; 3], hi, [0.0; 3]);
+        assert_eq!(filled(16_384, [1.0, 1.0, 1024.0]).unwrap().layers, MOST_PER_AXIS);
+        assert!(filled(16_385, [1.0, 1.0, 1024.0]).is_err());
     }
 }

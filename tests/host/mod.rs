@@ -8,7 +8,9 @@ pub mod live;
 pub mod queries;
 
 use ash::vk;
-use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+use olbvh::build::{
+    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
+};
 use olbvh::gpu::{Buffer, Enabled, Gpu, HostDevice, RayTracing, Recorder, Requirements};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
@@ -194,6 +196,16 @@ impl Frame {
 
     pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         cmd_prepare_mesh(r, &self.input, &self.arrays, &self.mesh_scratch)?;
+        self.record_tree(r)
+    }
+
+    /// For points that have moved since a frame was recorded into this memory.
+    pub fn record_moved(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+        cmd_move_mesh(r, &self.input, &self.arrays, &self.mesh_scratch)?;
+        self.record_tree(r)
+    }
+
+    fn record_tree(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
         r.barrier("frame.mesh → frame.tree");
         let mesh = MeshView { input: self.input, arrays: self.arrays };
         cmd_build(r, &mesh, &self.tree, &BuildOptions::default(), &self.build_scratch)?;

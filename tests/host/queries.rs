@@ -53,9 +53,9 @@ impl Queries {
         let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
         let voxels = VoxelGrid {
             origin: [-1.0; 3],
-            across: axis(0, 0.3),
-            down: axis(1, 0.3),
-            up: axis(2, 0.8),
+            next_voxel: axis(0, 0.3),
+            next_row: axis(1, 0.3),
+            next_layer: axis(2, 0.8),
             half: [axis(0, 0.15), axis(1, 0.15), axis(2, 0.4)],
             size: [37, 29],
             layers: 9,

@@ -87,7 +87,7 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
         let [all, tree] = both(&mesh, &topology, alpha, assign);
         let (all, walking) = (Locator::new(&mesh, &topology, &all), Locator::new(&mesh, &topology, &tree));
         let some = &points[..if alpha > 1.0 { n / 10 } else { n }];
-        let expected = all.locate_all(some);
+        let expected = all.locate_each(some);
         for order in [order_of(&topology.grid, some), (0..some.len() as u32).rev().collect()] {
             assert!(
                 all.locate_in_runs(some, &order) == expected && walking.locate_in_runs(some, &order) == expected,

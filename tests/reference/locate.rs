@@ -82,7 +82,7 @@ fn no_point_of_a_mesh_is_lost() {
         for assign in Assign::EVERY {
             let tree = tree(&mesh, &topology, alpha, assign);
             let some: Vec<[f32; 3]> = points.iter().copied().step_by(part).collect();
-            let found = Locator::new(&mesh, &topology, &tree).locate_all(&some);
+            let found = Locator::new(&mesh, &topology, &tree).locate_each(&some);
             for (p, location) in some.iter().zip(&found) {
                 assert_ne!(location.owner, NONE, "α {alpha} {assign}: {p:?} is lost");
             }

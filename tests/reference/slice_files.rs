@@ -38,10 +38,10 @@ fn gaps(voxels: &VoxelGrid, tets: &[[P; 4]], slack: f64) -> Vec<f64> {
     let extent = [0, 1, 2].map(|c| half.iter().map(|h| h[c].abs()).sum::<f64>());
     // A voxel outside of the box of a tetrahedron by more than the allowance of a touch is apart from it.
     let meets = |lo: P, hi: P, centre: P| (0..3).all(|c| lo[c] - extent[c] - slack <= centre[c] && centre[c] <= hi[c] + extent[c] + slack);
-    let normal = |layers: u32| if layers > 1 { voxels.up } else { voxels.half[2] };
+    let normal = |layers: u32| if layers > 1 { voxels.next_layer } else { voxels.half[2] };
     let near = |v: &[P; 4]| {
         let along = |step: [f32; 3], k: usize, n: u32| reached(v, origin, wide(step), half[k], n, slack);
-        let (xs, ys) = (along(voxels.across, 0, w), along(voxels.down, 1, h));
+        let (xs, ys) = (along(voxels.next_voxel, 0, w), along(voxels.next_row, 1, h));
         let layers = along(normal(voxels.layers), 2, voxels.layers);
         let [lo, hi] = [f64::min, f64::max].map(|pick| [0, 1, 2].map(|c| v.iter().map(|p| p[c]).fold(v[0][c], pick)));
         let mut found = Vec::new();

@@ -1,7 +1,7 @@
 //! The body: a mesh that wgpu moves, the arrays of olbvh for it, and the pixels of a cut through it.
 
 use anyhow::{Context, Result};
-use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
+use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh};
 use olbvh::gpu::{Buffer, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::BuildOptions;
@@ -89,12 +89,13 @@ impl Body {
     }
 
     /// Records the work of olbvh in a frame. It reads the positions and writes owners and values, all in compute
-    /// shaders.
-    pub fn record(&self, r: &mut Recorder<'_>) -> olbvh::Result<()> {
+    /// shaders. Which tetrahedra are neighbours is found out in the first frame only.
+    pub fn record(&self, r: &mut Recorder<'_>, first: bool) -> olbvh::Result<()> {
         let Self { scene, input, output, .. } = self;
         // The frame before used the same memory.
         r.barrier("frame.before → frame.mesh");
-        cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
+        let prepare = if first { cmd_prepare_mesh } else { cmd_move_mesh };
+        prepare(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
         r.barrier("frame.mesh → frame.tree");
         cmd_build(r, &scene.mesh, &scene.tree, &self.options, &self.build_scratch)?;
         cmd_locate(r, scene, input, output, &LocateOptions::default())?;

@@ -110,9 +110,10 @@ fn draw(host: &Device, gpu: &Gpu, mesh: &Mesh, frames: u32, out: &str) -> Result
     let bytes = u64::from(4 * SIZE[0] * SIZE[1]);
     let readback = device.create_buffer(&wgpu::BufferDescriptor { label: Some("readback"), size: bytes, usage, mapped_at_creation: false });
 
-    // The recording of a frame is rehearsed once, so that nothing is created later.
+    // The recording of the first and of later frames is rehearsed, so that nothing is created later.
     let mut rehearsal = Recorder::rehearse(gpu);
-    body.record(&mut rehearsal)?;
+    body.record(&mut rehearsal, true)?;
+    body.record(&mut rehearsal, false)?;
     rehearsal.finish()?;
     let mut pools = DescriptorPools::new(gpu);
     pools.reserve(rehearsal.descriptor_room())?;
@@ -144,7 +145,7 @@ fn draw(host: &Device, gpu: &Gpu, mesh: &Mesh, frames: u32, out: &str) -> Result
             ours.as_hal_mut::<Vulkan, _, Result<()>>(|encoder| {
                 let commands = encoder.context("no command buffer of Vulkan's")?.raw_handle();
                 let mut recorder = Recorder::new(gpu, commands, None).with_pools(&mut pools)?;
-                body.record(&mut recorder)?;
+                body.record(&mut recorder, frame == 0)?;
                 Ok(recorder.finish()?)
             })
         }?;

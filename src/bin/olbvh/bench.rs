@@ -30,7 +30,8 @@ write, at the minimum, divided by its time.
 allow. It also lists what only one of the files has, and every difference in device, driver, target, program and settings.")]
 pub struct Args {
     /// Mesh files or procedural meshes to measure instead of those of the suite.
-    mesh: Vec<PathBuf>,
+    #[arg(value_name = "MESH")]
+    meshes: Vec<PathBuf>,
     /// Selection of meshes and query sizes.
     #[arg(long, default_value = "quick", value_name = "quick|paper|full|scaling")]
     suite: Suite,
@@ -54,7 +55,7 @@ pub struct Args {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     seconds: Option<f64>,
     /// Compare two .json result files instead of measuring.
-    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["mesh", "suite", "points", "pixels", "repeat", "seconds", "merge"])]
+    #[arg(long, num_args = 2, value_names = ["A", "B"], conflicts_with_all = ["meshes", "suite", "points", "pixels", "repeat", "seconds", "merge"])]
     compare: Option<Vec<PathBuf>>,
     #[command(flatten)]
     read: input::ReadArgs,
@@ -71,7 +72,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     if let Some([a, b]) = args.compare.as_deref() {
         return run_compare([a, b], args.output.as_deref(), common);
     }
-    let target = args.output.as_deref().map(target).transpose()?;
+    let target = args.output.as_deref().map(|path| target(path, &args.meshes)).transpose()?;
     let mut settings = Settings::of(args.suite);
     settings.points = args.points.unwrap_or(settings.points);
     if let Some(pixels) = args.pixels {
@@ -88,13 +89,17 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut report = Report::new(&gpu, args.suite, settings, commit())?;
     let named =
         |(role, mesh): (&str, &str)| (if role.is_empty() { mesh.to_owned() } else { format!("{role} {mesh}") }, PathBuf::from(mesh));
-    let meshes: Vec<(String, PathBuf)> = if args.mesh.is_empty() {
+    let meshes: Vec<(String, PathBuf)> = if args.meshes.is_empty() {
         args.suite.meshes().into_iter().map(named).collect()
     } else {
-        args.mesh.iter().map(|path| (path.display().to_string(), path.clone())).collect()
+        args.meshes.iter().map(|path| (path.display().to_string(), path.clone())).collect()
     };
     for (name, path) in meshes {
         let mesh = args.read.mesh(&path, common)?.mesh;
+        if let (Some(folder), Some(Target::Folder)) = (&args.output, &target) {
+            // Only now, so that wrong arguments leave no folder.
+            std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+        }
         let measured = measure(&gpu, &name, &mesh, &report, &|line| common.remark(line))?;
         report.push(measured);
         // Results are written after every mesh, so that a long run that is stopped leaves those it has.
@@ -118,13 +123,13 @@ fn run_compare([a, b]: [&Path; 2], out: Option<&Path>, common: &Common) -> Outco
     output::summary(common, &json, &comparison.text())
 }
 
-/// Determines the kind of output and announces it, before long work.
-fn target(path: &Path) -> Outcome<Target> {
-    if path.extension().is_some() {
-        return output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &[]).map(Target::File);
+/// Determines the kind of output. A file is announced; a folder that exists may have any name.
+fn target(path: &Path, meshes: &[PathBuf]) -> Outcome<Target> {
+    if path.is_dir() || path.extension().is_none() && !path.exists() {
+        return Ok(Target::Folder);
     }
-    std::fs::create_dir_all(path).map_err(|source| Error::Io { path: path.into(), source })?;
-    Ok(Target::Folder)
+    let inputs: Vec<&Path> = meshes.iter().map(PathBuf::as_path).collect();
+    output::announce(path, &[OutputFormat::Json, OutputFormat::Md], &inputs).map(Target::File)
 }
 
 fn write(path: &Path, target: &Target, report: &Report) -> Outcome {

@@ -134,15 +134,24 @@ impl Failure {
 
     /// Prints the reason on standard error and returns the exit code.
     pub fn report(self) -> ExitCode {
-        let (code, message) = match self {
+        let code = match &self {
             Self::Closed => return ExitCode::SUCCESS,
-            Self::Failed(message) => (1, message),
-            Self::Usage(message) => (2, message),
-            Self::Input(message) => (3, message),
-            Self::Device(message) => (4, message),
+            Self::Failed(_) => 1,
+            Self::Usage(_) => 2,
+            Self::Input(_) => 3,
+            Self::Device(_) => 4,
         };
-        output_line(&format!("olbvh: error: {message}"));
+        output_line(&format!("olbvh: error: {self}"));
         ExitCode::from(code)
+    }
+}
+
+impl std::fmt::Display for Failure {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Failed(message) | Self::Usage(message) | Self::Input(message) | Self::Device(message) => f.write_str(message),
+            Self::Closed => f.write_str("standard output was closed"),
+        }
     }
 }
 

@@ -4,6 +4,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::output::{self, Progress};
 use crate::{engine, input};
 use olbvh::conformance::{Case, Lab, Outcome as Ending, Report, cases, cases_of};
+use olbvh::formats::xml_attribute;
 use olbvh::gpu::{Binding, GpuOptions};
 use serde_json::{Value, json};
 use std::fmt::Write as _;
@@ -27,6 +28,7 @@ Exit codes: 0 all passed, 1 a case failed, 2 wrong usage, 3 bad mesh file, 4 no 
 pub struct Args {
     /// Mesh files or procedural meshes (kuhn:NX,NY,NZ) to use instead of the built-in ones. The reference
     /// implementation is slow on large meshes.
+    #[arg(value_name = "MESH")]
     meshes: Vec<PathBuf>,
     /// List the cases, without --filter all of them, and run none.
     #[arg(long)]
@@ -38,8 +40,8 @@ pub struct Args {
     /// How kernels receive their buffers. Default: both ways, if the device supports them.
     #[arg(long, value_enum, default_value_t = Bindings::Both)]
     binding: Bindings,
-    /// Also write a `JUnit` report (XML) to this file.
-    #[arg(long, value_name = "FILE")]
+    /// Also write a `JUnit` report to this .xml file.
+    #[arg(long, value_name = "FILE.xml")]
     junit: Option<PathBuf>,
     #[command(flatten)]
     read: input::ReadArgs,
@@ -65,6 +67,13 @@ fn name(binding: Binding) -> &'static str {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
+    if let Some(file) = &args.junit {
+        let inputs: Vec<&Path> = args.meshes.iter().map(PathBuf::as_path).collect();
+        output::announce_file(file, &inputs)?;
+        if !file.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("xml")) {
+            return Err(Failure::Usage(format!("{}: a JUnit report is an .xml file; name it so", file.display())));
+        }
+    }
     let all = if args.meshes.is_empty() { cases() } else { cases_of_meshes(args, common)? };
     // A list without filter names all cases, so that one sees what can be run.
     let filter = args.filter.as_deref().or(args.list.then_some(""));
@@ -80,9 +89,6 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     if common.means_cpu() {
         return Err(Failure::Usage("--device cpu: the cases compare a Vulkan device with the CPU; name a Vulkan device".into()));
-    }
-    if let Some(file) = &args.junit {
-        output::announce_file(file, &[])?;
     }
     let (device, runs) = run_cases(args, common, &chosen)?;
     finish(args, common, &device, &runs)
@@ -200,21 +206,17 @@ fn entry((binding, report): &(Binding, Report)) -> Value {
 
 /// Writes the `JUnit` report, which CI systems read.
 fn write_junit(file: &Path, runs: &[(Binding, Report)]) -> Outcome {
-    // XML allows no control characters.
-    let escape = |text: &str| {
-        text.replace(char::is_control, " ").replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;").replace('"', "&quot;")
-    };
     let failures = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Failed(_))).count();
     let skipped = runs.iter().filter(|r| matches!(r.1.outcome, Ending::Skipped(_))).count();
     let mut text = String::from("<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n");
     let _ = writeln!(text, "<testsuite name=\"olbvh conformance\" tests=\"{}\" failures=\"{failures}\" skipped=\"{skipped}\">", runs.len());
     for (binding, report) in runs {
-        let (case, seconds) = (escape(&report.name), report.time.as_secs_f64());
+        let (case, seconds) = (xml_attribute(&report.name), report.time.as_secs_f64());
         let _ = write!(text, "  <testcase classname=\"{}\" name=\"{case}\" time=\"{seconds:.3}\"", name(*binding));
         let _ = match &report.outcome {
             Ending::Passed => writeln!(text, "/>"),
-            Ending::Failed(f) => writeln!(text, "><failure message=\"{}\"/></testcase>", escape(&f.to_string())),
-            Ending::Skipped(why) => writeln!(text, "><skipped message=\"{}\"/></testcase>", escape(why)),
+            Ending::Failed(f) => writeln!(text, "><failure message=\"{}\"/></testcase>", xml_attribute(&f.to_string())),
+            Ending::Skipped(why) => writeln!(text, "><skipped message=\"{}\"/></testcase>", xml_attribute(why)),
         };
     }
     text.push_str("</testsuite>\n");

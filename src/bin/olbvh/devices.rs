@@ -21,6 +21,7 @@ pub fn run(_: &Args, common: &Common) -> Outcome {
     if common.device.is_some() {
         common.remark("--device has no effect here; these are all devices");
     }
+    Shapes::check(common)?;
     let devices = match list_devices() {
         Ok(devices) => devices,
         // A missing Vulkan loader is not a failure here: the list is empty, and the reason is printed.
@@ -43,12 +44,13 @@ struct Listed<'a> {
     device: &'a DeviceReport,
     /// Why it cannot be used.
     fault: Option<String>,
-    target: Option<Shapes>,
+    /// The target that kernels would have, or why the one that was asked for does not suit this device.
+    target: Outcome<Shapes>,
 }
 
 impl<'a> Listed<'a> {
     fn new(common: &Common, index: usize, device: &'a DeviceReport) -> Self {
-        Self { index, device, fault: fault_of(index, device), target: Shapes::of(common, device).ok() }
+        Self { index, device, fault: fault_of(index, device), target: Shapes::of(common, device) }
     }
 
     fn text(&self, verbose: bool) -> String {
@@ -65,15 +67,17 @@ impl<'a> Listed<'a> {
             None => writeln!(lines, "     qualifies"),
             Some(fault) => writeln!(lines, "     cannot be used; {fault}"),
         };
-        if let Some(shapes) = self.target.as_ref().filter(|_| verbose) {
-            let _ = writeln!(lines, "     kernels {shapes}");
-        }
+        let _ = match &self.target {
+            Ok(shapes) if verbose => writeln!(lines, "     kernels {shapes}"),
+            Ok(_) => Ok(()),
+            Err(failure) => writeln!(lines, "     {failure}"),
+        };
         lines
     }
 
     fn json(&self) -> Value {
         let d = self.device;
-        let target = self.target.as_ref().map(|shapes| {
+        let target = self.target.as_ref().ok().map(|shapes| {
             let profile =
                 if let Origin::Profile(path) | Origin::File(path) = &shapes.origin { Some(path.display().to_string()) } else { None };
             json!({ "name": shapes.target.name, "profile": profile })
@@ -82,6 +86,7 @@ impl<'a> Listed<'a> {
             "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind,
             "memory_bytes": d.memory, "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
             "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines, "target": target,
+            "target_fault": self.target.as_ref().err().map(Failure::to_string),
         })
     }
 }

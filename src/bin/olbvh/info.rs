@@ -4,8 +4,8 @@ use crate::common::{Common, Outcome};
 use crate::engine::{self, Engine, Shapes, Summary};
 use crate::input::TreeArgs;
 use crate::output;
-use crate::text::{Page, bytes, grouped, joined, milliseconds};
-use olbvh::formats::{Fate, Loaded};
+use crate::text::{Page, bytes, grouped, joined, milliseconds, single};
+use olbvh::formats::{Fate, Loaded, printable};
 use olbvh::grid::MAX_LEVEL;
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Fineness, Lists};
@@ -43,12 +43,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let summary = engine.summary(&loaded.mesh, &options)?;
     let json = json(args, engine.as_ref(), &loaded, &summary);
-    output::result(common, &json, &page(args, (&engine.name(), engine.target()), &loaded, &summary, common.verbose).to_string())
+    output::result(common, &json, &page(args, engine.as_ref(), &loaded, &summary, common.verbose).to_string())
 }
 
 /// Lower and upper corner in the coordinates of the source.
 fn bounds(mesh: &Mesh, summary: &Summary) -> [[f64; 3]; 2] {
-    [summary.bounds.lo, summary.bounds.hi].map(|corner| [0, 1, 2].map(|c| mesh.origin[c] + f64::from(corner[c])))
+    [summary.bounds.lo, summary.bounds.hi].map(|corner| [0, 1, 2].map(|c| mesh.origin[c] + single(corner[c])))
 }
 
 fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value {
@@ -56,7 +56,8 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
     let [lo, hi] = bounds(mesh, s);
     let field = |f: &Field| {
         let on = if f.on == On::Points { "points" } else { "cells" };
-        json!({ "name": f.name, "on": on, "min": f.range().map(|r| r[0]), "max": f.range().map(|r| r[1]) })
+        let [min, max] = [0, 1].map(|end| f.range().map(|range| single(range[end])));
+        json!({ "name": f.name, "on": on, "min": min, "max": max })
     };
     let mut arrays: serde_json::Map<String, Value> = s.memory.arrays().into_iter().map(|(name, n)| (name.to_owned(), n.into())).collect();
     arrays.insert("total".into(), s.memory.total().into());
@@ -82,7 +83,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "topology_ms": s.topology_ms,
         "neighbour_bytes": s.neighbour_bytes,
         "tree": {
-            "l": s.level, "l_wanted": s.wanted, "alpha": tree.level.is_none().then_some(tree.alpha), "level": tree.level,
+            "l": s.level, "l_wanted": s.wanted, "alpha": tree.level.is_none().then_some(single(tree.alpha)), "level": tree.level,
             "assign": tree.assign.name(), "lists": tree.lists.name(), "budget": tree.budget,
             "entries": s.entries, "nodes": s.nodes, "leaves": s.leaves, "bytes": arrays, "paper_bytes": s.paper_bytes, "build_ms": s.build_ms,
             "stages_ms": s.stages.iter().map(|(name, ms)| (name.clone(), json!(ms))).collect::<serde_json::Map<_, _>>(),
@@ -95,14 +96,14 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
     all
 }
 
-fn page(args: &Args, (device, shapes): (&str, Option<&Shapes>), loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
+fn page(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
     let mut page = Page::default();
     add_mesh(&mut page, args, loaded, s);
     add_fields(&mut page, &loaded.mesh);
-    add_tree(&mut page, args, device, s);
+    add_tree(&mut page, args, &engine.name(), s);
     add_memory(&mut page, s);
     if verbose {
-        add_stages(&mut page, shapes, s);
+        add_stages(&mut page, engine.target(), s);
     }
     if args.bad_cells && !s.bad.is_empty() {
         add_bad_cells(&mut page, &loaded.mesh, s);
@@ -146,7 +147,7 @@ fn add_fields(page: &mut Page, mesh: &Mesh) {
     page.section(if mesh.fields.is_empty() { "No fields" } else { "Fields" });
     for f in &mesh.fields {
         let range = f.range().map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
-        page.row(&f.name, format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
+        page.row(printable(&f.name), format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
     }
 }
 

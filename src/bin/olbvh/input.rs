@@ -2,8 +2,9 @@
 
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
+use crate::text::counted;
 use olbvh::error::Error;
-use olbvh::formats::{LoadOptions, Loaded, Merge, load};
+use olbvh::formats::{LoadOptions, Loaded, Merge, load, printable};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::render::TransferFunction;
@@ -145,6 +146,15 @@ fn refused(path: &Path, error: Error) -> Failure {
     }
 }
 
+/// Remarks on the bad cells of a mesh, if there are any, since answers leave them out.
+pub fn remark_on_bad_cells(path: &Path, bad: u32, common: &Common) {
+    if bad > 0 {
+        let (are, them) = if bad == 1 { ("is", "it") } else { ("are", "them") };
+        let cells = counted(bad.into(), "bad cell");
+        common.remark(format_args!("{}: {cells} {are} left out (`olbvh info --bad-cells` lists {them})", path.display()));
+    }
+}
+
 /// The field with this name; without a name, the first field of points, or else the first field of cells.
 pub fn field<'a>(mesh: &'a Mesh, name: Option<&str>) -> Outcome<Option<&'a Field>> {
     let Some(name) = name else {
@@ -165,9 +175,9 @@ pub fn transfer(name: &str) -> Outcome<TransferFunction> {
     })
 }
 
-/// The names of a mesh's fields as part of a sentence.
+/// The names of a mesh's fields as part of a sentence, without characters that would change the terminal.
 pub fn fields(mesh: &Mesh) -> String {
-    let list = |on: On| mesh.fields.iter().filter(|f| f.on == on).map(|f| f.name.as_str()).collect::<Vec<_>>().join(", ");
+    let list = |on: On| mesh.fields.iter().filter(|f| f.on == on).map(|f| printable(&f.name)).collect::<Vec<_>>().join(", ");
     match (list(On::Points), list(On::Cells)) {
         (points, cells) if points.is_empty() && cells.is_empty() => "the mesh has no fields".into(),
         (points, cells) if cells.is_empty() => format!("the mesh has {points}"),

@@ -4,7 +4,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
-use crate::text::{counted, grouped, in_blocks, milliseconds};
+use crate::text::{counted, grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
 use olbvh::mesh::Mesh;
@@ -109,12 +109,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     };
     drop(progress);
     let took = done.took;
+    input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     seconds -= took.build_seconds;
     let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
     let json = json!({
         "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": seconds,
-        "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": args.tolerance,
-        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "device": engine.name(),
+        "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": single(args.tolerance),
+        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
+        "device": engine.name(),
     });
     // With few points, most of the time passes before the first one, so no rate is printed.
     let rate = if points.len() < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };

@@ -3,16 +3,18 @@
 use crate::arguments::vector;
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
-use crate::input::{MemoryArgs, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
-use olbvh::blocks::Meshes;
-use olbvh::error::Error;
+use olbvh::blocks::{InBlocks, Meshes};
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
-use serde_json::json;
+use olbvh::reference::boundary::{is_usable, valid_grid};
+use olbvh::reference::overlap::{Effort, Overlap};
+use olbvh::render::Bounds;
+use serde_json::{Value, json};
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -57,15 +59,7 @@ pub struct Args {
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Json, OutputFormat::Vtu], &[&args.a, &args.b], common)?;
-    let format = output.format;
-    if args.pairs && format != OutputFormat::Json {
-        return Err(Failure::Usage(format!("{}: --pairs needs a .json file; a .vtu file holds no pairs", args.output.display())));
-    }
-    let mut options = args.tree.suited(Fineness::Points)?;
-    if args.pairs {
-        // Pairs are found through lists; only lists by bounding box find each pair once.
-        options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, fineness: Fineness::Alpha, ..options };
-    }
+    let options = args.options(output.format)?;
     let engine = engine::open(common)?;
     let a = args.tree.mesh(&args.a, common)?.mesh;
     let mut b = args.tree.mesh(&args.b, common)?.mesh;
@@ -76,74 +70,142 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
-    let cells = |mesh: &Mesh, tets: &[u32]| {
-        let mut ids: Vec<u32> = tets.iter().map(|&t| mesh.cell_id(t)).collect();
-        ids.sort_unstable();
-        ids.dedup();
-        ids
-    };
-    let (ids_a, ids_b) = (cells(&a, &overlap.a), cells(&b, &overlap.b));
-    let pairs = overlap.pairs.as_ref().map(|pairs| {
-        let mut pairs: Vec<[u32; 2]> = pairs.iter().map(|p| [a.cell_id(p[0]), b.cell_id(p[1])]).collect();
-        pairs.sort_unstable();
-        pairs.dedup();
-        pairs
-    });
-    let narrow: u64 = overlap.effort.iter().map(|e| e.narrow).sum();
-    let primitives = (a.tets.len() + b.tets.len()) as u64;
-    let share = narrow as f64 / primitives.max(1) as f64;
-    if format == OutputFormat::Vtu {
-        write_mesh(output.path(), &part(&a, &overlap.a))?;
-    } else {
-        let mut result = json!({ "a": ids_a, "b": ids_b });
-        if let Some(pairs) = &pairs {
-            result["pairs"] = json!(pairs);
-        }
-        write_json(output.path(), &result)?;
+    for (path, bad) in [&args.a, &args.b].into_iter().zip(took.bad_cells) {
+        input::remark_on_bad_cells(path, bad, common);
     }
-    let effort = |e: &olbvh::reference::overlap::Effort| json!({ "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located, "narrow_tests": e.narrow });
-    let json = json!({
-        "file": args.output.display().to_string(), "a": ids_a.len(), "b": ids_b.len(), "pairs": pairs.as_ref().map(Vec::len),
-        "narrow_tests": narrow, "narrow_share": share, "seconds": seconds, "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak,
-        "a_effort": effort(&overlap.effort[0]), "b_effort": effort(&overlap.effort[1]), "device": engine.name(),
-    });
-    let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
-    let text = format!(
-        "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {:.2} per cell; {} trees {}, overlap {} on {}\n",
-        args.output.display(),
-        grouped(ids_a.len() as u64),
-        grouped(ids_b.len() as u64),
-        grouped(narrow),
-        share,
-        took.trees,
-        milliseconds(took.build_seconds * 1e3),
-        milliseconds(seconds * 1e3),
-        engine.name()
-    );
-    output.finish(common, &json, &text)
+    let cells = Cells::of(&overlap, [&a, &b]);
+    match output.format {
+        OutputFormat::Vtu => write_mesh(output.path(), &part(&a, &overlap.a))?,
+        _ => write_json(output.path(), &cells.json())?,
+    }
+    let tets = (a.tets.len() + b.tets.len()) as u64;
+    Done { cells, effort: overlap.effort, tets, took, seconds, device: engine.name() }.report(args, output, common)
+}
+
+impl Args {
+    /// The checked options of both trees.
+    fn options(&self, format: OutputFormat) -> Outcome<BuildOptions> {
+        let options = self.tree.suited(Fineness::Points)?;
+        if !self.pairs {
+            return Ok(options);
+        }
+        if format != OutputFormat::Json {
+            return Err(Failure::Usage(format!("{}: --pairs needs a .json file; a .vtu file holds no pairs", self.output.display())));
+        }
+        // Pairs are found through lists; only lists by bounding box find each pair once.
+        Ok(BuildOptions { lists: Lists::All, assign: Assign::Aabb, fineness: Fineness::Alpha, ..options })
+    }
+
+    /// The failure of a B with coordinates that are too large in those of A.
+    fn too_far(&self) -> Failure {
+        let (to, by) = match (self.move_b, self.rotate_b) {
+            (Some(_), _) => ("--move-b", "move it less far"),
+            (None, Some(_)) => ("--rotate-b", "rotate it less"),
+            (None, None) => ("B", "bring the meshes nearer to each other"),
+        };
+        Failure::Usage(format!("{to}: coordinates of B, relative to A, would be 2^125 (4.3e37) or more, too large to compute with; {by}"))
+    }
 }
 
 /// Transforms the points of B into the coordinates of A: rotated, moved, and relative to A's origin.
 fn pose(b: &mut Mesh, a: &Mesh, args: &Args) -> Outcome {
-    let finite = |p: &&[f32; 3]| p.iter().all(|x| x.is_finite());
-    let wide = |p: &[f32; 3]| DVec3::from_array(p.map(f64::from));
-    let ends = b.points.iter().filter(finite).map(wide).fold((DVec3::MAX, DVec3::MIN), |(lo, hi), p| (lo.min(p), hi.max(p)));
-    let centre = if ends.0.x <= ends.1.x { ends.0.midpoint(ends.1) } else { DVec3::ZERO };
-    let turn = match args.rotate_b {
-        Some((axis, degrees)) => DQuat::from_axis_angle(axis.normalize(), degrees.to_radians()),
-        None => DQuat::IDENTITY,
-    };
+    let wide = |p: [f32; 3]| DVec3::from_array(p.map(f64::from));
     let shift = DVec3::from_array(args.move_b.unwrap_or_default()) + DVec3::from_array(b.origin) - DVec3::from_array(a.origin);
     if args.rotate_b.is_none() && shift == DVec3::ZERO {
         return Ok(());
     }
+    let Bounds { lo, hi } = Bounds::from(&valid_grid(b));
+    let centre = wide(lo).midpoint(wide(hi));
+    let turn = args.rotate_b.map(|(axis, degrees)| DQuat::from_axis_angle(axis.normalize(), degrees.to_radians()));
     for p in &mut b.points {
-        let at = wide(p) - centre;
-        let turned = if args.rotate_b.is_some() { turn * at } else { at };
-        *p = (turned + centre + shift).as_vec3().to_array();
+        let turned = turn.map_or(wide(*p), |turn| turn * (wide(*p) - centre) + centre);
+        let posed = (turned + shift).as_vec3().to_array();
+        // Outside the bounds are only points that no valid cell has.
+        if (0..3).all(|c| (lo[c]..=hi[c]).contains(&p[c])) && !is_usable(posed) {
+            return Err(args.too_far());
+        }
+        *p = posed;
     }
     b.origin = a.origin;
-    if shift.is_finite() { Ok(()) } else { Err(Error::Invalid("--move-b: coordinates of B become infinite".into()).into()) }
+    Ok(())
+}
+
+/// The cells that were found, by their ids in the files, ascending.
+struct Cells {
+    a: Vec<u32>,
+    b: Vec<u32>,
+    pairs: Option<Vec<[u32; 2]>>,
+}
+
+impl Cells {
+    fn of(overlap: &Overlap, [a, b]: [&Mesh; 2]) -> Self {
+        Self {
+            a: ascending(overlap.a.iter().map(|&t| a.cell_id(t))),
+            b: ascending(overlap.b.iter().map(|&t| b.cell_id(t))),
+            pairs: overlap.pairs.as_ref().map(|pairs| ascending(pairs.iter().map(|&[s, t]| [a.cell_id(s), b.cell_id(t)]))),
+        }
+    }
+
+    /// The content of a result file.
+    fn json(&self) -> Value {
+        let mut result = json!({ "a": self.a, "b": self.b });
+        if let Some(pairs) = &self.pairs {
+            result["pairs"] = json!(pairs);
+        }
+        result
+    }
+}
+
+/// Sorts ids; several tetrahedra may be parts of one cell, which is listed once.
+fn ascending<T: Ord>(ids: impl Iterator<Item = T>) -> Vec<T> {
+    let mut ids: Vec<T> = ids.collect();
+    ids.sort_unstable();
+    ids.dedup();
+    ids
+}
+
+/// An overlap that was computed and written.
+struct Done {
+    cells: Cells,
+    effort: [Effort; 2],
+    /// Number of tetrahedra of both meshes.
+    tets: u64,
+    took: InBlocks,
+    seconds: f64,
+    device: String,
+}
+
+impl Done {
+    /// Prints the summary.
+    fn report(&self, args: &Args, output: ResultOutput, common: &Common) -> Outcome {
+        let Self { cells: Cells { a, b, pairs }, took, seconds, device, .. } = self;
+        let narrow: u64 = self.effort.iter().map(|e| e.narrow).sum();
+        let share = narrow as f64 / self.tets.max(1) as f64;
+        let [a_effort, b_effort] = self.effort.each_ref().map(|e| {
+            json!({
+                "by_vertex": e.by_vertex, "by_node": e.by_node, "searched": e.searched, "located_vertices": e.located,
+                "narrow_tests": e.narrow,
+            })
+        });
+        let json = json!({
+            "file": args.output.display().to_string(), "a": a.len(), "b": b.len(), "pairs": pairs.as_ref().map(Vec::len),
+            "narrow_tests": narrow, "narrow_share": share, "seconds": seconds, "build_ms": took.build_seconds * 1e3,
+            "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells.iter().sum::<u32>(),
+            "a_effort": a_effort, "b_effort": b_effort, "device": device,
+        });
+        let listed = pairs.as_ref().map_or(String::new(), |pairs| format!(", in {} pairs", grouped(pairs.len() as u64)));
+        let text = format!(
+            "{}: {} cells of A and {} of B intersect{listed}\n{} narrow tests, {share:.2} per cell; {} trees {}, overlap {} on {device}\n",
+            args.output.display(),
+            grouped(a.len() as u64),
+            grouped(b.len() as u64),
+            grouped(narrow),
+            took.trees,
+            milliseconds(took.build_seconds * 1e3),
+            milliseconds(seconds * 1e3),
+        );
+        output.finish(common, &json, &text)
+    }
 }
 
 /// A mesh of some of the cells, in the order of their ids, with all points and fields.

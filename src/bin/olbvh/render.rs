@@ -5,7 +5,7 @@ use crate::common::{Common, Outcome};
 use crate::engine::{self, Picture};
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
-use crate::text::{grouped, in_blocks, milliseconds};
+use crate::text::{grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::View;
 use olbvh::error::Result;
 use olbvh::formats::{OutputFormat, write_png};
@@ -49,8 +49,8 @@ pub struct Args {
     #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size, allow_negative_numbers = true)]
     size: [u32; 2],
     /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
-    /// bounds, or less where the mesh or its layers are thinner than that, down to 1/8192. An iso-surface may have
-    /// gaps where the mesh or its cells are thinner than a step.
+    /// bounds; less where walls are thinner than 12 such steps, or layers of cells thinner than one, down to 1/8192. An
+    /// iso-surface may have gaps where the mesh or its cells are thinner than a step.
     #[arg(long, allow_negative_numbers = true)]
     step: Option<f64>,
     /// View and settings, separated by commas, for example `top,ortho` or `azimuth=30,elevation=20,zoom=1.5` (angles in
@@ -65,7 +65,7 @@ pub struct Args {
     #[arg(long, value_name = "A|P:A,P:A,…", value_parser = opacity, allow_hyphen_values = true)]
     opacity: Option<Opacity>,
     /// Draw iso-surfaces of a field of points at these values (up to 8) instead of the volume. They are opaque, unless
-    /// --opacity gives their opacities.
+    /// --opacity or the file of --tf gives their opacities.
     #[arg(long, value_name = "V,V,…", value_parser = iso, allow_hyphen_values = true)]
     iso: Option<Iso>,
     /// Values of the field at the two ends of the transfer function, LO below HI. Default: the range in the .json file
@@ -119,11 +119,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves
     }
     let field = args.field(&loaded.mesh, common)?;
-    if let (false, Some([lo, hi])) = (settings.iso.is_empty(), field.range())
-        && !settings.iso.iter().any(|iso| (lo..=hi).contains(iso))
-    {
-        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", field.name));
-    }
+    let expected = remark_on_iso(&settings.iso, &field, common);
     let suited = suited_step(&loaded.mesh.points, &loaded.mesh.tets);
     settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
@@ -132,6 +128,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let Picture { pixels, stats, range: [lo, hi], step } = picture;
     drop(progress);
+    input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
+    let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height as u32);
+    if expected && pixels.chunks(4 * width).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
+        common.remark("the picture is empty: the camera (--camera) does not see the mesh, or only what is transparent (--opacity)");
+    }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
         common.remark(format_args!(
             "the mesh is about {thickness:.1e} thick, the step is {step:.1e}: the picture may show rings, or miss parts; --step sets it"
@@ -142,16 +143,18 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let json = json!({
         "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1],
         "field": field.name, "range": [lo, hi], "iso": settings.iso,
-        "step": step, "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
+        "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
         "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
-        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "seconds": seconds, "device": engine.name(),
+        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
+        "seconds": seconds, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} from {lo} to {hi}, {}x{} pixels\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
+        "{}: {} from {lo} to {hi}, {}x{} pixels, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
         args.output.display(),
         field.name,
         settings.size[0],
         settings.size[1],
+        single(step),
         grouped(stats.samples),
         grouped(stats.found_samples),
         grouped(stats.skipped_samples),
@@ -194,6 +197,22 @@ impl Args {
         common.remark("the mesh has no fields; drawing the height z");
         Ok(Field { name: "z".into(), on: On::Points, values: mesh.points.iter().map(|p| p[2]).collect() })
     }
+}
+
+/// Remarks on iso-values that show nothing, or little. Returns whether something may be seen.
+fn remark_on_iso(iso: &[f32], field: &Field, common: &Common) -> bool {
+    let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty()) else { return true };
+    let seen = iso.iter().any(|iso| (lo..=hi).contains(iso));
+    if !seen {
+        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", field.name));
+    }
+    for (end, what) in [(lo, "smallest"), (hi, "largest")].into_iter().filter(|(end, _)| lo < hi && iso.contains(end)) {
+        common.remark(format_args!(
+            "{end} is the {what} value of {}: its surface is speckled, or not to be seen; take one within {lo} to {hi}",
+            field.name
+        ));
+    }
+    seen
 }
 
 /// Parses `WxH`, or `N` for a square.

@@ -9,7 +9,7 @@ use crate::slice_output::{Appearance, Layers, layer_file, materials};
 use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, Stack};
-use olbvh::formats::OutputFormat;
+use olbvh::formats::{OutputFormat, printable};
 use olbvh::mesh::{Field, On};
 use olbvh::options::Fineness;
 use olbvh::reference::boundary::valid_grid;
@@ -112,10 +112,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let field = input::field(mesh, args.field.as_deref())?;
     let bounds = Bounds::from(&valid_grid(mesh));
     let voxels = args.voxels(format, &bounds, mesh.origin, common)?;
-    let look = args.look(format, colors, field, common);
+    let look = args.look(format, &colors, field, common);
     let placement = Placement::new(&voxels, mesh);
-    let [width, height] = voxels.size;
-    let mut layers = Layers::create(&args.output, format, ([width, height, voxels.layers], &placement), mesh, args.owners, look)?;
+    let mut layers = Layers::create(&args.output, format, &placement, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
     let mut tally = Tally::default();
     let start = Instant::now();
@@ -127,6 +126,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     layers.finish()?;
     drop(progress);
+    input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if tally.inside + tally.touched == 0 {
         common.remark(placement.remark_on_emptiness(args.axis_name(), &bounds, mesh));
     }
@@ -186,15 +186,18 @@ impl Args {
     }
 
     /// How values of a field are shown.
-    fn look(&self, format: OutputFormat, colors: TransferFunction, field: Option<&Field>, common: &Common) -> Appearance {
+    fn look(&self, format: OutputFormat, colors: &TransferFunction, field: Option<&Field>, common: &Common) -> Appearance {
         let range = self.range.or(colors.range()).or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
         let materials = field.and_then(materials);
         if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
             common.remark(format_args!(
-                "{name} does not number materials from 1 to 255; the package has its values from {} to {}",
-                range[0], range[1]
+                "{} does not number materials from 1 to 255; the package has its values from {} to {}",
+                printable(name),
+                range[0],
+                range[1]
             ));
         }
+        let colors = colors.over(range.map(f64::from));
         Appearance { colors, range, unit: self.unit.unwrap_or(0.001), field: field.map(|f| f.name.clone()), materials }
     }
 
@@ -233,7 +236,7 @@ impl Done<'_> {
             "origin": placement.origin, "spacing": placement.spacing, "axis": args.axis_name(), "axes": placement.axes,
             "thickness": placement.thickness, "inside": tally.inside, "touched": tally.touched, "empty": tally.empty, "seconds": seconds,
             "field": field.map(|f| f.name.as_str()), "on": on, "build_ms": took.build_seconds * 1e3, "blocks": took.trees,
-            "peak_bytes": took.peak, "device": device,
+            "peak_bytes": took.peak, "bad_cells": took.bad_cells[0], "device": device,
         });
         let text = format!(
             "{shown}: {} of {width}x{height} voxels; {} inside, {} touched, {} empty; {} on {device}{}\n",

@@ -57,17 +57,17 @@ pub struct Layers<'a> {
 }
 
 impl<'a> Layers<'a> {
-    /// Creates the output for layers of this many voxels: per row, rows, layers.
+    /// Creates the output for voxels that are placed like this.
     pub fn create(
         path: &Path,
         format: OutputFormat,
-        (size, placement): ([u32; 3], &Placement),
+        placement: &Placement,
         mesh: &'a Mesh,
         owners: bool,
         look: Appearance,
     ) -> Result<Self> {
+        let Placement { size, origin, spacing, axes, .. } = *placement;
         let [w, h, count] = size;
-        let Placement { origin, spacing, axes, .. } = *placement;
         let target = match format {
             OutputFormat::Png => Target::Pictures(path.into()),
             OutputFormat::Svx => {

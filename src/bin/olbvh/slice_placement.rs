@@ -8,6 +8,8 @@ use olbvh::slicing::VoxelGrid;
 /// Placement of a stack of voxels.
 #[derive(Clone, Copy, Debug)]
 pub struct Placement {
+    /// Number of voxels per row, rows per layer, and layers.
+    pub size: [u32; 3],
     /// Centre of the first voxel of the first row of the first layer.
     pub origin: [f64; 3],
     /// Distance from voxel to voxel, row to row and layer to layer; the last is negative for layers that go downwards.
@@ -16,7 +18,6 @@ pub struct Placement {
     pub axes: [[f64; 3]; 3],
     /// Height of a voxel perpendicular to the layers.
     pub thickness: f64,
-    layers: u32,
 }
 
 fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
@@ -31,20 +32,21 @@ impl Placement {
         let halves = voxels.half.map(wide);
         // The direction of the layers is that of the half axis, since the distance between layers may be 0.
         let axes = halves.map(|v| v.map(|x| x / length(v)));
-        let [across, down, up] = [voxels.across, voxels.down, voxels.up].map(wide);
+        let [next_voxel, next_row, next_layer] = [voxels.next_voxel, voxels.next_row, voxels.next_layer].map(wide);
+        let [width, height] = voxels.size;
         Self {
+            size: [width, height, voxels.layers],
             origin: [0, 1, 2].map(|c| mesh.origin[c] + f64::from(voxels.origin[c])),
-            spacing: [length(across), length(down), length(up).copysign(dot(up, axes[2]))],
+            spacing: [length(next_voxel), length(next_row), length(next_layer).copysign(dot(next_layer, axes[2]))],
             axes,
             thickness: 2.0 * length(halves[2]),
-            layers: voxels.layers,
         }
     }
 
     /// Lower and upper end of the layers along their axis.
     fn layers_span(&self) -> [f64; 2] {
         let first = dot(self.origin, self.axes[2]);
-        let last = first + self.spacing[2] * (f64::from(self.layers) - 1.0);
+        let last = first + self.spacing[2] * (f64::from(self.size[2]) - 1.0);
         let half = 0.5 * self.thickness;
         [first.min(last) - half, first.max(last) + half]
     }
@@ -79,7 +81,8 @@ mod tests {
         let settings = SliceSettings { plane: Plane::Axis(0), at: Some(10.0), layers: 3, size: [6, 4], ..SliceSettings::default() };
         let settings = SliceSettings { thickness: Some(0.5), spacing: Some(-2.0), ..settings };
         let placed = settings.voxels(bounds.lo, bounds.hi, mesh.origin).map(|voxels| Placement::new(&voxels, &mesh));
-        let Ok(Placement { origin, spacing, axes, thickness, .. }) = placed else { panic!("{placed:?}") };
+        let Ok(Placement { size, origin, spacing, axes, thickness }) = placed else { panic!("{placed:?}") };
+        assert_eq!(size, [6, 4, 3]);
         assert_eq!(origin, [10.0, -2.75, 7.25]);
         assert_eq!((spacing, thickness), ([0.5, 0.5, -2.0], 0.5));
         assert_eq!(axes, [[0.0, 1.0, 0.0], [0.0, 0.0, 1.0], [1.0, 0.0, 0.0]]);

@@ -70,6 +70,11 @@ pub fn number(x: f64) -> f64 {
     format!("{x:.7e}").parse().unwrap_or(x)
 }
 
+/// The number with the fewest digits that is `x` in single precision: 0.4 rather than 0.4000000059604645.
+pub fn single(x: f32) -> f64 {
+    format!("{x:e}").parse().unwrap_or(x.into())
+}
+
 /// Formats a duration in a readable unit.
 pub fn milliseconds(ms: f64) -> String {
     match ms {
@@ -118,6 +123,9 @@ mod tests {
         assert_eq!([grouped(0u32), grouped(999u32), grouped(1000u32), grouped(12_290_298u32)], ["0", "999", "1,000", "12,290,298"]);
         assert_eq!([counted(0, "point"), counted(1, "point"), counted(1200, "point")], ["0 points", "1 point", "1,200 points"]);
         assert_eq!([f64::from(0.1f32), 5_123_456.75, -7e6].map(|x| number(x).to_string()), ["0.1", "5123456.8", "-7000000"]);
+        let singles = [0.4, 1e-5, -16_777_216.0, f32::MAX, f32::MIN_POSITIVE, 1e-45];
+        assert_eq!(singles.map(single), [0.4, 1e-5, -16_777_216.0, 3.402_823_5e38, 1.175_494_4e-38, 1e-45]);
+        assert!(singles.iter().all(|&x| single(x) as f32 == x) && single(f32::NAN).is_nan());
         assert_eq!([bytes(12), bytes(1536), bytes(3 << 30)], ["12 B", "1.50 KiB", "3.00 GiB"]);
         assert_eq!([milliseconds(1.26), milliseconds(2345.0), milliseconds(90_000.0)], ["1.3 ms", "2.35 s", "1.5 min"]);
     }

@@ -47,7 +47,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         return Err(Failure::Usage(format!("--seconds {}: a time from 0 to 1,000,000 is needed", args.seconds)));
     }
     if let Some(path) = &args.output {
-        output::announce(path, &[OutputFormat::Json], &[])?;
+        output::announce(path, &[OutputFormat::Json], &[&args.mesh])?;
     }
     let (gpu, shapes) = engine::device(common)?;
     let file = args.output.clone().or_else(|| Some(folder()?.join(Profile::file_name(gpu.report()))));

@@ -1,6 +1,6 @@
 //! The C interface to point location, to all owners of points, and to values at points.
 
-use super::scene::OlbvhScene;
+use super::scene::{OlbvhScene, scene_on};
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, recorded};
 use crate::capi::{OlbvhStatus, border, handle, put, tolerance};
 use crate::error::{Error, Result};
@@ -26,7 +26,8 @@ pub struct OlbvhLocation {
     /// for points in no order, which are sorted first.
     pub path: u32,
     /// For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
-    /// owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh.
+    /// owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh. The hints may be where
+    /// the owners are: each is read before it is replaced.
     pub hints: OlbvhBuffer,
     /// For path 2: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
     pub memory: OlbvhBuffer,
@@ -73,15 +74,12 @@ impl OlbvhLocation {
         Ok(LocateOptions { tolerance: tolerance(self.tolerance), method })
     }
 
-    fn input(&self) -> Result<PointInput> {
-        let n = u64::from(self.count);
-        let points = self.points.holds(if n == 0 { 0 } else { (u64::from(self.stride) * (n - 1) + 3).saturating_mul(4) }, "points")?;
-        Ok(PointInput { points, stride: self.stride, count: self.count, hints: self.hints.optional(4 * n, "hints")?, order: None })
+    fn input(&self) -> PointInput {
+        PointInput { points: self.points.part(), stride: self.stride, count: self.count, hints: self.hints.given(), order: None }
     }
 
-    fn output(&self) -> Result<LocateOutput> {
-        let n = u64::from(self.count);
-        Ok(LocateOutput { owners: self.owners.holds(4 * n, "owners")?, barycentrics: self.barycentrics.holds(16 * n, "barycentrics")? })
+    fn output(&self) -> LocateOutput {
+        LocateOutput { owners: self.owners.part(), barycentrics: self.barycentrics.part() }
     }
 }
 
@@ -108,15 +106,15 @@ pub extern "C" fn olbvh_cmd_locate(
     location: *const OlbvhLocation,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene, .. }, location) = (handle(scene, "scene")?, handle(location, "location")?);
-        let (options, mut input) = (location.options()?, location.input()?);
+        let (OlbvhScene { gpu, scene, .. }, location) = (scene_on(r, scene, "scene")?, handle(location, "location")?);
+        let (options, mut input) = (location.options()?, location.input());
         if options.method == LocateMethod::Sorted {
             let order = location.memory.place(|a| PointOrder::carve(gpu, a, location.count))?;
             cmd_sort_points(r, scene.tree.grid, &input, &order)?;
             r.barrier("sort_points → locate");
             input.order = Some(order.order);
         }
-        cmd_locate(r, scene, &input, &location.output()?, &options)
+        cmd_locate(r, scene, &input, &location.output(), &options)
     })
 }
 
@@ -140,7 +138,8 @@ pub extern "C" fn olbvh_owner_parts(
 
 /// Records the search for all owners of points, that is for all tetrahedra that contain each of them: a word each in
 /// `found`, point by point, ascending for each point. Only as many as fit `found` are written; `ends` and `total` of
-/// `olbvh_owner_parts` are correct in any case. Of `location`, only points, stride, count and tolerance are used.
+/// `olbvh_owner_parts` are correct in any case, modulo 2^32. Of `location`, only points, stride, count and tolerance
+/// are used.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_owners(
     recording: *mut OlbvhRecording,
@@ -150,8 +149,8 @@ pub extern "C" fn olbvh_cmd_owners(
     found: OlbvhBuffer,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene, .. }, location) = (handle(scene, "scene")?, handle(location, "location")?);
-        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input()?;
+        let (OlbvhScene { gpu, scene, .. }, location) = (scene_on(r, scene, "scene")?, handle(location, "location")?);
+        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
         let memory = memory.place(|a| OwnersMemory::carve(gpu, a, location.count))?;
         let options = LocateOptions { tolerance: tolerance(location.tolerance), ..LocateOptions::default() };
         cmd_count_owners(r, scene, &input, &memory, &options)?;
@@ -170,9 +169,8 @@ pub extern "C" fn olbvh_cmd_interpolate(
     values: OlbvhBuffer,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (scene, location) = (&handle(scene, "scene")?.scene, handle(location, "location")?);
-        let (field, on) = handle(field, "field")?.read(scene)?;
-        let values = values.holds(4 * u64::from(location.count), "values")?;
-        cmd_interpolate(r, scene, field, on, &location.output()?, values, location.count)
+        let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
+        let (field, on) = handle(field, "field")?.read();
+        cmd_interpolate(r, scene, field, on, &location.output(), values.part(), location.count)
     })
 }

@@ -1,6 +1,6 @@
 //! The C interface to the overlap of two meshes: which tetrahedra intersect the other mesh, and which pairs intersect.
 
-use super::scene::OlbvhScene;
+use super::scene::{OlbvhScene, scene_on};
 use super::{OlbvhBuffer, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::query::{OverlapMemory, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap};
@@ -55,7 +55,7 @@ pub extern "C" fn olbvh_cmd_overlap(
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (a, b) = (&handle(a, "a")?.scene, &handle(b, "b")?.scene);
+        let (a, b) = (&scene_on(r, a, "a")?.scene, &scene_on(r, b, "b")?.scene);
         let memory = memory.place(|arena| OverlapMemory::carve(arena, a, b))?;
         cmd_overlap(r, a, b, &memory, rounds.into())
     })
@@ -83,7 +83,7 @@ pub extern "C" fn olbvh_cmd_count_pairs(
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene: a, .. }, b) = (handle(a, "a")?, &handle(b, "b")?.scene);
+        let (OlbvhScene { gpu, scene: a, .. }, b) = (scene_on(r, a, "a")?, &scene_on(r, b, "b")?.scene);
         let memory = memory.place(|arena| PairMemory::carve(gpu, arena, a.mesh.input.tets))?;
         cmd_count_pairs(r, a, b, &memory, rounds.into())
     })
@@ -102,7 +102,7 @@ pub extern "C" fn olbvh_cmd_list_pairs(
     rounds: OlbvhRounds,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (OlbvhScene { gpu, scene: a, .. }, b) = (handle(a, "a")?, &handle(b, "b")?.scene);
+        let (OlbvhScene { gpu, scene: a, .. }, b) = (scene_on(r, a, "a")?, &scene_on(r, b, "b")?.scene);
         let memory = memory.place(|arena| PairMemory::carve(gpu, arena, a.mesh.input.tets))?;
         cmd_list_pairs(r, a, b, &memory, found.part(), rounds.into())
     })

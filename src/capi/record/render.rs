@@ -1,6 +1,6 @@
 //! The C interface to pictures, and to the ranges of values by which nodes are skipped.
 
-use super::scene::OlbvhScene;
+use super::scene::{OlbvhScene, scene_on};
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
 use crate::build::{cmd_ranges, range_bytes};
 use crate::capi::query::OlbvhPictureSettings;
@@ -119,9 +119,8 @@ pub extern "C" fn olbvh_cmd_ranges(
     ranges: OlbvhBuffer,
 ) -> OlbvhStatus {
     recorded(recording, |r| {
-        let scene = &handle(scene, "scene")?.scene;
-        let ranges = ranges.holds(range_bytes(scene.tree.capacity.nodes), "ranges")?;
-        cmd_ranges(r, &scene.mesh, &scene.tree, handle(field, "field")?.read(scene)?, ranges)
+        let scene = &scene_on(r, scene, "scene")?.scene;
+        cmd_ranges(r, &scene.mesh, &scene.tree, handle(field, "field")?.read(), ranges.part())
     })
 }
 
@@ -140,18 +139,18 @@ pub extern "C" fn olbvh_picture_parts(scene: *const OlbvhScene, picture: *const 
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const OlbvhScene, picture: *const OlbvhPicture) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (scene, picture) = (&handle(scene, "scene")?.scene, handle(picture, "picture")?);
-        let view = picture.view.holds(offset_of!(OlbvhView, drawn_count) as u64, "a view")?;
+        let (scene, picture) = (&scene_on(r, scene, "scene")?.scene, handle(picture, "picture")?);
+        let view = picture.view.part();
+        view.check(offset_of!(OlbvhView, drawn_count) as u64, "a view")?;
         let values = view.part(offset_of!(OlbvhView, drawn) as u64, (512 * size_of::<[f32; 2]>()) as u64);
-        let ranges = picture.ranges.optional(range_bytes(scene.tree.capacity.nodes), "ranges")?;
         let input = RenderInput {
             size: [picture.width, picture.height],
             view: view.part(0, offset_of!(OlbvhView, table) as u64),
             iso: picture.iso != 0,
             table: view.part(offset_of!(OlbvhView, table) as u64, (offset_of!(OlbvhView, drawn) - offset_of!(OlbvhView, table)) as u64),
-            field: picture.field.read(scene)?,
-            normals: picture.normals.optional(12 * u64::from(scene.mesh.input.points), "normals")?,
-            visibility: ranges.map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
+            field: picture.field.read(),
+            normals: picture.normals.given(),
+            visibility: picture.ranges.given().map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
             part: None,
         };
         let memory = picture.memory.place(picture.carve(scene))?;

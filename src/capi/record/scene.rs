@@ -1,18 +1,28 @@
 //! The C interface to a mesh and its tree in the host's memory, and to their construction.
 
 use super::{OlbvhBuffer, OlbvhRecording, recorded};
-use crate::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_prepare_mesh};
-use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, give, handle, put, release};
+use crate::build::{
+    BuildScratch, Capacity, MAX_ENTRIES, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh,
+    cmd_prepare_mesh,
+};
+use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, check_level, give, handle, put, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, Gpu};
-use crate::grid::MAX_LEVEL;
-use crate::options::{BuildOptions, Lists};
+use crate::gpu::{ALIGNMENT, Gpu, Recorder};
+use crate::options::{BuildOptions, Lists, usual_capacity};
 use crate::primitives::Arena;
 use crate::query::Scene;
 
-/// Entries per tetrahedron for which there is room by default, if all leaves have full lists.
-const ENTRIES: u32 = 24;
+/// Entries per tetrahedron for which there is room by default, by the kind of lists.
+const fn default_entries(lists: Lists) -> u32 {
+    match lists {
+        Lists::Boundary => 8,
+        Lists::All => 24,
+    }
+}
+
+/// The deepest level by default.
+const DEFAULT_LEVEL: u32 = 7;
 
 /// What must be known of a mesh and its tree before memory is allocated for them.
 #[repr(C)]
@@ -24,14 +34,14 @@ pub struct OlbvhPlan {
     pub stride: u32,
     /// Number of tetrahedra.
     pub tets: u32,
-    /// Deepest level that the leaves may have, at most 10.
+    /// Deepest level that the leaves may have, from 1 to 10. 0: the level of `build`, or 7 if that has none.
     pub level: u32,
     /// Upper bound on the number of entries of a leaf; 0: unknown. If it is too low, points are lost. Location records
     /// one dispatch for every 16,384 entries, at most 16 dispatches.
     pub longest_leaf: u32,
     /// How to build the tree. If both a capacity and a budget are given, the smaller one holds. If neither is given,
     /// there is room for 8 entries per tetrahedron, or 24 if all leaves have full lists. A tree that would need more is
-    /// made coarser.
+    /// made coarser. A capacity is at least the number of tetrahedra.
     pub build: OlbvhBuildOptions,
 }
 
@@ -59,19 +69,89 @@ pub struct OlbvhScene {
     build_scratch: BuildScratch,
 }
 
+/// A scene to record with, which must lie on the device of the recording.
+pub(super) fn scene_on<'a>(r: &Recorder<'_>, scene: *const OlbvhScene, what: &str) -> Result<&'a OlbvhScene> {
+    let scene = handle(scene, what)?;
+    if scene.gpu.is_same_device(r.gpu()) {
+        return Ok(scene);
+    }
+    Err(Error::Invalid(format!("{what} lies on another device than the recording; make both with one olbvh_gpu")))
+}
+
 /// Where the arrays of a scene are, as olbvh.glsl needs them.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhSceneArrays {
-    /// Content of the buffer whose address is passed to `olbvh_open`. With descriptors, this buffer is the first
-    /// binding.
+    /// Content of the buffer whose address is passed to `olbvh_open`, a multiple of 8. With descriptors, this buffer is
+    /// the first binding.
     pub addresses: [u32; 22],
     /// Buffers of the other bindings, in order.
     pub bindings: [OlbvhBuffer; 10],
-    /// What was built, in words: level of the leaves, level before the limits (by alpha or as requested; larger than
-    /// the level of the leaves where a capacity lowered it), candidates, entries, nodes, internal
-    /// nodes, leaves, …
+    /// An `olbvh_build_status`: what was built.
     pub status: OlbvhBuffer,
+    /// An `olbvh_mesh_status`: what is known of the mesh, such as the number of bad tetrahedra.
+    pub mesh_status: OlbvhBuffer,
+    /// One bit per tetrahedron, lowest bit of a word first: set if it is bad, and so left out of the tree.
+    pub bad: OlbvhBuffer,
+}
+
+/// The result of `olbvh_cmd_build`, which the device writes to `olbvh_scene_arrays_data.status`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhBuildStatus {
+    /// Level of the leaves.
+    pub level: u32,
+    /// Level before the limits, by alpha or as requested; `level` is smaller where a limit lowered it.
+    pub wanted_level: u32,
+    /// Number of octree cells in the bounding boxes of all tetrahedra, of which the entries are chosen.
+    pub candidates: u32,
+    /// Number of entries, that is of (tetrahedron, leaf) pairs.
+    pub entries: u32,
+    /// Number of nodes.
+    pub nodes: u32,
+    /// Number of internal nodes.
+    pub internal: u32,
+    /// Number of leaves.
+    pub leaves: u32,
+    /// Number of leaves that the surface of the mesh may pass through.
+    pub boundary_leaves: u32,
+    /// Number of entries of the longest leaf, for `olbvh_plan.longest_leaf`.
+    pub longest_leaf: u32,
+    /// Unused.
+    pub pad: u32,
+    /// Sum of the estimates from which the level by alpha follows, lower word first.
+    pub sum: [u32; 2],
+    /// Number of candidates on every level from 0 to 10, two words each, lower word first.
+    pub total: [u32; 22],
+    /// Element k is the number of nodes on levels 0 to k.
+    pub levels: [u32; 11],
+    /// Not 0: the tree is empty, since its capacity is too small even for a single node; that of a plan never is.
+    pub overflow: u32,
+}
+
+/// What is known of a mesh, which the device writes to `olbvh_scene_arrays_data.mesh_status`.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+#[allow(dead_code, reason = "the device writes it, and C programs read it")]
+pub struct OlbvhMeshStatus {
+    /// Lower corner of the bounds, in a form of the kernels.
+    pub lo: [u32; 3],
+    /// Upper corner of the bounds, in a form of the kernels.
+    pub hi: [u32; 3],
+    /// Number of bad tetrahedra, which the tree leaves out: a vertex does not exist, occurs twice, or has a coordinate
+    /// that is not finite or beyond 2^125.
+    pub bad: u32,
+    /// Number of boundary tetrahedra: those on the surface, without volume, beside a fold, or at a crowded vertex.
+    pub boundary: u32,
+    /// Number of tetrahedra without volume.
+    pub zero_volume: u32,
+    /// Number of tetrahedra of negative volume, in the order of their vertices; they are as good as others.
+    pub negative: u32,
+    /// Number of crowded vertices, at which more than 128 tetrahedra may meet.
+    pub crowded: u32,
+    /// Not 0: the table of faces is full, as it can be beyond 429 million tetrahedra only. The tree must not be used.
+    pub overflow: u32,
 }
 
 /// A plan with its defaults resolved.
@@ -83,20 +163,20 @@ struct Planned {
 impl OlbvhPlan {
     fn read(&self) -> Result<Planned> {
         let mut options = self.build.read()?;
-        if self.level > MAX_LEVEL {
-            return Err(Error::Invalid(format!("level {} is beyond {MAX_LEVEL}", self.level)));
-        }
+        check_level(self.level)?;
+        let level = if self.level == 0 { options.level.unwrap_or(DEFAULT_LEVEL) } else { self.level };
+        let usual = usual_capacity(self.tets);
         let capacity = match (options.capacity, options.budget.take()) {
-            (Some(entries), Some(bytes)) => {
-                let within = Capacity::for_bytes(bytes, self.level, &options)?;
-                if within.entries < entries { within } else { Capacity::for_entries(entries, self.level) }
+            (None, None) => Capacity::for_entries(self.tets.saturating_mul(default_entries(options.lists)).min(MAX_ENTRIES), level),
+            (Some(entries), None) => Capacity::for_entries(entries, level),
+            (entries, Some(bytes)) => {
+                let (within, most) = (Capacity::for_bytes(bytes, level, &options)?, entries.unwrap_or(usual));
+                if within.entries < most { within } else { Capacity::for_entries(most, level) }
             }
-            (Some(entries), None) => Capacity::for_entries(entries, self.level),
-            (None, Some(bytes)) => Capacity::for_bytes(bytes, self.level, &options)?,
-            (None, None) if options.lists == Lists::Boundary => Capacity::usual(self.tets, self.level),
-            (None, None) => Capacity::for_entries(self.tets.saturating_mul(ENTRIES), self.level),
         };
-        Ok(Planned { options, capacity })
+        // The planned entries are the limit, not candidates, unless more of them are asked for than are usual.
+        options.capacity = options.capacity.filter(|&entries| entries > usual);
+        Ok(Planned { options, capacity: capacity.with_candidates(self.tets, &options) })
     }
 
     fn memory(&self, arena: &mut Arena, planned: &Planned) -> Result<(MeshArrays, TreeMemory)> {
@@ -170,11 +250,13 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
     border(|| {
         let scene = &handle(scene, "scene")?.scene;
         // SAFETY: the caller passes null or a valid `OlbvhBuffer`.
-        let field = unsafe { field.as_ref() }.copied().unwrap_or_default();
-        let field = field.optional(4 * u64::from(scene.mesh.input.points), "a field")?;
+        let field = unsafe { field.as_ref() }.and_then(OlbvhBuffer::given);
+        field.map_or(Ok(()), |field| field.check(4 * u64::from(scene.mesh.input.points), "a field"))?;
         let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field);
         let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
-        put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status: scene.tree.status.into() })
+        let MeshArrays { status: mesh_status, bad, .. } = scene.mesh.arrays;
+        let [status, mesh_status, bad] = [scene.tree.status, mesh_status, bad].map(OlbvhBuffer::from);
+        put(out, OlbvhSceneArrays { addresses: bytemuck::cast(buffers.addresses()), bindings, status, mesh_status, bad })
     })
 }
 
@@ -183,9 +265,24 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
 /// `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
+    build(recording, scene, cmd_prepare_mesh)
+}
+
+/// As `olbvh_cmd_build`, for positions that have changed since a tree of the scene was built: neighbours, whose search
+/// takes much of that time, stay as they were found then. The cells must be the same. A tetrahedron that was or becomes
+/// bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`; no point is lost.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_cmd_rebuild(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
+    build(recording, scene, cmd_move_mesh)
+}
+
+/// One of the two functions of stage 0.
+type Prepare = fn(&mut Recorder<'_>, &MeshInput, &MeshArrays, &MeshScratch) -> Result<()>;
+
+fn build(recording: *mut OlbvhRecording, scene: *const OlbvhScene, prepare: Prepare) -> OlbvhStatus {
     recorded(recording, |r| {
-        let OlbvhScene { scene, options, mesh_scratch, build_scratch, .. } = handle(scene, "scene")?;
-        cmd_prepare_mesh(r, &scene.mesh.input, &scene.mesh.arrays, mesh_scratch)?;
+        let OlbvhScene { scene, options, mesh_scratch, build_scratch, .. } = scene_on(r, scene, "scene")?;
+        prepare(r, &scene.mesh.input, &scene.mesh.arrays, mesh_scratch)?;
         r.barrier("scene.mesh → scene.tree");
         cmd_build(r, &scene.mesh, &scene.tree, options, build_scratch)
     })

@@ -1,6 +1,6 @@
 //! The C interface to slices.
 
-use super::scene::OlbvhScene;
+use super::scene::{OlbvhScene, scene_on};
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::query::OlbvhVoxels;
 use crate::capi::{OlbvhStatus, border, handle, put};
@@ -64,9 +64,9 @@ pub extern "C" fn olbvh_slicing_parts(slicing: *const OlbvhSlicing, out: *mut Ol
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const OlbvhScene, slicing: *const OlbvhSlicing) -> OlbvhStatus {
     recorded(recording, |r| {
-        let (scene, slicing) = (&handle(scene, "scene")?.scene, handle(slicing, "slicing")?);
+        let (scene, slicing) = (&scene_on(r, scene, "scene")?.scene, handle(slicing, "slicing")?);
         let OlbvhSlicing { layer, first, rows, field, .. } = *slicing;
-        let field = (field.values.size > 0).then(|| field.read(scene)).transpose()?;
+        let field = (field.values.size > 0).then(|| field.read());
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
         let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate, part: None };
         let memory = slicing.memory.place(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], rows))?;

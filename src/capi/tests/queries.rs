@@ -1,5 +1,6 @@
 //! Tests of every query, recorded and owning, as a C program calls it: the results are the same bytes as from Rust.
 
+use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
@@ -14,7 +15,7 @@ const NOTHING: OlbvhBuffer = OlbvhBuffer { buffer: 0, offset: 0, size: 0, addres
 const LO: [f32; 3] = [-1.0; 3];
 const HI: [f32; 3] = [6.0, 5.0, 4.0];
 
-fn settings() -> OlbvhPictureSettings {
+pub fn settings() -> OlbvhPictureSettings {
     let (colors, opacity) = (c"viridis_r".as_ptr(), c"0:0,0.4:0,0.5:0.4,0.6:0,1:0".as_ptr());
     OlbvhPictureSettings { width: 37, height: 30, colors, opacity, range: [-1.5, 5.0], ..olbvh_default_picture_settings() }
 }
@@ -87,18 +88,25 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
 }
 
 /// A scene in the host's memory, and its buffers.
-struct Stage {
-    scene: *mut OlbvhScene,
+pub struct Stage {
+    pub scene: *mut OlbvhScene,
     positions: Buffer,
     _held: [Buffer; 3],
 }
 
+/// A scene whose tree has lists by bounding box, with which every pair is found once.
 fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
+    place(gpu, mesh, 6, OlbvhBuildOptions { lists: 0, assign: 0, ..olbvh_default_build_options() })
+}
+
+/// The plan of a scene for a mesh.
+pub fn plan(mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> OlbvhPlan {
+    OlbvhPlan { points: mesh.points.len() as u32, stride: 3, tets: mesh.tets.len() as u32, level, longest_leaf: 0, build }
+}
+
+pub fn place(gpu: *const OlbvhGpu, mesh: &Mesh, level: u32, build: OlbvhBuildOptions) -> Stage {
     let device = &handle(gpu, "gpu").unwrap().0;
-    let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
-    // Lists by bounding box, with which every pair is found once.
-    let build = OlbvhBuildOptions { lists: 0, assign: 0, ..olbvh_default_build_options() };
-    let plan = OlbvhPlan { points, stride: 3, tets, level: 6, longest_leaf: 0, build };
+    let plan = plan(mesh, level, build);
     let sizes: OlbvhPlanSizes = made(|out| olbvh_plan_measure(gpu, &raw const plan, out));
     let (positions, cells) = (device.upload("olbvh.test.positions", &mesh.points), device.upload("olbvh.test.cells", &mesh.tets));
     let (positions, cells) = (positions.unwrap(), cells.unwrap());
@@ -108,7 +116,7 @@ fn stage(gpu: *const OlbvhGpu, mesh: &Mesh) -> Stage {
     Stage { scene, positions, _held: [cells, memory, scratch] }
 }
 
-fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
+pub fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
     let mut all = vec![T::zeroed(); count];
     let bytes = bytemuck::cast_slice_mut(&mut all);
     gpu.download_ref(
@@ -253,19 +261,33 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert!(pairs.len() > 100 && pairs == expected.pairs);
 
     // Buffers that are too small are refused during recording.
-    slicing.memory.size -= 256;
-    location.owners.size -= 1;
     ok(olbvh_recording_begin(recording, 0, 0, 0));
-    assert_eq!(olbvh_cmd_slice(recording, a.scene, &raw const slicing), OlbvhStatus::Invalid);
-    assert_eq!(olbvh_cmd_locate(recording, a.scene, &raw const location), OlbvhStatus::Invalid);
-    assert!(message().contains("owners"), "{}", message());
+    let refused = |status: OlbvhStatus, what: &str| assert!(status == OlbvhStatus::Invalid && message().contains(what), "{}", message());
+    let less = |part: OlbvhBuffer, bytes: u64| OlbvhBuffer { size: part.size - bytes, ..part };
+    let short = OlbvhField { values: less(field.values, 1), ..field };
+    let slice = |slicing: OlbvhSlicing| olbvh_cmd_slice(recording, a.scene, &raw const slicing);
+    refused(slice(OlbvhSlicing { memory: less(slicing.memory, 256), ..slicing }), "memory");
+    refused(slice(OlbvhSlicing { field: short, ..slicing }), "a field");
+    let locate = |location: OlbvhLocation| olbvh_cmd_locate(recording, a.scene, &raw const location);
+    refused(locate(OlbvhLocation { points: less(location.points, 1), ..location }), "points");
+    refused(locate(OlbvhLocation { owners: less(location.owners, 1), ..location }), "owners");
+    refused(locate(OlbvhLocation { barycentrics: less(location.barycentrics, 1), ..location }), "barycentrics");
+    refused(locate(OlbvhLocation { path: 0, hints: less(location.owners, 1), ..location }), "hints");
+    let interpolate = |field: &OlbvhField, values| olbvh_cmd_interpolate(recording, a.scene, &raw const location, field, values);
+    refused(interpolate(&short, interpolated.all().into()), "a field");
+    refused(interpolate(&field, less(interpolated.all().into(), 1)), "values");
+    refused(olbvh_cmd_ranges(recording, a.scene, &raw const field, less(ranges.all().into(), 1)), "ranges");
+    refused(olbvh_cmd_ranges(recording, a.scene, &raw const short, ranges.all().into()), "a field");
+    let draw = |picture: OlbvhPicture| olbvh_cmd_render(recording, a.scene, &raw const picture);
+    refused(draw(OlbvhPicture { view: less(picture.view, 8), ..picture }), "a view");
+    refused(draw(OlbvhPicture { field: short, ..picture }), "a field");
+    refused(draw(OlbvhPicture { normals: less(picture.normals, 1), ..picture }), "normals");
+    refused(draw(OlbvhPicture { ranges: less(picture.ranges, 1), ..picture }), "ranges");
     olbvh_recording_free(recording);
     olbvh_scene_free(a.scene);
     olbvh_scene_free(b.scene);
 }
 
-/// Compares the owning calls with the Rust interface. With a reordered mesh the results are mapped back to the caller's
-/// numbers and differ only in the owners of shared faces, edges and vertices.
 /// A stack that is sliced in several bands.
 fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
     let stack = OlbvhVoxels { across: [0.007, 0.0, 0.0], down: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
@@ -277,16 +299,18 @@ fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
     assert!(found.iter().map(|v| v.to_bits()).eq(expected.1), "values");
 }
 
+/// Compares the owning calls with the Rust interface. With a reordered mesh the results are mapped back to the caller's
+/// numbers and differ only in the owners of shared faces, edges and vertices.
 pub fn owned(gpu: *mut OlbvhGpu) {
     let device = &handle(gpu, "gpu").unwrap().0;
     let [mesh, other] = meshes();
     let settings = OlbvhPictureSettings { shading: 0, ..settings() };
-    let plan = |gpu: &OlbvhTree| {
-        let bounds = Bounds::from(gpu.tree.grid());
+    let prepare = |tree: &OlbvhTree, settings: &OlbvhPictureSettings| {
+        let bounds = Bounds::from(tree.tree.grid());
         let (neighbours, field) =
-            (gpu.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
+            (tree.mesh.device.neighbours().unwrap(), Field { name: String::new(), on: On::Points, values: values(&mesh) });
         let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
-        Prepared::new(&settings.read().unwrap(), &mesh, &valid, &field).unwrap().plan
+        Prepared::new(&settings.read().unwrap(), &mesh, &valid, &field).unwrap()
     };
     let tree_of = |mesh: &Mesh, reorder: u32| -> *mut OlbvhTree {
         let (points, tets) = (mesh.points.as_ptr().cast(), mesh.tets.as_ptr().cast());
@@ -310,7 +334,7 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     for reorder in [0, 1] {
         let tree = tree_of(&mesh, reorder);
         let expected = first.get_or_insert_with(|| {
-            let plan = plan(handle(tree, "tree").unwrap());
+            let Prepared { plan, .. } = prepare(handle(tree, "tree").unwrap(), &settings);
             expected(device, &[mesh.clone(), other.clone()], &plan, None)
         });
         let mut owners = vec![0; middles.len()];
@@ -335,6 +359,9 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         assert!(sliced.iter().zip(&expected.sliced).filter(|(a, b)| near(a, **b)).count() > answers.len() * 9 / 10);
         if reorder == 0 {
             large_stack(tree, &values);
+            let fresh = tree_of(&mesh, 0);
+            pictures(fresh, &values, &|settings| prepare(handle(fresh, "tree").unwrap(), settings));
+            olbvh_tree_free(fresh);
         }
         olbvh_tree_free(tree);
     }

@@ -1,7 +1,7 @@
 //! What sets and pairs share: counters, and both trees in one frame.
 
 use crate::error::Result;
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, Buffer, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{OverlapFrames, OverlapFramesSpec};
 use crate::layout::{NodeFrame, OverlapStatus};
 use crate::options::Assign;
@@ -9,19 +9,32 @@ use crate::primitives::Arena;
 use crate::query::Scene;
 use std::mem::offset_of;
 
+/// Words from the counters of one direction to those of the other.
+const STRIDE: usize = size_of::<OverlapStatus>().next_multiple_of(ALIGNMENT as usize) / 4;
+
 /// Counters of both directions, and the [`NodeFrame`] of each tree.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Frames {
     pub(super) status: [BufferRef; 2],
+    /// The range that contains both of them.
+    both: BufferRef,
     pub(super) of: [BufferRef; 2],
 }
 
 impl Frames {
     pub(super) fn carve(arena: &mut Arena) -> Result<Self> {
-        let mut status = || arena.take(size_of::<OverlapStatus>() as u64);
-        let status = [status()?, status()?];
+        let (size, stride) = (size_of::<OverlapStatus>() as u64, 4 * STRIDE as u64);
+        let both = arena.take(stride + size)?;
+        let status = [both.part(0, size), both.part(stride, size)];
         let mut frame = || arena.take(size_of::<NodeFrame>() as u64);
-        Ok(Self { status, of: [frame()?, frame()?] })
+        Ok(Self { status, both, of: [frame()?, frame()?] })
+    }
+
+    /// Reads back the counters of both directions.
+    pub(super) fn statuses(&self, gpu: &Gpu, memory: &Buffer) -> Result<[OverlapStatus; 2]> {
+        let words: Vec<u32> = gpu.download(memory, self.both)?;
+        let status = |i: usize| bytemuck::pod_read_unaligned(bytemuck::cast_slice(&words[i * STRIDE..][..size_of::<OverlapStatus>() / 4]));
+        Ok([status(0), status(1)])
     }
 
     /// Records the computation of both frames. Counters must be zeroed; there is no barrier.

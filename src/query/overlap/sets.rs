@@ -51,7 +51,7 @@ pub struct OverlapMemory {
     pub hits: [BufferRef; 2],
     /// [`crate::layout::OverlapStatus`] of A against B, then of B against A.
     pub status: [BufferRef; 2],
-    frames: Frames,
+    pub(super) frames: Frames,
     directions: [Arrays; 2],
 }
 

@@ -10,10 +10,8 @@ use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Built, Progress, Rounds, StructureView, upload_field};
-use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
+use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
-/// Voxels of one band, unless a single row has more.
-const CHUNK: u64 = 1 << 20;
 /// Bytes of device memory per voxel of a band, including transfers but not runs, and a fixed reserve.
 const PER_VOXEL: u64 = 40;
 const RESERVE: u64 = 1 << 14;
@@ -69,8 +67,9 @@ impl<'a> Slicing<'a> {
         let [width, height] = voxels.size;
         let per_run = size_of::<RunState>() as u64;
         let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, VOXEL_RUN));
-        let most = CHUNK.min(gpu.memory_left().saturating_sub(RESERVE + per_run * u64::from(width)) / per_voxel);
-        let rows = bands(voxels, most).map(|rows| rows.count).max().unwrap_or(1);
+        let most = BAND_VOXELS.min(gpu.memory_left().saturating_sub(RESERVE + per_run * u64::from(width)) / per_voxel);
+        // The first band is the largest.
+        let rows = bands(voxels, most).next().map_or(1, |rows| rows.count);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size, rows);
         let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.slice", carve)?;
         let (searched, sliced) = (StructureView::new(mesh, built)?, Sliced::default());

@@ -1,16 +1,17 @@
 //! Drawing of a whole picture by means of [`cmd_render`]: allocates memory, and submits one round at a time until every
 //! ray is done.
 
-use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render};
+use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render, cmd_render_marked};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu};
+use crate::gpu::{Buffer, BufferRef, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
 use crate::primitives::Arena;
 use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, upload_field};
 use crate::render::{Plan, RenderStats, TABLE_SIZE};
+use bytemuck::Pod;
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long.
 const STRIP: u32 = 1 << 20;
@@ -56,6 +57,8 @@ pub(crate) struct Canvas<'a> {
     buffer: Buffer,
     /// Rows of a strip.
     rows: u32,
+    /// Whether the memory has the marks of the visible nodes, which strips have in common.
+    marked: bool,
     stats: RenderStats,
 }
 
@@ -96,14 +99,14 @@ impl<'a> Canvas<'a> {
             Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
         };
         let in_strips = in_strips && matches!(searched.structure, Structure::Octree(_));
-        let mut rows = if in_strips { strip_rows(plan.size) } else { plan.size[1] };
+        let mut rows = if in_strips { strip_rows(plan.size) } else { plan.size[1] }.max(1);
         while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > gpu.memory_left() - gpu.memory_left() / 4 {
             rows = rows.div_ceil(2).next_multiple_of(BLOCK);
         }
         let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
         let (memory, ranges) = carve(&mut Arena::new(buffer.all()), rows)?;
         let stats = RenderStats::default();
-        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, stats };
+        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, marked: false, stats };
         canvas.gather_ranges()?;
         Ok(canvas)
     }
@@ -118,8 +121,7 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws a picture of this size from the first row of the view, or a part of one. `report` receives the number of
-    /// rays done and their total.
+    /// Draws a picture of this size, or a part of one. `report` receives the number of rays done and their total.
     fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: Progress<'_>) -> Result<()> {
         let Self { gpu, searched, plan, memory, stats, .. } = self;
         let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
@@ -133,7 +135,9 @@ impl<'a> Canvas<'a> {
             visibility: self.ranges.map(|ranges| Visibility { ranges, values, count: plan.visible_values.len() as u32 }),
             part,
         };
-        let ((), time) = gpu.submit("olbvh.query.intervals", |r| cmd_render(r, searched, &input, memory, Rounds::begin(0)))?;
+        let begin = |r: &mut Recorder<'_>| cmd_render_marked(r, searched, &input, memory, Rounds::begin(0), self.marked);
+        let ((), time) = gpu.submit("olbvh.query.intervals", begin)?;
+        self.marked = true;
         stats.ranges_ms += time.milliseconds("query.visible");
         stats.interval_ms += time.milliseconds("query.intervals");
         let rays = u64::from(size[0]) * u64::from(size[1]);
@@ -170,27 +174,21 @@ impl<'a> Canvas<'a> {
             let pixels = first[0]..first[0] + size[0] as usize * size[1] as usize;
             let items = first[1]..first[1] + super::rays(size)? as usize;
             let (colors, states) = (&mut rays.colors[pixels], &mut rays.states[items]);
-            self.draw_strip(size, RenderPart { cells, row }, colors, states, SILENT)?;
-            let last = self.memory.rays.part(0, size_of_val(states) as u64);
-            states.copy_from_slice(&self.gpu.download(&self.buffer, last)?);
+            self.gpu.write(&mut self.buffer, self.memory.colors.offset, colors)?;
+            self.gpu.write(&mut self.buffer, self.memory.rays.offset, states)?;
+            self.draw(size, Some(RenderPart { row, cells: Some(cells) }), SILENT)?;
+            // Both are read before either is stored: colours with older states would get the same samples again.
+            let drawn = self.first(self.memory.colors, colors.len())?;
+            let reached = self.first(self.memory.rays, states.len())?;
+            colors.copy_from_slice(&drawn);
+            states.copy_from_slice(&reached);
         }
         Ok(self.stats)
     }
 
-    /// Draws rows of the picture, with the colours gathered so far in `colors`, and the rays' states.
-    fn draw_strip(
-        &mut self,
-        size: [u32; 2],
-        part: RenderPart,
-        colors: &mut [[f32; 4]],
-        states: &[RayState],
-        report: Progress<'_>,
-    ) -> Result<()> {
-        self.gpu.write(&mut self.buffer, self.memory.colors.offset, colors)?;
-        self.gpu.write(&mut self.buffer, self.memory.rays.offset, states)?;
-        self.draw(size, Some(part), report)?;
-        colors.copy_from_slice(&self.gpu.download(&self.buffer, self.memory.colors.part(0, size_of_val(colors) as u64))?);
-        Ok(())
+    /// Reads back the first items of a part of the memory.
+    fn first<T: Pod>(&self, part: BufferRef, count: usize) -> Result<Vec<T>> {
+        self.gpu.download(&self.buffer, part.part(0, (count * size_of::<T>()) as u64))
     }
 }
 
@@ -216,21 +214,13 @@ pub fn render(
     let [width, height] = plan.size;
     let rays = u64::from(width) * u64::from(height);
     let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(STRIP))?;
-    if canvas.rows == height {
-        canvas.draw(plan.size, None, report)?;
-        let colors = canvas.gpu.download(&canvas.buffer, canvas.memory.colors.part(0, 16 * rays))?;
-        return Ok(Rendered { colors, stats: canvas.stats });
-    }
     super::rays(plan.size)?;
-    let mut colors = vec![[0.0; 4]; rays as usize];
-    let Rays { states, .. } = Rays::new([width, canvas.rows])?;
-    for (strip, colors) in colors.chunks_mut(width as usize * canvas.rows as usize).enumerate() {
-        let row = strip as u32 * canvas.rows;
+    let mut colors = Vec::with_capacity(rays as usize);
+    for row in (0..height).step_by(canvas.rows as usize) {
         let size = [width, canvas.rows.min(height - row)];
-        let before = u64::from(width) * u64::from(row);
-        let states = &states[..super::rays(size)? as usize];
-        let part = RenderPart { cells: CellRange::WHOLE, row };
-        canvas.draw_strip(size, part, colors, states, &|done, _| report(before + done, rays))?;
+        let before = colors.len() as u64;
+        canvas.draw(size, Some(RenderPart { row, cells: None }), &|done, _| report(before + done, rays))?;
+        colors.extend(canvas.first::<[f32; 4]>(canvas.memory.colors, size[0] as usize * size[1] as usize)?);
     }
     Ok(Rendered { colors, stats: canvas.stats })
 }

@@ -1,8 +1,8 @@
 //! The textual form of a camera.
 
-use super::{Bounds, Camera, DEFAULT_FOV, Projection, three_quarter};
+use super::{Bounds, Camera, DEFAULT_FOV, Projection, three_quarter, upright};
 use crate::error::{Error, Result};
-use glam::DVec3;
+use glam::{DMat3, DVec3};
 
 /// A camera as a user describes it, in the coordinates of the mesh's source. Whatever is left open is chosen so that
 /// the mesh is framed.
@@ -10,7 +10,8 @@ use glam::DVec3;
 pub struct CameraSpec {
     /// The side to look from, as a direction from the mesh to the eye; ignored with `eye`.
     pub from: Option<DVec3>,
-    /// Degrees around the vertical axis, 0 = from −y (front), 90 = from +x (right); ignored with `eye`.
+    /// Degrees around the vertical axis, 0 = from the front, 90 = from the right (with z up, −y and +x); ignored with
+    /// `eye`.
     pub azimuth: Option<f64>,
     /// Degrees above the horizon; ignored with `eye`.
     pub elevation: Option<f64>,
@@ -18,7 +19,8 @@ pub struct CameraSpec {
     pub eye: Option<DVec3>,
     /// The point that the eye looks at; by default the centre of the mesh. Without `eye`, it moves the framed camera.
     pub target: Option<DVec3>,
-    /// The direction that is up in the picture; z by default.
+    /// The vertical axis of the mesh, which is up in the picture; z by default. Front and right turn with it, as
+    /// [`upright`] says.
     pub up: Option<DVec3>,
     /// Perspective angle from top to bottom, in degrees.
     pub fov: Option<f64>,
@@ -29,7 +31,7 @@ pub struct CameraSpec {
 }
 
 /// Named views, as directions from the mesh to the eye. `iso` is the default three-quarter view, which depends on the
-/// mesh's shape.
+/// mesh's shape. The first [`SIDES`] turn with the vertical axis.
 const VIEWS: [(&str, Option<DVec3>); 13] = [
     ("iso", None),
     ("front", Some(DVec3::NEG_Y)),
@@ -46,10 +48,14 @@ const VIEWS: [(&str, Option<DVec3>); 13] = [
     ("-z", Some(DVec3::NEG_Z)),
 ];
 
+/// How many views are sides of the mesh. The others are axes of its coordinates.
+const SIDES: usize = 7;
+
 /// The syntax of a camera's text, for errors and help.
 pub const HELP: &str = "a view (iso, front, back, left, right, top, bottom, +x, -x, +y, -y, +z or -z), settings, or both, separated by commas. \
 Settings are azimuth=DEGREES and elevation=DEGREES of the eye as seen from the mesh, or the eye itself, eye=X,Y,Z; target=X,Y,Z, the point that is looked \
-at; up=X,Y,Z; fov=DEGREES from top to bottom, or ortho, or ortho=HEIGHT; zoom=FACTOR";
+at; up=X,Y,Z, the mesh's vertical axis; fov=DEGREES from top to bottom, or ortho, or ortho=HEIGHT; zoom=FACTOR. By default z is up, and the front is at -y; \
+iso, the sides and both angles turn with up, so up=0,1,0 suits meshes with y up, whose front is at +z";
 
 /// Keys of settings.
 const KEYS: [&str; 8] = ["azimuth", "elevation", "zoom", "fov", "ortho", "eye", "target", "up"];
@@ -63,6 +69,7 @@ impl std::str::FromStr for CameraSpec {
     fn from_str(text: &str) -> Result<Self> {
         let mut spec = Self::default();
         let mut given = Vec::new();
+        let mut turns = false;
         let mut parts = text.split(',').map(str::trim).peekable();
         while let Some(part) = parts.next() {
             // The numbers of a vector are separated by commas as well, so numbers that follow without a key belong to
@@ -75,6 +82,7 @@ impl std::str::FromStr for CameraSpec {
             if given.contains(&key) {
                 return Err(Error::Invalid(format!("`{part}` is a second {key}; give one")));
             }
+            turns |= key == "view" && VIEWS[..SIDES].iter().any(|(name, _)| name.eq_ignore_ascii_case(&part));
             given.push(key);
         }
         if let Some([a, b]) = CONTRADICTIONS.iter().find(|pair| pair.iter().all(|key| given.contains(key))) {
@@ -82,6 +90,9 @@ impl std::str::FromStr for CameraSpec {
         }
         if ["view", "azimuth", "elevation"].iter().all(|key| given.contains(key)) {
             return Err(Error::Invalid("azimuth and elevation leave nothing to the view; give two of the three".into()));
+        }
+        if turns {
+            spec.from = spec.from.map(|side| spec.axes() * side);
         }
         Ok(spec)
     }
@@ -128,7 +139,12 @@ impl CameraSpec {
             "ortho" => self.ortho = Some(scalar(&|v| v > 0.0, "above 0")?),
             "eye" => self.eye = vector()?,
             "target" => self.target = vector()?,
-            _ => self.up = vector()?,
+            _ => {
+                self.up = vector()?;
+                if self.up.is_some_and(|up| up.try_normalize().is_none()) {
+                    return Err(wrong("needs a direction, not all 0"));
+                }
+            }
         }
         Ok(key)
     }
@@ -137,7 +153,7 @@ impl CameraSpec {
     /// height.
     ///
     /// # Errors
-    /// [`Error::Invalid`] if eye and target are the same point.
+    /// [`Error::Invalid`] if eye and target are the same point, or a number is out of its limits.
     pub fn resolve(&self, bounds: &Bounds, origin: [f64; 3], aspect: f64) -> Result<Camera> {
         self.resolve_around(bounds, &bounds.corners(), origin, aspect)
     }
@@ -151,18 +167,17 @@ impl CameraSpec {
         let corners = bounds.corners();
         let center = (corners[0] + corners[7]) * 0.5;
         let target = self.target.map_or(center, local);
-        let up = self.up.unwrap_or(DVec3::Z);
-        let fov = if self.ortho.is_some() { None } else { Some(self.fov.unwrap_or(DEFAULT_FOV)) };
-        let framed = Camera::frame_from(bounds, points, aspect, self.direction(bounds), up, fov);
-        let mut camera = match self.eye.map(local) {
-            Some(eye) => {
-                let projection = match self.ortho {
-                    None => Projection::Perspective(self.fov.unwrap_or(DEFAULT_FOV)),
-                    Some(_) => framed.projection,
-                };
-                Camera::look_at(eye, target, up, projection)?
+        let fov = self.fov.unwrap_or(DEFAULT_FOV);
+        let mut camera = if let Some(eye) = self.eye.map(local) {
+            let mut camera = Camera::look_at(eye, target, self.up.unwrap_or(DVec3::Z), Projection::Perspective(fov))?;
+            if self.ortho.is_some() {
+                camera.projection = Projection::Orthographic(camera.height_around(bounds, points, aspect));
             }
-            None => Camera { eye: framed.eye + (target - center), ..framed },
+            camera
+        } else {
+            let (from, up) = self.side(bounds);
+            let framed = Camera::frame_from(bounds, points, aspect, from, up, self.ortho.is_none().then_some(fov));
+            Camera { eye: framed.eye + (target - center), ..framed }
         };
         if let Some(Some(height)) = self.ortho {
             camera.projection = Projection::Orthographic(height);
@@ -177,14 +192,25 @@ impl CameraSpec {
         Ok(camera)
     }
 
-    /// Direction from the mesh to the eye.
-    fn direction(&self, bounds: &Bounds) -> DVec3 {
-        let base = self.from.unwrap_or_else(|| three_quarter(bounds)).normalize_or(DVec3::NEG_Y);
+    /// The axes of the mesh.
+    fn axes(&self) -> DMat3 {
+        upright(self.up.and_then(DVec3::try_normalize).unwrap_or(DVec3::Z))
+    }
+
+    /// Direction from the mesh to the eye, and what is up in the picture.
+    fn side(&self, bounds: &Bounds) -> (DVec3, DVec3) {
+        let axes = self.axes();
+        let size = bounds.corners()[7] - bounds.corners()[0];
+        let extent = DVec3::from_array([axes.x_axis, axes.y_axis, axes.z_axis].map(|axis| axis.abs().dot(size)));
+        let base = self.from.map_or_else(|| three_quarter(extent), |from| axes.transpose() * from).normalize_or(DVec3::NEG_Y);
         if self.azimuth.is_none() && self.elevation.is_none() {
-            return base;
+            return (axes * base, axes.z_axis);
         }
-        let azimuth = self.azimuth.map_or_else(|| base.x.atan2(-base.y), f64::to_radians);
+        // A sum with 0 is not −0, so that straight above or below is at azimuth 0.
+        let azimuth = self.azimuth.map_or_else(|| (base.x + 0.0).atan2(0.0 - base.y), f64::to_radians);
         let elevation = self.elevation.map_or_else(|| base.z.clamp(-1.0, 1.0).asin(), f64::to_radians);
-        DVec3::new(azimuth.sin() * elevation.cos(), -azimuth.cos() * elevation.cos(), elevation.sin())
+        let ((sa, ca), (se, ce)) = (azimuth.sin_cos(), elevation.sin_cos());
+        // Perpendicular to the view, so that the azimuth turns the picture even straight above and below.
+        (axes * DVec3::new(sa * ce, -ca * ce, se), axes * DVec3::new(-sa * se, ca * se, ce))
     }
 }

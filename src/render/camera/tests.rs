@@ -24,6 +24,68 @@ fn every_view_holds_the_whole_box_and_fills_the_picture() {
     }
 }
 
+/// An eye fixes the direction and the centre of an orthographic picture; its height is that of the mesh seen from there.
+#[test]
+fn parallel_views_from_an_eye_hold_the_whole_mesh() {
+    let rod = [DVec3::new(10.0, -10.0, 3.0), DVec3::new(-10.0, 10.0, -3.0)];
+    let bounds = Bounds { lo: [-10.0, -10.0, -3.0], hi: [10.0, 10.0, 3.0] };
+    for eye in ["eye=100,100,0,ortho", "eye=-3,2,50,target=1,2,3,ortho", "eye=0,0,9,up=1,0,0,ortho"] {
+        for aspect in [0.4, 1.0, 2.5] {
+            let camera = eye.parse::<CameraSpec>().unwrap().resolve_around(&bounds, &rod, [0.0; 3], aspect).unwrap();
+            let most = rod.iter().flat_map(|&p| project(&camera, p, aspect)).fold(0.0, |m: f64, v| m.max(v.abs()));
+            assert!((most - FILL).abs() < 1e-9, "{eye} {aspect}: {most}");
+        }
+    }
+}
+
+/// A mesh with y up is seen as the mesh with z up that it is otherwise equal to, from every side.
+#[test]
+fn views_turn_with_up() {
+    let turned = |p: DVec3| DVec3::new(p.x, p.z, -p.y);
+    let near = |a: DVec3, b: DVec3, what: &str| assert!((a - b).length() < 1e-12 * (1.0 + a.length()), "{what}: {a} {b}");
+    let bounds = Bounds { lo: [-1.0, 0.0, -4.0], hi: [9.0, 1.5, -2.0] };
+    for text in
+        ["iso", "front", "back,ortho", "left", "right", "top", "bottom", "top,azimuth=30", "azimuth=200,elevation=-35", "left,elevation=20"]
+    {
+        let of = |text: &str, bounds: &Bounds| text.parse::<CameraSpec>().unwrap().resolve(bounds, [0.0; 3], 1.3).unwrap();
+        for (text, up) in [(format!("{text},up=0,1,0"), "after"), (format!("up=0,2,0,{text}"), "before")] {
+            let what = format!("{text} {up}");
+            let (z_up, y_up) =
+                (of(text.replace("up=0,1,0", "up=0,0,1").replace("up=0,2,0", "up=0,0,1").as_str(), &BOX), of(&text, &bounds));
+            let pairs = [(z_up.eye, y_up.eye), (z_up.forward, y_up.forward), (z_up.right, y_up.right), (z_up.up, y_up.up)];
+            for (z, y) in pairs {
+                near(turned(z), y, &what);
+            }
+        }
+        assert_eq!(of(text, &BOX), of(&format!("{text},up=0,0,1"), &BOX), "{text}: z is up");
+    }
+    // Axes of the coordinates stay where they are.
+    let along = |text: &str| text.parse::<CameraSpec>().unwrap().resolve(&BOX, [0.0; 3], 1.0).unwrap().forward;
+    near(along("-y,up=1,0,0"), DVec3::Y, "-y");
+    near(along("+z,up=0,1,0"), DVec3::NEG_Z, "+z");
+    for up in [DVec3::X, DVec3::NEG_Z, DVec3::new(0.6, 0.0, -0.8)] {
+        let axes = upright(up);
+        near(axes.x_axis.cross(axes.y_axis), up, "right-handed");
+        near(axes.z_axis, up, "up");
+        assert!((axes.determinant() - 1.0).abs() < 1e-12, "{axes}");
+    }
+}
+
+/// Straight above and below, the azimuth turns the picture as it does just beside them.
+#[test]
+fn azimuth_counts_above_and_below() {
+    let camera = |text: &str| text.parse::<CameraSpec>().unwrap().resolve(&BOX, [0.0; 3], 1.0).unwrap();
+    for azimuth in [0, 45, 200] {
+        for (pole, beside) in [("top", "elevation=89.9999"), ("bottom", "elevation=-89.9999"), ("elevation=90", "elevation=89.9999")] {
+            let [pole, beside] = [pole, beside].map(|text| camera(&format!("{text},azimuth={azimuth}")));
+            assert!((pole.up - beside.up).length() < 1e-4 && (pole.right - beside.right).length() < 1e-4, "{azimuth}: {pole:?} {beside:?}");
+        }
+    }
+    assert_eq!([camera("top").up, camera("bottom").up], [DVec3::Y; 2]);
+    let low = camera("top,elevation=30").forward;
+    assert!(low.y > 0.8 && low.x.abs() < 1e-12, "from the front: {low}");
+}
+
 #[test]
 fn origin_of_the_source_is_subtracted() {
     let spec: CameraSpec = "eye=1e7,0,0,target=1e7,1,0".parse().unwrap();
@@ -72,6 +134,7 @@ fn bad_texts_are_refused_with_the_part_and_the_help() {
         ("eye=1,2", "eye=1,2"),
         ("top,eye=1,nan,2", "eye=1,nan,2"),
         ("zoom=0", "zoom=0"),
+        ("up=0,0,0", "up=0,0,0"),
         ("fov=200", "fov=200"),
         ("colour=3", "colour=3"),
         ("zoom=1,2,top", "zoom=1,2"),

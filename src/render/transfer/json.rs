@@ -1,6 +1,6 @@
 //! Transfer functions from JSON files.
 
-use super::{DEFAULT_OPACITY, Error, Result, TransferFunction, parse_color};
+use super::{Error, Result, TransferFunction, check_colors, check_opacity, parse_color};
 use serde_json::Value;
 use serde_json::error::Category;
 
@@ -33,10 +33,9 @@ impl TransferFunction {
     /// [`TransferFunction::new`].
     pub fn from_json(text: &str) -> Result<Self> {
         let file: File = serde_json::from_str(text).map_err(|e| Error::Invalid(explain(text, &e)))?;
-        let opacity = file.opacity.map(|points| points.iter().enumerate().map(opacity_point).collect::<Result<_>>()).transpose()?;
-        let mut opacity: Option<Vec<(f32, f32)>> = opacity;
+        let opacity = file.opacity.map(|points| points.iter().enumerate().map(opacity_point).collect::<Result<Vec<_>>>()).transpose()?;
         let mut range = file.range.as_ref().map(range_of).transpose()?;
-        let mut colors = match (file.map, file.colors) {
+        let colors = match (file.map, file.colors) {
             (Some(map), None) if file.positions == Positions::Fractions => Self::named(&map)?.colors,
             (Some(_), None) => {
                 return Err(invalid("\"positions\": \"values\" needs \"colors\"; the places of a \"map\" are fractions of the range"));
@@ -45,21 +44,19 @@ impl TransferFunction {
             (None, None) => return Err(invalid("neither \"map\" nor \"colors\" is given")),
             (Some(_), Some(_)) => return Err(invalid("both \"map\" and \"colors\" are given; leave one of them out")),
         };
-        if file.positions == Positions::Values {
-            // Places given as values are rescaled to the range that they span together, or to the given range.
-            let places = || colors.iter().map(|c| c.0).chain(opacity.iter().flatten().map(|o| o.0));
-            let [lo, hi] = range.unwrap_or_else(|| [places().fold(f32::MAX, f32::min), places().fold(f32::MIN, f32::max)]);
-            for place in colors.iter_mut().map(|c| &mut c.0).chain(opacity.iter_mut().flatten().map(|o| &mut o.0)) {
-                *place = (*place - lo) / (hi - lo);
-            }
-            range = Some([lo, hi]);
+        let in_values = file.positions == Positions::Values;
+        check_colors(&colors, in_values)?;
+        opacity.as_ref().map_or(Ok(()), |opacity| check_opacity(opacity, in_values))?;
+        if in_values {
+            // By default, the range that they span together.
+            let values = || colors.iter().map(|c| c.0).chain(opacity.iter().flatten().map(|o| o.0));
+            range = range.or_else(|| Some([values().fold(f32::MAX, f32::min), values().fold(f32::MIN, f32::max)]));
         }
         if let Some([lo, hi]) = range.filter(|[lo, hi]| !(lo < hi && (hi - lo).is_finite())) {
             return Err(Error::Invalid(format!("the range from {lo} to {hi} is empty; its first value must be below the second")));
         }
-        let known = opacity.is_some();
-        let function = Self::new(colors, opacity.unwrap_or_else(|| DEFAULT_OPACITY.to_vec()))?;
-        Ok(Self { range, opacity: function.opacity.filter(|_| known), ..function })
+        let in_values = [in_values, in_values && opacity.is_some()];
+        Ok(Self { colors, opacity, range, in_values })
     }
 }
 

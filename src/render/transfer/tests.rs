@@ -70,6 +70,11 @@ fn json_forms() {
         TransferFunction::from_json(r#"{"colors": [[100, "000000"], [300, "ffffff"]], "opacity": [[200, 0.5]], "positions": "values"}"#)
             .unwrap();
     assert_eq!((f.range(), f.at(0.5)), (Some([100.0, 300.0]), [0.5; 4]));
+    assert_eq!((f.over([200.0, 400.0]).at(0.25)[0], f.over([200.0, 200.0]).at(0.5)[0]), (0.75, 0.5));
+    // Values may lie outside the range.
+    let text = r#"{"colors": [[0, "000"], [500, "fff"]], "positions": "values", "range": [20, 95]}"#;
+    let f = TransferFunction::from_json(text).unwrap();
+    assert_eq!((f.at(0.0)[0], f.at(1.0)[0], f.over([0.0, 1000.0]).at(0.25)[0]), (0.04, 0.19, 0.5));
 }
 
 #[cfg(feature = "formats")]
@@ -92,6 +97,12 @@ fn json_errors_say_what_is_wrong() {
         (r#"{"map": "grey", "opacity": [[0, 1], [1, 7]]}"#, "opacities of a transfer function: at place 1, the value 7 lies outside"),
         (r##"{"colors": [[0, "#123"], [1, "#12"]]}"##, "point 2 of \"colors\" is [1,\"#12\"], not [PLACE, COLOUR]"),
         (r#"{"colors": [[0, [1, 2]]]}"#, "point 1 of \"colors\" is [0,[1,2]], not"),
+        (
+            r##"{"colors": [[300, "#123"], [100, "#123"]], "positions": "values"}"##,
+            "colours of a transfer function: values must ascend, but 100 follows 300",
+        ),
+        (r##"{"colors": [[1e99, "#123"]], "positions": "values"}"##, "the field's value inf is beyond single precision"),
+        (r##"{"colors": [[5, "#123"]], "positions": "values"}"##, "the range from 5 to 5 is empty"),
         (r##"{"colors": [[1, "#123"], [0, "#123"]]}"##, "colours of a transfer function: places must ascend, but 0 follows 1"),
     ] {
         let error = TransferFunction::from_json(bad).unwrap_err().to_string();

@@ -1,6 +1,6 @@
 //! The engine that computes on the CPU with the reference implementation.
 
-use super::{Engine, Picture, Report, Sink, Summary};
+use super::{Engine, OnProgress, Picture, Sink, Summary};
 use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
@@ -13,7 +13,7 @@ use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
-use olbvh::slicing::bands;
+use olbvh::slicing::{BAND_VOXELS, bands};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -63,18 +63,18 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Located>> {
-        on_host((asked.mesh, &asked.options), memory, |tree| Ok(tree.locate(asked.points, field, &asked.how, report)))
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| Ok(tree.locate(asked.points, field, &asked.how, report)))
     }
 
-    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
-        on_host((asked.mesh, &asked.options), memory, |tree| {
+    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
             Ok(each(asked.points, |p| locator.owners(p), report))
         })
     }
 
-    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
         no_memory(memory)?;
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
@@ -85,23 +85,25 @@ impl Engine for Cpu {
         let side_a = OverlapSide { mesh: a, topology: &topology_a, tree: &tree_a };
         let answer = overlap(side_a, OverlapSide { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
         report(1, 1);
-        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds })
+        let bad_cells = [topology_a.counts.bad, topology_b.counts.bad];
+        Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Picture>> {
-        on_host((asked.mesh, &asked.options), memory, |tree| {
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Scene::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
             let volume::Picture { pixels, stats } = volume::render(&scene, report);
             Ok(Picture { pixels, stats, range: scene.range(), step: scene.plan().step })
         })
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks> {
         let Stack { field, voxels, extrapolate, .. } = *asked;
-        on_host((asked.mesh, &asked.options), memory, |tree| {
+        on_host(asked.mesh, &asked.options, memory, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
             let mut done = 0;
-            for rows in bands(voxels, CHUNK as u64) {
+            // Bands are those of the device, so that owners are equal even where tetrahedra overlap.
+            for rows in bands(voxels, BAND_VOXELS) {
                 sink(slicer.band(rows))?;
                 done += u64::from(rows.count) * u64::from(voxels.size[0]);
                 report(done, voxels.voxels());
@@ -120,13 +122,15 @@ fn no_memory(memory: Option<u64>) -> Result<()> {
 
 /// Builds the tree over the whole mesh and computes an answer with it.
 fn on_host<T>(
-    (mesh, options): (&Mesh, &BuildOptions),
+    mesh: &Mesh,
+    options: &BuildOptions,
     memory: Option<u64>,
     answer: impl FnOnce(&CpuTree<'_>) -> Result<T>,
 ) -> Result<InBlocks<T>> {
     no_memory(memory)?;
     let tree = CpuTree::new(mesh, options)?;
-    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3 })
+    let bad_cells = [tree.topology.counts.bad, 0];
+    Ok(InBlocks { answer: answer(&tree)?, trees: 1, peak: 0, build_seconds: tree.build_ms / 1e3, bad_cells })
 }
 
 impl<'a> CpuTree<'a> {
@@ -140,7 +144,7 @@ impl<'a> CpuTree<'a> {
         Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: Report<'_>) -> Located {
+    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: OnProgress<'_>) -> Located {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Located::default();
         // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
@@ -148,7 +152,7 @@ impl<'a> CpuTree<'a> {
             let found = match options.method {
                 LocateMethod::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
                 LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
-                LocateMethod::Descent | LocateMethod::Traversal(_) => locator.locate_all(chunk),
+                LocateMethod::Descent | LocateMethod::Traversal(_) => locator.locate_each(chunk),
             };
             all.owners.extend(found.iter().map(|l| l.owner));
             all.barycentrics.extend(found.iter().map(|l| l.barycentric));
@@ -165,11 +169,40 @@ impl<'a> CpuTree<'a> {
 const CHUNK: usize = 1 << 16;
 
 /// Computes the answers for all points, in parallel, chunk by chunk.
-fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: Report<'_>) -> Vec<T> {
+fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: OnProgress<'_>) -> Vec<T> {
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {
         all.par_extend(chunk.par_iter().map(|&p| one(p)));
         report(all.len() as u64, points.len() as u64);
     }
     all
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use olbvh::slicing::{Band, Extrapolate, Rows, SliceSettings};
+
+    /// Where cells overlap, the owner of a voxel depends on where runs start: in wide layers, too, where the device
+    /// starts them.
+    #[test]
+    fn runs_of_wide_layers_start_where_those_of_the_device_do() -> Result<()> {
+        let one = olbvh::mesh::kuhn([6; 3])?;
+        let moved = one.points.iter().map(|p| [p[0] + 0.37, p[1] + 0.21, p[2] + 0.43]);
+        let beside = one.tets.iter().map(|t| t.map(|v| v + one.points.len() as u32));
+        let mesh = &Mesh::new(one.points.iter().copied().chain(moved).collect(), one.tets.iter().copied().chain(beside).collect());
+        let settings = SliceSettings { size: [1100, 130], ..SliceSettings::default() };
+        let voxels = &settings.voxels([0.0; 3], [6.43; 3], mesh.origin)?;
+        let (options, extrapolate) = (BuildOptions::default(), Extrapolate::Nearest);
+        let mut owners = Vec::new();
+        let mut sink = |band: Band| {
+            owners.extend(band.owners);
+            Ok(())
+        };
+        Cpu.slice(&Stack { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| (), &mut sink)?;
+        let CpuTree { topology, tree, .. } = &CpuTree::new(mesh, &options)?;
+        let whole = Slicer::new(mesh, topology, tree, None, *voxels, extrapolate)?.band(Rows { layer: 0, first: 0, count: 130 });
+        assert!(owners == whole.owners, "{} owners differ", owners.iter().zip(&whole.owners).filter(|(a, b)| a != b).count());
+        Ok(())
+    }
 }

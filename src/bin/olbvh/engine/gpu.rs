@@ -1,6 +1,6 @@
 //! The engine that computes on a Vulkan device.
 
-use super::{Engine, Picture, Report, Shapes, Sink, Summary};
+use super::{Engine, OnProgress, Picture, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
 use olbvh::blocks::{self, InBlocks, Meshes, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
@@ -21,7 +21,7 @@ impl Device {
     /// kept in the user's cache folder.
     pub fn open(common: &Common) -> Outcome<Self> {
         // The device is trusted here, because the self-test follows with the target that it will have.
-        let options = GpuOptions { device: common.device.clone(), pipeline_cache: cache_file(), trust: true, ..GpuOptions::default() };
+        let options = GpuOptions { device: common.device.clone(), pipeline_cache: cache_folder(), trust: true, ..GpuOptions::default() };
         let gpu = Gpu::new(&options)?;
         let shapes = Shapes::of(common, gpu.report())?;
         let gpu = gpu.with_target(shapes.target.clone())?;
@@ -40,11 +40,11 @@ impl Device {
     }
 }
 
-/// File in which compiled pipelines are kept.
-fn cache_file() -> Option<PathBuf> {
+/// The user's cache folder of this program.
+fn cache_folder() -> Option<PathBuf> {
     let folder =
         std::env::var_os("XDG_CACHE_HOME").map(PathBuf::from).or_else(|| Some(PathBuf::from(std::env::var_os("HOME")?).join(".cache")))?;
-    Some(folder.join("olbvh").join(concat!("pipelines-", env!("CARGO_PKG_VERSION"), ".bin")))
+    Some(folder.join("olbvh"))
 }
 
 impl Engine for Device {
@@ -86,26 +86,26 @@ impl Engine for Device {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: Report<'_>) -> Result<InBlocks<Located>> {
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
         let values = field.map(|f| (f.values.as_slice(), f.on));
         blocks::locate(&self.0, self.memory(memory), asked, values, report)
     }
 
-    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
         blocks::locate_all(&self.0, self.memory(memory), asked, report)
     }
 
-    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Overlap>> {
+    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
         let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.into_parts();
         Ok(took.with(found.overlap))
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: Report<'_>) -> Result<InBlocks<Picture>> {
+    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         let (blocks::Picture { rendered, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.into_parts();
         Ok(took.with(Picture { pixels: plan.pixels(&rendered.colors), stats: rendered.stats, range, step: plan.step }))
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: Report<'_>, sink: Sink<'_>) -> Result<InBlocks> {
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks> {
         Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.into_parts().1)
     }
 }

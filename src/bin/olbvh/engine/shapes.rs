@@ -34,7 +34,7 @@ impl Shapes {
     /// row for its kind.
     pub fn of(common: &Common, device: &DeviceReport) -> Outcome<Self> {
         if let Some((wanted, named_by)) = common.wanted_target() {
-            return Self::wanted(&wanted, device).map_err(|failure| failure.about(named_by));
+            return Wanted::read(&wanted).and_then(|wanted| wanted.on(device)).map_err(|failure| failure.about(named_by));
         }
         let kind = || Self { target: Row::of(device).target(&device.room), origin: Origin::Kind };
         let Some(folder) = folder().filter(|_| !common.no_profile) else { return Ok(kind()) };
@@ -48,19 +48,41 @@ impl Shapes {
         })
     }
 
+    /// Checks that what `--target` or `OLBVH_TARGET` names exists, whatever the device.
+    pub fn check(common: &Common) -> Outcome {
+        let Some((wanted, named_by)) = common.wanted_target() else { return Ok(()) };
+        Wanted::read(&wanted).map(drop).map_err(|failure| failure.about(named_by))
+    }
+}
+
+/// A target that was asked for.
+enum Wanted {
+    /// A built-in row.
+    Row(Row),
+    /// The target of a profile in a file.
+    File(PathBuf, Target),
+}
+
+impl Wanted {
     /// The built-in row with this name, or the profile in this file.
-    fn wanted(wanted: &str, device: &DeviceReport) -> Outcome<Self> {
+    fn read(wanted: &str) -> Outcome<Self> {
         match named::<Row>(wanted) {
-            Ok(row) => Ok(Self { target: row.target(&device.room), origin: Origin::Row }),
+            Ok(row) => Ok(Self::Row(row)),
             // This is a misspelt name, not a file.
             Err(error) if !wanted.contains(['.', '/', '\\']) && !Path::new(wanted).exists() => {
                 Err(Failure::Usage(format!("{error}, or a file that `olbvh tune` saved")))
             }
-            Err(_) => {
-                let path = PathBuf::from(wanted);
-                let target = Profile::read(&path).map_err(Failure::input)?.target;
+            Err(_) => Ok(Self::File(wanted.into(), Profile::read(Path::new(wanted)).map_err(Failure::input)?.target)),
+        }
+    }
+
+    /// The target on a device, which must have room for it.
+    fn on(self, device: &DeviceReport) -> Outcome<Shapes> {
+        match self {
+            Self::Row(row) => Ok(Shapes { target: row.target(&device.room), origin: Origin::Row }),
+            Self::File(path, target) => {
                 target.check(&device.room).map_err(|e| Failure::Usage(format!("{}: {e}", path.display())))?;
-                Ok(Self { target, origin: Origin::File(path) })
+                Ok(Shapes { target, origin: Origin::File(path) })
             }
         }
     }

@@ -3,30 +3,22 @@
 // for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so that
 // this memory is likely to be cached; then anywhere in the table. (The smallest vertex of a face would not do: a vertex
 // before all its neighbours is that of all its faces, which its slots cannot hold.) mates[face] receives the other face
-// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow. Also
-// counts crowded vertices (see corners.glsl).
+// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
-#include "shared/grid.glsl"
-#include "shared/tet.glsl"
 #include "shared/mates.glsl"
-#include "shared/corners.glsl"
-ARGUMENTS(8)
+ARGUMENTS(5)
     uint tets;
     uint slots;      // of the table
     uint near_slots; // of the table per vertex, searched first
     uint share;      // tetrahedra per workgroup
 END_ARGUMENTS
-RECORDS(0, vec4, vertices)
-RECORDS(1, uvec4, cells)
-BUFFER(2, readonly, uint, bad)
-BUFFER(3, READ_WRITE, uint, table) // faces with their SIDE, or NONE; filled with NONE
-BUFFER(4, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
-BUFFER(5, READ_WRITE, MeshStatus, status)
-BUFFER(6, READ_WRITE, uint, flat_cells) // one bit per tetrahedron, set if it has no volume; zeroed
-BUFFER(7, READ_WRITE, uint, thin) // thin corners at every vertex; zeroed
+RECORDS(0, uvec4, cells)
+BUFFER(1, readonly, uint, bad)
+BUFFER(2, READ_WRITE, uint, table) // faces, or NONE; filled with NONE
+BUFFER(3, READ_WRITE, uint, mates) // of the four faces of every tetrahedron; zeroed
+BUFFER(4, READ_WRITE, MeshStatus, status)
 #include "shared/bad.glsl"
-#include "shared/vertices.glsl"
 
 const uint NEAR_PROBES = 16u;
 const uint MAX_PROBES = 8192u;
@@ -47,26 +39,13 @@ uvec3 face_of(uvec4 v, uint f) {
 }
 
 void main() {
-    uint without_volume = 0u, negative = 0u;
     uvec2 items = items_of_share(share, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);
-        Tet tet = load_tet(ids);
-        float vol = volume(tet);
-        // The sign of the volume in the caller's order of vertices follows from the parity of the permutation.
-        uvec4 r = tet.rank;
-        uint inversions = uint(r.y < r.x) + uint(r.z < r.x) + uint(r.w < r.x) + uint(r.z < r.y) + uint(r.w < r.y) + uint(r.w < r.z);
-        without_volume += uint(vol == 0.0);
-        negative += uint(vol != 0.0 && ((vol < 0.0) != ((inversions & 1u) != 0u)));
-        if (vol == 0.0) atomicOr(flat_cells.at[t >> 5u], 1u << (t & 31u));
-        for (uint corners = thin_corners(tet, vol), f = 0u; corners != 0u && f < 4u; ++f) {
-            if ((corners >> r[f] & 1u) != 0u && atomicAdd(thin.at[ids[f]], 1u) == MOST_THIN) atomicAdd(status.at[0].crowded, 1u);
-        }
         for (uint f = 0u; f < 4u; ++f) {
             uvec3 face = face_of(ids, f);
-            bool positive = (vol >= 0.0) == ((r[f] & 1u) == 1u);
-            uint me = (4u * t + f) | (positive ? SIDE : 0u);
+            uint me = 4u * t + f;
             uint h = mix_bits(face.x ^ mix_bits(face.z));
             uint near_base = min(face.y * near_slots, slots - near_slots), place, unused;
             umulExtended(h, near_slots, place, unused);
@@ -76,17 +55,16 @@ void main() {
                 place = place + 1u == near_slots ? 0u : place + 1u;
                 // Every probe is hashed anew: where the faces of many vertices crowd, long stretches of the table are
                 // full.
-                if (probe >= NEAR_PROBES) umulExtended(mix_bits(h ^ face.y ^ probe * 0x9e3779b9u), slots, slot, unused);
+                if (probe >= min(NEAR_PROBES, near_slots)) umulExtended(mix_bits(h ^ face.y ^ probe * 0x9e3779b9u), slots, slot, unused);
                 uint other = atomicCompSwap(table.at[slot], NONE, me);
                 if (other == NONE) break;
-                uint other_face = other & ~SIDE;
-                if (face_of(words(cells.at[other_face >> 2]), other_face & 3u) == face) {
-                    uint third = atomicCompSwap(mates.at[other_face], ALONE, mate(me, other));
+                if (face_of(words(cells.at[other >> 2]), other & 3u) == face) {
+                    uint third = atomicCompSwap(mates.at[other], ALONE, mate(me));
                     if (third == ALONE) {
-                        atomicMax(mates.at[4u * t + f], mate(other, me));
+                        atomicMax(mates.at[me], mate(other));
                     } else {
-                        atomicExchange(mates.at[other_face], CROWDED);
-                        atomicExchange(mates.at[4u * t + f], CROWDED);
+                        atomicExchange(mates.at[other], CROWDED);
+                        atomicExchange(mates.at[me], CROWDED);
                         if (third != CROWDED) atomicExchange(mates.at[face_of_mate(third)], CROWDED);
                     }
                     break;
@@ -94,11 +72,5 @@ void main() {
             }
             if (probe == MAX_PROBES) status.at[0].overflow = 1u;
         }
-    }
-    without_volume = subgroupAdd(without_volume);
-    negative = subgroupAdd(negative);
-    if (subgroupElect()) {
-        if (without_volume > 0u) atomicAdd(status.at[0].zero_volume, without_volume);
-        if (negative > 0u) atomicAdd(status.at[0].negative, negative);
     }
 }

@@ -1,0 +1,70 @@
+#version 460
+// Sets boundary bits (SPEC 2.3). Before that, turns the mates of faces into neighbours, in place (MATES), or, where
+// faces were matched before the points moved, parts tetrahedra from neighbours that have become bad.
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/mates.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/corners.glsl"
+#include "shared/shapes.glsl"
+layout(constant_id = 2) const uint MATES = 1;
+ARGUMENTS(7)
+    uint tets;
+    uint share; // tetrahedra per workgroup
+END_ARGUMENTS
+BUFFER(0, readonly, uint, bad)
+BUFFER(1, readonly, uint, shapes) // see shapes.glsl
+BUFFER16(2, READ_WRITE, uvec4, neighbours) // with MATES, mates on entry
+BUFFER(3, READ_WRITE, uint, boundary) // one bit per tetrahedron, zeroed
+BUFFER(4, READ_WRITE, MeshStatus, status)
+RECORDS(5, uvec4, cells)
+BUFFER(6, readonly, uint, thin) // thin corners at every vertex
+#include "shared/bad.glsl"
+
+uint shape_of(uint t) { return shapes.at[t >> 4u] >> (2u * (t & 15u)) & 3u; }
+
+bool is_crowded(uvec4 v) { return max(max(thin.at[v.x], thin.at[v.y]), max(thin.at[v.z], thin.at[v.w])) > MOST_THIN; }
+
+uvec4 neighbours_of(uint t) {
+    uvec4 held = neighbours.at[t], across;
+    for (uint f = 0u; f < 4u; ++f) {
+        if (MATES != 0u) across[f] = held[f] == ALONE || held[f] == CROWDED ? NONE : face_of_mate(held[f]) >> 2;
+        else across[f] = held[f] == NONE || is_bad(t) || is_bad(held[f]) ? NONE : held[f];
+    }
+    if (MATES != 0u || across != held) neighbours.at[t] = across;
+    return across;
+}
+
+// Whether a tetrahedron, which is not flat, lies on the positive side of the face opposite to one of its vertices.
+bool is_positive(uint shape, uvec4 ids, uint opposite) {
+    uvec4 before = uvec4(lessThan(ids, uvec4(opposite)));
+    return (shape == MIRRORED) == (((before.x + before.y + before.z + before.w) & 1u) == 0u);
+}
+
+void main() {
+    uint boundary_cells = 0u;
+    bool any_crowded = status.at[0].crowded > 0u;
+    uvec2 items = items_of_share(share, tets);
+    for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
+        uvec4 across = neighbours_of(t);
+        if (is_bad(t)) continue;
+        uvec4 ids = words(cells.at[t]);
+        uint shape = shape_of(t);
+        bool on_boundary = any(equal(across, uvec4(NONE))) || shape == FLAT || (any_crowded && is_crowded(ids));
+        uint all = ids.x ^ ids.y ^ ids.z ^ ids.w;
+        for (uint f = 0u; f < 4u && !on_boundary; ++f) {
+            // Two tetrahedra on the same side of a face are a fold, unless one of them is flat: a flat one lies on no
+            // side.
+            uint theirs = shape_of(across[f]);
+            if (theirs == FLAT) continue;
+            uvec4 v = words(cells.at[across[f]]);
+            uint opposite = v.x ^ v.y ^ v.z ^ v.w ^ all ^ ids[f];
+            on_boundary = is_positive(shape, ids, ids[f]) == is_positive(theirs, v, opposite);
+        }
+        if (on_boundary) atomicOr(boundary.at[t >> 5u], 1u << (t & 31u));
+        boundary_cells += uint(on_boundary);
+    }
+    boundary_cells = subgroupAdd(boundary_cells);
+    if (boundary_cells > 0u && subgroupElect()) atomicAdd(status.at[0].boundary, boundary_cells);
+}

@@ -1,0 +1,90 @@
+//! Settings of `olbvh render`, and what it says about pictures.
+
+#![allow(clippy::unwrap_used)]
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+use tempfile::TempDir;
+
+/// Runs the program in `folder`.
+fn olbvh(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_olbvh")).args(arguments).current_dir(folder).output().unwrap()
+}
+
+fn text(bytes: &[u8]) -> String {
+    String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// The JSON object of a run that must succeed.
+fn json(folder: &Path, arguments: &[&str]) -> Value {
+    let out = olbvh(folder, &[arguments, &["--json"]].concat());
+    assert_eq!(out.status.code(), Some(0), "{arguments:?}: {}", text(&out.stderr));
+    serde_json::from_slice(&out.stdout).unwrap()
+}
+
+const RENDER: &[&str] = &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
+
+#[test]
+fn render_takes_every_setting() {
+    let folder = TempDir::new().unwrap();
+    std::fs::write(folder.path().join("t.json"), r#"{"map": "magma", "opacity": [[0, 0], [1, 1]]}"#).unwrap();
+    let settings = [
+        "--camera -x,ortho,zoom=2",
+        "--camera azimuth=-40,elevation=10 --tf t.json",
+        "--tf inferno_r --background black --no-shading",
+        "--iso 0.3,-1,0.6 --opacity 0.5",
+        "--opacity 0:0,0.5:0.2,1:1 --range -0.5:1.5 --light -1,0,1 --outline 0",
+        "--background #ffffff,#aabbcc --opacity 0.2 --opacity-scale 2 --termination 1 --step 0.2",
+        "--background transparent --alpha 2 --assign exact --field jet --quiet",
+    ];
+    for line in settings {
+        let arguments: Vec<&str> = RENDER.iter().copied().chain(line.split(' ')).collect();
+        let out = olbvh(folder.path(), &arguments);
+        assert_eq!(out.status.code(), Some(0), "{line}: {}", text(&out.stderr));
+        assert_eq!(out.stdout.is_empty(), line.ends_with("--quiet"), "{line}");
+    }
+}
+
+#[test]
+fn what_nobody_sees_is_skipped() {
+    let folder = TempDir::new().unwrap();
+    let picture = ["render", "kuhn:24,20,16", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
+    let run = |opacity: &str| json(folder.path(), &[&picture[..], &["--opacity", opacity]].concat());
+    let (opaque, narrow) = (run("0.2"), run("0:0,0.6:0,0.65:0.9,0.7:0"));
+    let of = |result: &Value, key: &str| result[key].as_u64().unwrap();
+    assert_eq!(of(&opaque, "skipped_samples"), 0);
+    assert!(of(&narrow, "skipped_samples") > 0 && of(&narrow, "samples") < of(&opaque, "samples"), "{narrow:#}");
+    let surface = json(folder.path(), &[&picture[..], &["--iso", "0.65"]].concat());
+    assert!(of(&surface, "skipped_samples") > of(&surface, "samples") && surface["iso"].as_array().unwrap().len() == 1, "{surface:#}");
+}
+
+/// A picture that shows nothing, or not what was meant, is no failure, but it is told.
+#[test]
+fn odd_pictures_are_remarked_on() {
+    let folder = TempDir::new().unwrap();
+    let told = |more: &[&str]| {
+        let out = olbvh(folder.path(), &[RENDER, more].concat());
+        assert_eq!(out.status.code(), Some(0), "{more:?}: {}", text(&out.stderr));
+        assert!(text(&out.stdout).contains(" pixels, step 0.0138106"), "{}", text(&out.stdout));
+        text(&out.stderr)
+    };
+    let range = json(folder.path(), RENDER)["range"].as_array().unwrap().iter().map(Value::to_string).collect::<Vec<_>>();
+    let (empty, ends) = ("the picture is empty", "value of jet: its surface is speckled");
+    assert_eq!(told(&[]), "");
+    assert!(told(&["--camera", "eye=20,0,0,target=30,0,0"]).contains(empty));
+    assert!(told(&["--opacity", "0", "--outline", "0"]).contains(empty));
+    for (i, end) in ["smallest", "largest"].into_iter().enumerate() {
+        let message = told(&["--iso", &format!("0.5,{}", range[i])]);
+        assert!(message.contains(&format!("is the {end} {ends}")) && !message.contains(empty), "{message}");
+    }
+    let message = told(&["--iso", "9"]);
+    assert!(message.contains("no surface to be seen") && !message.contains(empty), "{message}");
+    let points = "POINTS 5 float 0 0 0 1 0 0 0 1 0 0 0 1 1 1 0";
+    let cells = "CELLS 2 10 4 0 1 2 3 4 0 1 4 2 CELL_TYPES 2 10 10";
+    let file = format!("# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\n{points}\n{cells}\n");
+    std::fs::write(folder.path().join("flat.vtk"), file.replace("4 0 1 4 2", "4 0 1 1 2")).unwrap();
+    let out = olbvh(folder.path(), &["render", "flat.vtk", "-o", "a.png", "--size", "9", "--device", "cpu"]);
+    assert!(text(&out.stderr).contains("flat.vtk: 1 bad cell is left out"), "{}", text(&out.stderr));
+    assert_eq!(json(folder.path(), &["render", "flat.vtk", "-o", "a.png", "--size", "9", "--device", "cpu"])["bad_cells"], 1);
+}

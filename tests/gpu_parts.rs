@@ -1,0 +1,157 @@
+//! Recording functions refuse parts of buffers that are too small for what is read from them or written to them.
+
+#![allow(clippy::unwrap_used)]
+
+use olbvh::build::{BadCells, DeviceMesh, Tree, cmd_ranges, range_bytes};
+use olbvh::error::{Error, Result};
+use olbvh::gpu::{BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::layout::RenderView;
+use olbvh::mesh::{On, kuhn};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{
+    LocateMethod, LocateOptions, LocateOutput, OwnersMemory, PointInput, PointOrder, RenderInput, RenderMemory, Rounds, Scene, SliceInput,
+    SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_locate, cmd_render, cmd_slice, cmd_sort_points,
+    cmd_visible, visible_bytes,
+};
+use olbvh::render::TABLE_SIZE;
+use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
+
+fn refused(result: Result<()>, what: &str) {
+    let Err(Error::Invalid(text)) = result else { panic!("{what}: {result:?}") };
+    assert!(text.contains(&format!("{what} in a part of")), "{what}: {text}");
+}
+
+fn less(part: BufferRef) -> BufferRef {
+    part.part(0, part.size() - 1)
+}
+
+/// A mesh, its tree, and memory of which parts are taken.
+struct Lab {
+    gpu: Gpu,
+    device: DeviceMesh,
+    tree: Tree,
+    memory: olbvh::gpu::Buffer,
+}
+
+impl Lab {
+    fn new() -> Self {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        let device = DeviceMesh::upload(&gpu, &kuhn([3; 3]).unwrap(), BadCells::Reject).unwrap();
+        let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+        let memory = gpu.buffer("olbvh.test.parts", 1 << 20).unwrap();
+        Self { gpu, device, tree, memory }
+    }
+
+    fn part(&self, bytes: u64) -> BufferRef {
+        self.memory.all().part(0, bytes)
+    }
+
+    /// Records without a command buffer.
+    fn rehearse(&self, record: impl FnOnce(&mut Recorder<'_>) -> Result<()>) -> Result<()> {
+        record(&mut Recorder::rehearse(&self.gpu))
+    }
+}
+
+#[test]
+fn points_and_their_answers() {
+    let lab = Lab::new();
+    let scene = Scene::new(&lab.device, &lab.tree).unwrap();
+    let count = 100;
+    let n = u64::from(count);
+    // The last point ends before the next one would begin.
+    let stride = 5;
+    let input =
+        PointInput { points: lab.part(4 * (5 * 99 + 3)), stride, count, hints: Some(lab.part(4 * n)), order: Some(lab.part(4 * n)) };
+    let output = LocateOutput { owners: lab.part(4 * n), barycentrics: lab.part(16 * n) };
+    let locate = |input: PointInput, output: LocateOutput| {
+        [LocateMethod::Descent, LocateMethod::Runs, LocateMethod::Sorted, LocateMethod::Traversal(8)].map(|method| {
+            let options = LocateOptions { method, ..LocateOptions::default() };
+            lab.rehearse(|r| cmd_locate(r, &scene, &input, &output, &options))
+        })
+    };
+    let each = |results: [Result<()>; 4], what: &str| results.into_iter().for_each(|result| refused(result, what));
+    locate(input, output).into_iter().for_each(Result::unwrap);
+    each(locate(PointInput { points: less(input.points), ..input }, output), "points");
+    each(locate(PointInput { hints: input.hints.map(less), ..input }, output), "hints");
+    each(locate(PointInput { order: input.order.map(less), ..input }, output), "an order of points");
+    each(locate(input, LocateOutput { owners: less(output.owners), ..output }), "owners");
+    each(locate(input, LocateOutput { barycentrics: less(output.barycentrics), ..output }), "barycentrics");
+    let none = PointInput { points: lab.part(0), count: 0, hints: Some(lab.part(0)), ..input };
+    locate(none, LocateOutput { owners: lab.part(0), barycentrics: lab.part(0) }).into_iter().for_each(Result::unwrap);
+
+    let sort = |input: PointInput, room: u32| {
+        let order = PointOrder::carve(&lab.gpu, &mut Arena::new(lab.memory.all()), room).unwrap();
+        lab.rehearse(|r| cmd_sort_points(r, lab.tree.memory().grid, &input, &order))
+    };
+    sort(input, count).unwrap();
+    refused(sort(PointInput { points: less(input.points), ..input }, count), "points");
+    refused(sort(input, count - 1), "an order of points");
+
+    let owners = |room: u32| {
+        let memory = OwnersMemory::carve(&lab.gpu, &mut Arena::new(lab.memory.all()), room).unwrap();
+        let count = |r: &mut Recorder<'_>| cmd_count_owners(r, &scene, &input, &memory, &LocateOptions::default());
+        [lab.rehearse(count), lab.rehearse(|r| cmd_list_owners(r, &scene, &input, &memory, lab.part(4)))]
+    };
+    owners(count).into_iter().for_each(Result::unwrap);
+    owners(count - 1).into_iter().for_each(|result| refused(result, "owners"));
+}
+
+#[test]
+fn fields_and_their_values() {
+    let lab = Lab::new();
+    let (scene, view, tree) = (Scene::new(&lab.device, &lab.tree).unwrap(), lab.device.view(), lab.tree.memory());
+    let (points, tets) = (u64::from(view.input.points), u64::from(view.input.tets));
+    let (count, nodes) = (100, tree.capacity.nodes);
+    let (located, values) = (LocateOutput { owners: lab.part(400), barycentrics: lab.part(1600) }, lab.part(400));
+    for (on, field) in [(On::Points, lab.part(4 * points)), (On::Cells, lab.part(4 * tets))] {
+        let interpolate = |field, located, values| lab.rehearse(|r| cmd_interpolate(r, &scene, field, on, &located, values, count));
+        interpolate(field, located, values).unwrap();
+        refused(interpolate(less(field), located, values), "a field");
+        refused(interpolate(field, LocateOutput { owners: less(located.owners), ..located }, values), "owners");
+        refused(interpolate(field, LocateOutput { barycentrics: less(located.barycentrics), ..located }, values), "barycentrics");
+        refused(interpolate(field, located, less(values)), "values");
+
+        let ranges = lab.part(range_bytes(nodes));
+        let gather = |field, ranges| lab.rehearse(|r| cmd_ranges(r, &view, tree, (field, on), ranges));
+        gather(field, ranges).unwrap();
+        refused(gather(less(field), ranges), "a field");
+        refused(gather(field, less(ranges)), "ranges");
+    }
+    let (ranges, shown, marks) = (lab.part(range_bytes(nodes)), lab.part(24), lab.part(visible_bytes(nodes)));
+    let mark = |ranges, shown, marks| lab.rehearse(|r| cmd_visible(r, tree, ranges, (shown, 3), marks));
+    mark(ranges, shown, marks).unwrap();
+    refused(mark(less(ranges), shown, marks), "ranges");
+    refused(mark(ranges, less(shown), marks), "visible values");
+    refused(mark(ranges, shown, less(marks)), "marks");
+}
+
+#[test]
+fn pictures_and_slices() {
+    let lab = Lab::new();
+    let (searched, points) = (StructureView::new(&lab.device, &lab.tree).unwrap(), u64::from(lab.device.input().points));
+    let memory = RenderMemory::carve(&mut Arena::new(lab.memory.all()), [16; 2], None).unwrap();
+    let field = (lab.part(4 * points), On::Points);
+    let short = (less(field.0), On::Points);
+    let (view, table) = (lab.part(size_of::<RenderView>() as u64), lab.part(16 * TABLE_SIZE as u64));
+    let normals = Some(lab.part(12 * points));
+    let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, visibility: None, part: None };
+    let draw = |input: RenderInput| lab.rehearse(|r| cmd_render(r, &searched, &input, &memory, Rounds::begin(1)));
+    draw(input).unwrap();
+    refused(draw(RenderInput { view: less(view), ..input }), "a view");
+    refused(draw(RenderInput { table: less(table), ..input }), "a transfer function");
+    refused(draw(RenderInput { field: short, ..input }), "a field");
+    refused(draw(RenderInput { normals: normals.map(less), ..input }), "normals");
+
+    let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
+    let half = [axis(0), axis(1), axis(2)];
+    let voxels = VoxelGrid { origin: [0.0; 3], next_voxel: axis(0), next_row: axis(1), next_layer: axis(2), half, size: [5, 5], layers: 1 };
+    let memory = SliceMemory::carve(&mut Arena::new(lab.memory.all()), [5, 5], 5).unwrap();
+    let slice = |field| {
+        let rows = Rows { layer: 0, first: 0, count: 5 };
+        let input = SliceInput { voxels: &voxels, rows, field: Some(field), extrapolate: Extrapolate::Nearest, part: None };
+        lab.rehearse(|r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(1)))
+    };
+    slice(field).unwrap();
+    refused(slice(short), "a field");
+}
