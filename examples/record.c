@@ -158,7 +158,7 @@ int main(int argc, char **argv) {
     vk(vkBeginCommandBuffer(commands, &begin), "vkBeginCommandBuffer");
     for (int rehearsal = 1; rehearsal >= 0; --rehearsal) {
         check(olbvh_recording_begin(recording, rehearsal ? 0 : (uint64_t)(uintptr_t)commands, 0, 0), "beginning");
-        check(olbvh_cmd_build(recording, scene), "recording the tree");
+        check(olbvh_cmd_build(recording, scene), "recording the tree"); /* for moved points, later: olbvh_cmd_rebuild */
         check(olbvh_cmd_ranges(recording, scene, &picture.field, picture.ranges), "recording ranges");
         check(olbvh_cmd_render(recording, scene, &picture), "recording a picture");
         check(olbvh_cmd_slice(recording, scene, &slicing), "recording a slice");

@@ -8,7 +8,7 @@ use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::View;
 use olbvh::error::Result;
-use olbvh::formats::{OutputFormat, write_png};
+use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::Fineness;
 use olbvh::render::camera::{CameraSpec, HELP};
@@ -142,7 +142,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     write_png(output.path(), settings.size[0], settings.size[1], &pixels)?;
     let json = json!({
         "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1],
-        "field": field.name, "range": [lo, hi], "iso": settings.iso,
+        "field": field.name, "range": [single(lo), single(hi)], "iso": settings.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
         "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
         "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
@@ -151,7 +151,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let text = format!(
         "{}: {} from {lo} to {hi}, {}x{} pixels, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
         args.output.display(),
-        field.name,
+        printable(&field.name),
         settings.size[0],
         settings.size[1],
         single(step),
@@ -204,12 +204,12 @@ fn remark_on_iso(iso: &[f32], field: &Field, common: &Common) -> bool {
     let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty()) else { return true };
     let seen = iso.iter().any(|iso| (lo..=hi).contains(iso));
     if !seen {
-        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", field.name));
+        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", printable(&field.name)));
     }
     for (end, what) in [(lo, "smallest"), (hi, "largest")].into_iter().filter(|(end, _)| lo < hi && iso.contains(end)) {
         common.remark(format_args!(
             "{end} is the {what} value of {}: its surface is speckled, or not to be seen; take one within {lo} to {hi}",
-            field.name
+            printable(&field.name)
         ));
     }
     seen
