@@ -56,6 +56,8 @@
 //!     cmd_locate(r, &scene, asked, found, &LocateOptions::default())
 //! } // then a barrier from compute writes to the reader of `found`, and `Recorder::finish`
 //! ```
+//! - **Moved points**: after the first frame, [`build::cmd_move_mesh`] in place of [`build::cmd_prepare_mesh`] spares the
+//!   search for neighbours, most of stage 0.
 //! - **Frames in flight**: whatever is written in every frame needs its own memory per frame in flight, or a barrier
 //!   between frames. So do descriptor pools on devices without buffer addresses. Data that does not change (cells,
 //!   fields) can be shared.
