@@ -2,26 +2,13 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod program;
+
+use program::{json, olbvh, text};
 use serde_json::Value;
 use std::path::Path;
-use std::process::{Command, Output};
+use std::process::Command;
 use tempfile::TempDir;
-
-/// Runs the program in `folder`.
-fn olbvh(folder: &Path, arguments: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_olbvh")).args(arguments).current_dir(folder).output().unwrap()
-}
-
-fn text(bytes: &[u8]) -> String {
-    String::from_utf8(bytes.to_vec()).unwrap()
-}
-
-/// The JSON object of a run that must succeed.
-fn json(folder: &Path, arguments: &[&str]) -> Value {
-    let out = olbvh(folder, &[arguments, &["--json"]].concat());
-    assert_eq!(out.status.code(), Some(0), "{arguments:?}: {}", text(&out.stderr));
-    serde_json::from_slice(&out.stdout).unwrap()
-}
 
 /// Runs the program, which must fail with `code`; returns its message.
 fn fails(folder: &Path, code: i32, arguments: &[&str]) -> String {

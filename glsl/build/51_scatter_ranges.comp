@@ -52,7 +52,7 @@ void main() {
         uint node = find_node(top, from, level, morton(at));
         at = next_candidate(box, at);
         if (node == NONE) continue;
-        // Most tetrahedra add nothing, and a read costs less than an atomic operation.
+        // A read spares those that add nothing to the node an atomic operation.
         if (ranges.at[2u * node] < lo) atomicMax(ranges.at[2u * node], lo);
         if (ranges.at[2u * node + 1u] < hi) atomicMax(ranges.at[2u * node + 1u], hi);
     }

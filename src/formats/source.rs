@@ -179,25 +179,34 @@ pub(crate) fn skip_comments(bytes: &[u8]) -> usize {
 
 /// A word of a file, made fit for a message: [`printable`], and only the start of a long one.
 pub(crate) fn excerpt(word: &[u8]) -> String {
-    let cut = &word[..word.len().min(60)];
-    let mut text = printable(&String::from_utf8_lossy(cut)).into_owned();
-    if cut.len() < word.len() {
-        text.push('…');
+    const MOST: usize = 60;
+    let cut = &word[..word.len().min(MOST)];
+    let (mut text, mut is_whole) = (String::new(), cut.len() == word.len());
+    for c in String::from_utf8_lossy(cut).chars() {
+        let escaped = c.escape_default();
+        if text.chars().count() + if is_escaped(c) { escaped.len() } else { 1 } > MOST {
+            is_whole = false;
+            break;
+        }
+        if is_escaped(c) { text.extend(escaped) } else { text.push(c) }
     }
-    text
+    text + if is_whole { "" } else { "…" }
+}
+
+/// Whether a character controls a terminal, ends a line, or turns the direction of writing.
+fn is_escaped(c: char) -> bool {
+    c.is_control() || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 /// A text made fit for a terminal, such as the name of a field, in which a file may have any characters: those that
 /// control the terminal, end the line or turn the direction of writing are escaped as in Rust (`\n`, `\u{1b}`).
 pub fn printable(text: &str) -> Cow<'_, str> {
-    let turns = |c| matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}');
-    let escaped = |c: char| c.is_control() || turns(c) || matches!(c, '\u{2028}' | '\u{2029}');
-    if !text.contains(escaped) {
+    if !text.contains(is_escaped) {
         return Cow::Borrowed(text);
     }
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        if escaped(c) { shown.extend(c.escape_default()) } else { shown.push(c) }
+        if is_escaped(c) { shown.extend(c.escape_default()) } else { shown.push(c) }
     }
     Cow::Owned(shown)
 }
@@ -214,5 +223,6 @@ mod tests {
         let long = "n".repeat(1000) + "\n";
         assert_eq!(printable(&long), "n".repeat(1000) + r"\n");
         assert_eq!((excerpt(long.as_bytes()), excerpt(b"a\x1b\xff")), ("n".repeat(60) + "…", "a\\u{1b}\u{fffd}".into()));
+        assert_eq!((excerpt(&[0; 12]), excerpt(&[0; 13])), (r"\u{0}".repeat(12), r"\u{0}".repeat(12) + "…"));
     }
 }

@@ -157,9 +157,9 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// Records the drawing of a picture. This call only records: nothing is submitted, waited for, allocated or read back.
 ///
 /// Each round takes a limited number of samples of each ray (1,024, fewer if the structure is searched for them) and
-/// skips rays that are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and the picture
-/// holds what has been gathered so far. Recording again with [`Rounds::resume`] (same input, same memory) continues the
-/// work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished.
+/// skips rays that are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and
+/// the picture holds what has been gathered so far. Recording again with [`Rounds::resume`] (same input, same memory)
+/// continues the work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished.
 ///
 /// Entry: mesh, structure and input are read by compute shaders; the flags of a structure whose nodes are skipped are
 /// also read by transfers. First use of `memory`: transfer and compute writes; when resumed, a transfer write of the

@@ -1,6 +1,7 @@
 //! A distance of samples that suits a mesh.
 
 use super::settings::DEFAULT_STEPS;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 /// Tetrahedra that are looked at, spread evenly over the mesh.
@@ -30,8 +31,8 @@ pub struct SuitedStep {
 /// The step that suits a mesh which may have thin walls, such as a plate or a pot, or consist of thin layers. `None`
 /// for a mesh without volume.
 pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep> {
-    let corner = |v: u32| points.get(v as usize).map(|p| p.map(f64::from));
-    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let corner = |v: u32| points.get(v as usize).map(|&p| Vec3::from_array(p).as_dvec3());
+    let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
     let mut found: Vec<[f64; 2]> = Vec::new();
     let every = tets.len().div_ceil(SAMPLES).max(1);
     for tet in tets.iter().step_by(every) {
@@ -41,11 +42,7 @@ pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep>
             continue;
         }
         found.push([altitude, area]);
-        for p in [a, b, c, d] {
-            for k in 0..3 {
-                (lo[k], hi[k]) = (lo[k].min(p[k]), hi[k].max(p[k]));
-            }
-        }
+        (lo, hi) = [a, b, c, d].into_iter().fold((lo, hi), |(lo, hi), p| (lo.min(p), hi.max(p)));
     }
     found.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]));
     let half = found.iter().map(|[_, area]| area).sum::<f64>() / 2.0;
@@ -54,7 +51,7 @@ pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep>
         below += area;
         below >= half
     })?;
-    let default = (0..3).map(|k| (hi[k] - lo[k]).powi(2)).sum::<f64>().sqrt() / DEFAULT_STEPS;
+    let default = (hi - lo).length() / DEFAULT_STEPS;
     // An altitude times twice the area of its face is six times the volume.
     let volume = found.iter().map(|[altitude, area]| altitude * area).sum::<f64>() / 6.0 * every as f64;
     let wall = 2.0 * volume / surface(&corner, tets);
@@ -65,7 +62,7 @@ pub fn suited_step(points: &[[f32; 3]], tets: &[[u32; 4]]) -> Option<SuitedStep>
 
 /// The area of the faces that only one tetrahedron has. In large meshes, faces are taken by their lowest vertex, and
 /// stand for the others.
-fn surface(corner: &(impl Fn(u32) -> Option<[f64; 3]> + Sync), tets: &[[u32; 4]]) -> f64 {
+fn surface(corner: &(impl Fn(u32) -> Option<DVec3> + Sync), tets: &[[u32; 4]]) -> f64 {
     let one_in = tets.len().div_ceil(SAMPLES).max(1) as u32;
     let is_taken = |v: u32| (v.wrapping_mul(0x9e37_79b9) >> 8).is_multiple_of(one_in);
     let faces = |&[a, b, c, d]: &[u32; 4]| {
@@ -84,26 +81,13 @@ fn surface(corner: &(impl Fn(u32) -> Option<[f64; 3]> + Sync), tets: &[[u32; 4]]
     all.chunk_by(|a, b| a == b).filter(|same| same.len() == 1).map(|same| area(&same[0])).sum::<f64>() * f64::from(one_in)
 }
 
-fn sub(p: [f64; 3], q: [f64; 3]) -> [f64; 3] {
-    [0, 1, 2].map(|k| p[k] - q[k])
-}
-
-fn cross(u: [f64; 3], v: [f64; 3]) -> [f64; 3] {
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-}
-
-fn dot(u: [f64; 3], v: [f64; 3]) -> f64 {
-    u[0] * v[0] + u[1] * v[1] + u[2] * v[2]
-}
-
-fn double_area(p: [f64; 3], q: [f64; 3], r: [f64; 3]) -> f64 {
-    let normal = cross(sub(q, p), sub(r, p));
-    dot(normal, normal).sqrt()
+fn double_area(p: DVec3, q: DVec3, r: DVec3) -> f64 {
+    (q - p).cross(r - p).length()
 }
 
 /// The smallest altitude, three times the volume by the area of the largest face, and twice that area.
-fn smallest_altitude([a, b, c, d]: [[f64; 3]; 4]) -> [f64; 2] {
-    let volume = dot(cross(sub(b, a), sub(c, a)), sub(d, a)).abs();
+fn smallest_altitude([a, b, c, d]: [DVec3; 4]) -> [f64; 2] {
+    let volume = (b - a).cross(c - a).dot(d - a).abs();
     let largest = double_area(a, b, c).max(double_area(a, b, d)).max(double_area(a, c, d)).max(double_area(b, c, d));
     [volume / largest, largest]
 }

@@ -13,13 +13,8 @@ use crate::options::{BuildOptions, Lists, usual_capacity};
 use crate::primitives::Arena;
 use crate::query::Scene;
 
-/// Entries per tetrahedron for which there is room by default, by the kind of lists.
-const fn default_entries(lists: Lists) -> u32 {
-    match lists {
-        Lists::Boundary => 8,
-        Lists::All => 24,
-    }
-}
+/// Entries per tetrahedron for which there is room by default, if all leaves have full lists.
+const ENTRIES: u32 = 24;
 
 /// The deepest level by default.
 const DEFAULT_LEVEL: u32 = 7;
@@ -167,7 +162,8 @@ impl OlbvhPlan {
         let level = if self.level == 0 { options.level.unwrap_or(DEFAULT_LEVEL) } else { self.level };
         let usual = usual_capacity(self.tets);
         let capacity = match (options.capacity, options.budget.take()) {
-            (None, None) => Capacity::for_entries(self.tets.saturating_mul(default_entries(options.lists)).min(MAX_ENTRIES), level),
+            (None, None) if options.lists == Lists::Boundary => Capacity::usual(self.tets, level),
+            (None, None) => Capacity::for_entries(self.tets.saturating_mul(ENTRIES).min(MAX_ENTRIES), level),
             (Some(entries), None) => Capacity::for_entries(entries, level),
             (entries, Some(bytes)) => {
                 let (within, most) = (Capacity::for_bytes(bytes, level, &options)?, entries.unwrap_or(usual));
