@@ -1,13 +1,15 @@
-//! The conformance suite as tests, with both ways of binding buffers. A test is a family of cases (for example
-//! `address sort/21-bits`), so that runners that start a process per test do not open the device a thousand times. Its
-//! message names every case that failed.
+//! The conformance suite as tests, with both ways of binding buffers. A test is one or several families of cases (for
+//! example `address sort/21-bits`), so that runners that start a process per test do not open the device a thousand
+//! times. Its message names every case that failed.
 //!
 //! The reference driver (lavapipe 25, 256 bits), and a run that names no driver, run all cases that are not `large` by
-//! address, mesh by mesh. Descriptors, other drivers, other subgroup sizes of lavapipe and validation layers run the
-//! quick cases, over a few meshes that together record every kernel. There, compiling kernels takes longer than all
-//! cases, so cases over meshes are divided by what they compute; and on SwiftShader, which compiles every kernel anew on
-//! every device that is opened, they are one family, with one mesh tested by descriptors. `OLBVH_TEST_GROUP` = `quick`,
-//! `full` or `large` overrides this.
+//! address, a large mesh or a dozen small ones per test: making all pipelines takes longer than the cases of a small
+//! mesh, even where the driver has kept what it compiled. Descriptors, other drivers, other subgroup sizes of lavapipe
+//! and validation layers run the quick cases, over a few meshes that together record every kernel. There, compiling
+//! kernels takes longer than all cases, so cases over meshes are divided by what they compute, descriptors leave out
+//! variants that have the same buffers as others; and on SwiftShader, which compiles every kernel anew on every device
+//! that is opened, they are one family, with one mesh tested by descriptors. `OLBVH_TEST_GROUP` = `quick`, `full` or
+//! `large` overrides this.
 
 mod not_run;
 
@@ -18,6 +20,10 @@ use olbvh::gpu::{Binding, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use std::env;
 
+/// Meshes whose cases take longest; each is a test of its own.
+const LONG: [&str; 5] = ["axle-40", "huge-among-small", "identical-1000", "jitter-12x13x11", "jitter-24x24x24"];
+/// Other meshes per test.
+const AT_ONCE: usize = 12;
 /// Meshes that together record every kernel, and also empty dispatches.
 const BRIEF: [&str; 6] = ["no-cells", "one-tet", "bad-cells", "jitter-12x13x11", "one-place", "cloud"];
 
@@ -32,8 +38,17 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     // Every row of the table of targets compiles all kernels anew, as gpu_targets does, which runs on all drivers, but
     // not for every subgroup size of lavapipe.
     let in_shape = |case: &Case| (binding == Binding::Address && driver.starts_with("lavapipe25-")) || !case.name.contains("/row-");
-    let mut families = grouped(group, |case| reference || !case.is_over_a_mesh() || BRIEF.contains(&case.family()) && in_shape(case));
+    // Surfaces are drawn from the same buffers as volumes.
+    let same = |case: &Case| binding == Binding::Descriptors && case.name.contains("/surfaces");
+    let in_brief = |case: &Case| BRIEF.contains(&case.family()) && in_shape(case) && !same(case);
+    let mut families = grouped(group, |case| reference || !case.is_over_a_mesh() || in_brief(case));
     if reference {
+        let short = |(name, cases): &mut (String, Vec<Case>)| cases.iter().any(Case::is_over_a_mesh) && !LONG.contains(&name.as_str());
+        let short: Vec<_> = families.extract_if(.., short).collect();
+        for some in short.chunks(AT_ONCE) {
+            let name = format!("{} and {} more", some[0].0, some.len() - 1);
+            families.push((name, some.iter().flat_map(|family| family.1.clone()).collect()));
+        }
         return families;
     }
     let over_meshes: Vec<Case> = families.extract_if(.., |(_, cases)| cases.iter().any(Case::is_over_a_mesh)).flat_map(|f| f.1).collect();

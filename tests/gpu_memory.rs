@@ -39,6 +39,21 @@ fn parts_are_cut_off() {
     assert_eq!(part.word(u64::MAX).size(), 0);
 }
 
+/// A buffer beyond the device's limit is refused with that limit, and the driver is not asked.
+#[test]
+fn too_large_a_buffer_is_refused() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let most = gpu.report().largest_buffer;
+    assert!(gpu.report().largest_allocation >= 1 << 30, "what Vulkan requires of every device");
+    let refused = |bytes| gpu.buffer("olbvh.test.large", bytes).unwrap_err().to_string();
+    if most < u64::MAX {
+        assert!(refused(most + 1).contains(&format!("holds {most} bytes at most")), "{}", refused(most + 1));
+    } else {
+        // Before Vulkan 1.3 only the driver knows.
+        assert!(refused(1 << 60).contains("olbvh.test.large"));
+    }
+}
+
 /// After a build only the tree is left, and the peak is the one planned.
 #[test]
 fn a_build_allocates_what_it_needs() {

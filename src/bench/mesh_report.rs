@@ -60,10 +60,10 @@ pub struct MeshReport {
 }
 
 impl MeshReport {
-    pub(super) fn new(name: &str, subject: &Subject<'_>) -> Self {
+    pub(super) fn new(subject: &Subject<'_>) -> Self {
         let (input, status) = (subject.device.input(), subject.device.status());
         Self {
-            name: name.into(),
+            name: subject.name.into(),
             tets: input.tets,
             points: input.points,
             boundary: status.boundary,

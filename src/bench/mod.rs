@@ -52,7 +52,7 @@ pub use suite::{Settings, Suite};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, StageTime};
 use crate::mesh::Mesh;
-use crate::reference::boundary::topology;
+use crate::reference::boundary::{Topology, topology};
 use measure::{Runs, repeat};
 use structure::{Built, Structure};
 use subject::Subject;
@@ -66,42 +66,48 @@ use verify::{Answers, check, check_tree};
 pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn(&str)) -> Result<MeshReport> {
     let settings = &whole.settings;
     progress(&format!("{name}: {} tetrahedra", mesh.tets.len()));
-    let subject = Subject::new(gpu, mesh, settings)?;
-    let mut report = MeshReport::new(name, &subject);
+    let subject = Subject::new(gpu, name, mesh, settings)?;
+    let mut report = MeshReport::new(&subject);
     let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
     let mut expected: Option<Answers> = None;
     for kind in whole.suite.kinds() {
-        let structure = match Structure::build(gpu, &subject.device, kind) {
-            Ok(Some(structure)) => structure,
-            Ok(None) => {
-                report.skip(kind, "the device traces no rays that way", progress);
-                continue;
+        match measure_structure(&subject, kind, expected.as_ref(), topology.as_ref(), whole, progress) {
+            Ok(Some((measured, answers))) => {
+                report.structures.push(measured);
+                expected.get_or_insert(answers);
             }
+            Ok(None) => report.skip(kind, "the device traces no rays that way", progress),
             // This structure is too large for the device or for 32-bit offsets; others may not be.
-            Err(error @ (Error::Memory { .. } | Error::TooLarge(_))) => {
-                report.skip(kind, &error.to_string(), progress);
-                continue;
-            }
+            Err(error) if error.is_lack_of_room() => report.skip(kind, &error.to_string(), progress),
             Err(error) => return Err(error),
-        };
-        progress(&format!("{name}: {kind}"));
-        let moved = subject.moved.as_ref().filter(|_| kind.overlaps());
-        let moved = moved.map(|moved| Structure::build(gpu, moved, kind)).transpose()?.flatten();
-        let answers = Answers::of(&subject, &structure, moved.as_ref())?;
-        if let (Structure::Octree(tree), Some(topology)) = (&structure, &topology) {
-            check_tree(&subject, topology, tree, &answers)?;
         }
-        let lost = match &expected {
-            Some(first) => check(&subject, kind, first, &answers)?,
-            None => None,
-        };
-        let mut measured = measure(&subject, kind, (&structure, moved.as_ref()), &answers, lost, settings)?;
-        measured.set_stages(&subject, &structure, &whole.copy);
-        report.structures.push(measured);
-        expected.get_or_insert(answers);
     }
     report.set_ratios();
     Ok(report)
+}
+
+/// Builds a structure, verifies its answers, and measures it; `None` if the device lacks what it needs. `expected` are the
+/// answers of the first structure, `topology` is that of a mesh for which trees are compared with the reference.
+fn measure_structure(
+    subject: &Subject<'_>,
+    kind: Kind,
+    expected: Option<&Answers>,
+    topology: Option<&Topology>,
+    whole: &Report,
+    progress: &dyn Fn(&str),
+) -> Result<Option<(StructureReport, Answers)>> {
+    let Some(structure) = Structure::build(subject.gpu, &subject.device, kind)? else { return Ok(None) };
+    progress(&format!("{}: {kind}", subject.name));
+    let moved = subject.moved.as_ref().filter(|_| kind.overlaps());
+    let moved = moved.map(|moved| Structure::build(subject.gpu, moved, kind)).transpose()?.flatten();
+    let answers = Answers::of(subject, &structure, moved.as_ref())?;
+    if let (Structure::Octree(tree), Some(topology)) = (&structure, topology) {
+        check_tree(subject, topology, tree, &answers)?;
+    }
+    let lost = expected.map(|first| check(subject, kind, first, &answers)).transpose()?.flatten();
+    let mut measured = measure(subject, kind, (&structure, moved.as_ref()), &answers, lost, &whole.settings)?;
+    measured.set_stages(subject, &structure, &whole.copy);
+    Ok(Some((measured, answers)))
 }
 
 /// Times one structure.

@@ -53,6 +53,8 @@ pub struct Report {
     pub scaling: Vec<Scale>,
     /// The meshes.
     pub meshes: Vec<MeshReport>,
+    /// Why meshes were not measured; each text begins with the mesh.
+    pub failed: Vec<String>,
 }
 
 impl Report {
@@ -74,8 +76,8 @@ impl Report {
             tunables: gpu.target().clone(),
             binding: format!("{:?}", gpu.binding()).to_lowercase(),
         };
-        let (copy, scaling, meshes) = (CopyRate::measure(gpu)?, Vec::new(), Vec::new());
-        Ok(Self { version: env!("CARGO_PKG_VERSION"), commit, suite, settings, device, copy, scaling, meshes })
+        let (copy, version) = (CopyRate::measure(gpu)?, env!("CARGO_PKG_VERSION"));
+        Ok(Self { version, commit, suite, settings, device, copy, scaling: Vec::new(), meshes: Vec::new(), failed: Vec::new() })
     }
 
     /// Adds a mesh.

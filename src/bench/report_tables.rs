@@ -179,11 +179,12 @@ fn heading(report: &Report) -> String {
 
 /// What was not measured, and why.
 fn notes(report: &Report) -> String {
-    let skipped = report
+    let structures = report
         .meshes
         .iter()
         .flat_map(|m| m.skipped.iter().map(move |(name, why)| format!("{name} over {}: not measured: {why}\n", m.name)));
-    skipped.fold(String::new(), |text, line| text + "\n" + &line)
+    let meshes = report.failed.iter().map(|why| format!("not measured: {why}\n"));
+    structures.chain(meshes).fold(String::new(), |text, line| text + "\n" + &line)
 }
 
 /// Formats the main tables for a terminal.

@@ -21,6 +21,7 @@ const MOVED: f32 = 0.137;
 /// A mesh and its queries.
 pub(super) struct Subject<'a> {
     pub gpu: &'a Gpu,
+    pub name: &'a str,
     pub mesh: &'a Mesh,
     pub device: DeviceMesh,
     /// The same mesh, moved, if the overlap is measured.
@@ -33,7 +34,7 @@ pub(super) struct Subject<'a> {
 }
 
 impl<'a> Subject<'a> {
-    pub(super) fn new(gpu: &'a Gpu, mesh: &'a Mesh, settings: &Settings) -> Result<Self> {
+    pub(super) fn new(gpu: &'a Gpu, name: &'a str, mesh: &'a Mesh, settings: &Settings) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let grid = *device.grid();
         let bounds = Bounds::from(&grid);
@@ -61,7 +62,7 @@ impl<'a> Subject<'a> {
         let voxels = (settings.slice > 0).then(|| slice.voxels(bounds.lo, bounds.hi, [0.0; 3])).transpose()?;
         let samples = plan.as_ref().map(|plan| (Quantity::LocateSamples, samples(plan, &bounds, settings.points as usize)));
         let points = [(Quantity::LocateRandom, random), (Quantity::LocateCoherent, coherent)].into_iter().chain(samples).collect();
-        Ok(Self { gpu, mesh, device, moved, points, field, plan, voxels })
+        Ok(Self { gpu, name, mesh, device, moved, points, field, plan, voxels })
     }
 
     /// Centre of a voxel of the slice, given by its index.

@@ -24,9 +24,15 @@ impl Guarded {
         Ok(Self { buffer: gpu.upload(name, &content)?, words: words.max(data.len()), name })
     }
 
-    /// Scratch memory of this many bytes, rounded up to words.
+    /// Scratch memory of this many bytes, rounded up to words. The device fills it, since it may be large.
     pub(crate) fn scratch(gpu: &Gpu, name: &'static str, bytes: u64) -> Verdict<Self> {
-        Self::new(gpu, name, &[], bytes.div_ceil(4) as usize)
+        let words = bytes.div_ceil(4);
+        let buffer = gpu.buffer(name, 4 * (words + GUARD as u64))?;
+        gpu.submit("olbvh.conformance.fill", |r| {
+            r.fill(buffer.all(), FILL);
+            Ok(())
+        })?;
+        Ok(Self { buffer, words: words as usize, name })
     }
 
     /// The buffer without its guard.

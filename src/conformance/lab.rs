@@ -9,6 +9,9 @@ use crate::error::Result;
 use crate::gpu::{Gpu, GpuOptions};
 use std::time::{Duration, Instant};
 
+/// Bytes of dropped buffers that are kept for other cases, since fresh memory costs more than most cases.
+const POOL: u64 = 256 << 20;
+
 /// How a case ended.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Outcome {
@@ -49,7 +52,7 @@ impl Lab {
     /// # Errors
     /// As [`Gpu::new`].
     pub fn new(options: &GpuOptions) -> Result<Self> {
-        let device = Gpu::new(&GpuOptions { trust: true, ..options.clone() })?;
+        let device = Gpu::new(&GpuOptions { trust: true, ..options.clone() })?.with_pool(POOL);
         Ok(Self { device, messages: 0, subject: None })
     }
 

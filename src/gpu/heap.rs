@@ -2,6 +2,7 @@
 
 use super::failed;
 use super::foundation::Foundation;
+use super::requirements::DeviceReport;
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
@@ -17,6 +18,8 @@ pub(super) struct Heap {
     pub allocator: Arc<Mutex<Allocator>>,
     /// Whether buffers have addresses.
     addresses: bool,
+    largest_buffer: u64,
+    largest_allocation: u64,
 }
 
 /// The properties of a buffer; its memory can be reused only by a buffer with the same ones.
@@ -41,9 +44,10 @@ pub(super) struct Memory {
 impl Heap {
     /// The heap of a device, with the host's allocator if there is one.
     pub fn new(foundation: &Foundation) -> Result<Arc<Self>> {
-        let addresses = foundation.report.requirements.buffer_addresses;
+        let DeviceReport { largest_buffer, largest_allocation, ref requirements, .. } = foundation.report;
+        let addresses = requirements.buffer_addresses;
         let allocator = foundation.allocator.clone().map_or_else(|| make_allocator(foundation, addresses), Ok)?;
-        Ok(Arc::new(Self { device: foundation.device.clone(), allocator, addresses }))
+        Ok(Arc::new(Self { device: foundation.device.clone(), allocator, addresses, largest_buffer, largest_allocation }))
     }
 }
 
@@ -66,6 +70,9 @@ impl Memory {
     /// Makes a buffer of `size` bytes in fresh memory. `claim` receives the bytes that it takes.
     pub fn new(heap: &Arc<Heap>, name: &str, kind: Kind, size: u64, claim: impl FnOnce(u64) -> Result<()>) -> Result<Self> {
         let error = |reason: String| Error::Memory { name: name.into(), bytes: size, reason };
+        if size > heap.largest_buffer {
+            return Err(error(format!("a buffer of this device holds {} bytes at most", heap.largest_buffer)));
+        }
         let address = if heap.addresses { vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { vk::BufferUsageFlags::empty() };
         let info = vk::BufferCreateInfo::default().size(size).usage(kind.usage | address);
         // SAFETY: plain creation; the handle is destroyed when `memory` is dropped.
@@ -78,7 +85,9 @@ impl Memory {
         let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
         let description = AllocationCreateDesc { name, requirements, location: kind.location, linear: true, allocation_scheme };
         let mut allocator = heap.allocator.lock().map_err(|_| error("the allocator's lock is poisoned".into()))?;
-        let allocation = allocator.allocate(&description).map_err(|e| error(e.to_string()))?;
+        let promised = heap.largest_allocation;
+        let beyond = if size > promised { format!("; the device promises {promised} bytes at once, no more") } else { String::new() };
+        let allocation = allocator.allocate(&description).map_err(|e| error(format!("{e}{beyond}")))?;
         drop(allocator);
         // SAFETY: fresh memory that meets the requirements, bound once.
         let bound = unsafe { heap.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset()) };

@@ -74,6 +74,10 @@ pub struct DeviceReport {
     pub kind: &'static str,
     /// Bytes of the largest device-local heap.
     pub memory: u64,
+    /// Bytes of the largest buffer; `u64::MAX` before Vulkan 1.3, where it is not stated.
+    pub largest_buffer: u64,
+    /// Bytes that one allocation is sure to be given, if there are as many; some drivers give more.
+    pub largest_allocation: u64,
     /// The requirements, checked against the device.
     pub requirements: Requirements,
 }
@@ -269,11 +273,18 @@ impl DeviceReport {
     /// As for [`Requirements::check`].
     pub(super) unsafe fn of(instance: &ash::Instance, device: vk::PhysicalDevice, requirements: Requirements) -> Self {
         let mut driver = vk::PhysicalDeviceDriverProperties::default();
-        // SAFETY: the caller promises that the handle is one of this instance; the structs live until the calls return.
+        let mut allocations = vk::PhysicalDeviceMaintenance3Properties::default();
+        let mut buffers = vk::PhysicalDeviceMaintenance4Properties::default().max_buffer_size(u64::MAX);
+        // SAFETY: the caller promises that the handle is one of this instance; the structs live until the calls return,
+        // and the one of buffers is chained only if the device knows it.
         let (properties, memory) = unsafe {
-            let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver);
+            let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut driver).push_next(&mut allocations);
             instance.get_physical_device_properties2(device, &mut properties);
-            (properties.properties, instance.get_physical_device_memory_properties(device))
+            let properties = properties.properties;
+            if properties.api_version >= vk::API_VERSION_1_3 {
+                instance.get_physical_device_properties2(device, &mut vk::PhysicalDeviceProperties2::default().push_next(&mut buffers));
+            }
+            (properties, instance.get_physical_device_memory_properties(device))
         };
         let (version, limits) = (properties.api_version, properties.limits);
         let subgroup = subgroup_of(properties.vendor_id, requirements.subgroup_sizes, requirements.subgroup_size_control);
@@ -303,6 +314,8 @@ impl DeviceReport {
                 _ => "other",
             },
             memory: heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).max().unwrap_or(0),
+            largest_buffer: buffers.max_buffer_size,
+            largest_allocation: allocations.max_memory_allocation_size,
             requirements,
         }
     }

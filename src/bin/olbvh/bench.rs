@@ -21,8 +21,8 @@ Examples:
   olbvh bench --compare a.json b.json       which times differ by more than their spread
 
 Procedural meshes: kuhn:NX,NY,NZ[,jitter=J], graded:N (cells of very different sizes), shell:N (thin walls), slivers:N (flat cells). The suite \
-determines the numbers of points, pixels and voxels, and the meshes unless MESH is given. Answers are verified before anything is timed; a wrong one \
-ends the run with code 1. Times are medians on the device (on the host if its queue has no timestamps); the JSON result has all of them, with bytes \
+determines the numbers of points, pixels and voxels, and the meshes unless MESH is given. Answers are verified before anything is timed. A mesh for which \
+one is wrong is not measured, nor is one that cannot be read or held; the others are, and the run ends with code 1. Times are medians on the device (on the host if its queue has no timestamps); the JSON result has all of them, with bytes \
 and ratios. Each stage of the construction is compared with the rate at which the device copies memory: the bytes that the stage has to read and \
 write, at the minimum, divided by its time.
 
@@ -94,21 +94,35 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     } else {
         args.meshes.iter().map(|path| (path.display().to_string(), path.clone())).collect()
     };
+    let (total, mut failures) = (meshes.len(), Vec::new());
     for (name, path) in meshes {
-        let mesh = args.read.mesh(&path, common)?.mesh;
-        if let (Some(folder), Some(Target::Folder)) = (&args.output, &target) {
-            // Only now, so that wrong arguments leave no folder.
-            std::fs::create_dir_all(folder).map_err(|source| Error::Io { path: folder.clone(), source })?;
+        let measured = args.read.mesh(&path, common).and_then(|read| {
+            let measured = measure(&gpu, &name, &read.mesh, &report, &|line| common.remark(line));
+            measured.map_err(|e| Failure::from(e).about(&name))
+        });
+        match measured {
+            Ok(measured) => report.push(measured),
+            Err(failure) => {
+                if total > 1 {
+                    common.remark(format!("not measured: {failure}"));
+                }
+                report.failed.push(failure.to_string());
+                failures.push(failure);
+            }
         }
-        let measured = measure(&gpu, &name, &mesh, &report, &|line| common.remark(line))?;
-        report.push(measured);
         // Results are written after every mesh, so that a long run that is stopped leaves those it has.
-        if let (Some(path), Some(target)) = (&args.output, &target) {
+        if let (Some(path), Some(target), false) = (&args.output, &target, report.meshes.is_empty()) {
             write(path, target, &report)?;
         }
     }
+    if report.meshes.is_empty()
+        && let Some(failure) = failures.pop()
+    {
+        return Err(failure);
+    }
     let json = serde_json::to_value(&report).map_err(|e| Failure::Failed(e.to_string()))?;
-    output::summary(common, &json, &text(&report))
+    output::summary(common, &json, &text(&report))?;
+    if failures.is_empty() { Ok(()) } else { Err(Failure::Failed(format!("{} of {total} meshes were not measured", failures.len()))) }
 }
 
 /// Compares two result files; the comparison is also written to a file, if one is named.
@@ -138,6 +152,7 @@ fn write(path: &Path, target: &Target, report: &Report) -> Outcome {
         Target::File(OutputFormat::Md) => vec![(path.to_path_buf(), markdown(report))],
         Target::File(_) => vec![(path.to_path_buf(), json)],
         Target::Folder => {
+            std::fs::create_dir_all(path).map_err(|source| Error::Io { path: path.into(), source })?;
             let plots = plots(report).into_iter();
             let tables = [("bench.json".to_owned(), json), ("bench.md".to_owned(), markdown(report))];
             plots.chain(tables).map(|(name, content)| (path.join(name), content)).collect()

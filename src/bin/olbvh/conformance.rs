@@ -138,14 +138,31 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
                 // Printed before the case runs, because a driver that crashes takes the program with it.
                 common.remark(format!("running {} ({})", case.name, name(binding)));
             }
-            runs.push((binding, lab.run(case)));
+            let report = lab.run(case);
+            if !common.json {
+                // Printed now, so that a run that is stopped has told what it found.
+                progress.pause(|| output::print(&lines(binding, &report, common.verbose)))?;
+            }
+            runs.push((binding, report));
             progress.set(runs.len() as u64, total);
         }
     }
     Ok((device, runs))
 }
 
-/// Prints the results, and returns a failure if a case has failed.
+/// What is printed about a case; empty if it passed and there is nothing more to say.
+fn lines(binding: Binding, report: &Report, verbose: bool) -> String {
+    let case = format!("{} ({})", report.name, name(binding));
+    match (&report.outcome, &report.accepted) {
+        (Ending::Failed(failure), _) => format!("FAILED  {case}\n        {failure}\n"),
+        (Ending::Skipped(why), _) => format!("skipped {case}: {why}\n"),
+        (Ending::Passed, Some(accepted)) => format!("passed  {case}\n        accepted: {accepted}\n"),
+        (Ending::Passed, None) if verbose => format!("passed  {case}, {} ms\n", report.time.as_millis()),
+        (Ending::Passed, None) => String::new(),
+    }
+}
+
+/// Prints the totals, writes the reports, and returns a failure if a case has failed.
 fn finish(args: &Args, common: &Common, device: &Value, runs: &[(Binding, Report)]) -> Outcome {
     let count = |wanted: fn(&Ending) -> bool| runs.iter().filter(|r| wanted(&r.1.outcome)).count();
     let passed = count(|o| matches!(o, Ending::Passed));
@@ -155,27 +172,13 @@ fn finish(args: &Args, common: &Common, device: &Value, runs: &[(Binding, Report
     if let Some(file) = &args.junit {
         write_junit(file, runs)?;
     }
-    let mut lines = String::new();
-    for (binding, report) in runs {
-        let _ = match &report.outcome {
-            Ending::Failed(failure) => writeln!(lines, "FAILED  {} ({})\n        {failure}", report.name, name(*binding)),
-            Ending::Skipped(why) => writeln!(lines, "skipped {} ({}): {why}", report.name, name(*binding)),
-            Ending::Passed => match &report.accepted {
-                Some(accepted) => writeln!(lines, "passed  {} ({})\n        accepted: {accepted}", report.name, name(*binding)),
-                None if common.verbose => {
-                    writeln!(lines, "passed  {} ({}), {} ms", report.name, name(*binding), report.time.as_millis())
-                }
-                None => Ok(()),
-            },
-        };
-    }
-    let _ = writeln!(lines, "{}", device["name"].as_str().unwrap_or_default());
-    let _ = writeln!(lines, "{passed} passed, {failed} failed, {skipped} skipped in {:.1} s", time.as_secs_f64());
+    let name = device["name"].as_str().unwrap_or_default();
+    let text = format!("{name}\n{passed} passed, {failed} failed, {skipped} skipped in {:.1} s\n", time.as_secs_f64());
     let json = json!({
         "device": device, "passed": passed, "failed": failed, "skipped": skipped, "seconds": time.as_secs_f64(),
         "cases": runs.iter().map(entry).collect::<Vec<_>>(),
     });
-    output::result(common, &json, &lines)?;
+    output::result(common, &json, &text)?;
     if failed > 0 { Err(Failure::Failed(format!("{failed} of {} cases failed", runs.len()))) } else { Ok(()) }
 }
 

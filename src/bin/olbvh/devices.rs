@@ -60,9 +60,13 @@ impl<'a> Listed<'a> {
             RayTracing { pipelines: true, .. } => "; ray-tracing pipelines",
             RayTracing { .. } => "",
         };
-        let memory = text::bytes(d.memory);
+        let [memory, at_once] = [d.memory, d.largest_allocation.min(d.largest_buffer).min(d.memory)].map(text::bytes);
         let mut lines = format!("{:>3}  {}\n", self.index, d.name);
-        let _ = writeln!(lines, "     {}; Vulkan {}; subgroups of {}; {memory} of memory; {}{rays}", d.driver, d.api, d.subgroup, d.kind);
+        let _ = writeln!(
+            lines,
+            "     {}; Vulkan {}; subgroups of {}; {memory} of memory, {at_once} at once; {}{rays}",
+            d.driver, d.api, d.subgroup, d.kind
+        );
         let _ = match &self.fault {
             None => writeln!(lines, "     qualifies"),
             Some(fault) => writeln!(lines, "     cannot be used; {fault}"),
@@ -84,7 +88,8 @@ impl<'a> Listed<'a> {
         });
         json!({
             "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind,
-            "memory_bytes": d.memory, "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
+            "memory_bytes": d.memory, "largest_buffer_bytes": d.largest_buffer, "largest_allocation_bytes": d.largest_allocation,
+            "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
             "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines, "target": target,
             "target_fault": self.target.as_ref().err().map(Failure::to_string),
         })

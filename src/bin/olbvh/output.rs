@@ -171,6 +171,14 @@ impl Progress {
             bar.set_position(done);
         }
     }
+
+    /// Hides the bar while something is printed.
+    pub fn pause<T>(&self, print: impl FnOnce() -> T) -> T {
+        match &self.0 {
+            Some(bar) => bar.suspend(print),
+            None => print(),
+        }
+    }
 }
 
 impl Drop for Progress {
