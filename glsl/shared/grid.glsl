@@ -20,10 +20,12 @@ vec3 from_corner(Grid g, vec3 x) {
     return vec3(canonical(d.x), canonical(d.y), canonical(d.z));
 }
 
-// Whether x may lie in a mesh: false far outside of the bounds, and for NaN.
+// Whether x may lie in a mesh: false far outside of the bounds, and for what is not finite, by its bits, since drivers
+// may compare NaN as they like.
 bool near_bounds(Grid g, vec3 x) {
     precise vec3 t = from_corner(g, x) * g.scale;
-    return all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
+    bool finite = all(notEqual(floatBitsToUint(x) & 0x7f800000u, uvec3(0x7f800000u)));
+    return finite && all(greaterThanEqual(t, vec3(-1.0))) && all(lessThanEqual(t, vec3(3.0)));
 }
 
 // The cell of the finest grid at this distance from the lower corner, in cells of that grid, clamped into the grid.

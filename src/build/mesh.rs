@@ -10,6 +10,9 @@ use crate::primitives::Arena;
 use crate::reference::boundary::{fault_of, set_bits};
 use std::sync::Arc;
 
+/// Meshes of this many tetrahedra are prepared in several submissions, since a system may end one that takes seconds.
+const LARGE: u32 = 1 << 20;
+
 /// What to do with bad cells (SPEC 2.3).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum BadCells {
@@ -90,7 +93,15 @@ impl DeviceMesh {
         let carve = |a: &mut Arena| MeshScratch::carve(a, points, tets);
         let (_memory, scratch) = Arena::reserve(gpu, "olbvh.mesh.scratch", carve)?;
         let stage0 = Stage0::new(&input, &arrays, &scratch)?;
-        let ((), time) = gpu.submit("olbvh.mesh", |r| stage0.prepare(r, given.as_ref().map(Buffer::all)))?;
+        let given = given.as_ref().map(Buffer::all);
+        let mut stages = Vec::new();
+        if tets < LARGE {
+            stages = gpu.submit("olbvh.mesh", |r| stage0.prepare(r, given))?.1.stages;
+        } else {
+            for part in 0..Stage0::PARTS {
+                stages.extend(gpu.submit("olbvh.mesh", |r| stage0.part(r, part, given))?.1.stages);
+            }
+        }
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
@@ -100,7 +111,7 @@ impl DeviceMesh {
         }
         let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
         let kept = KeptMesh { view: MeshView { input, arrays }, memory };
-        Ok(Self { gpu: gpu.clone(), kept, grid, status, stages: time.stages })
+        Ok(Self { gpu: gpu.clone(), kept, grid, status, stages })
     }
 
     /// The bad tetrahedra, which were left out, in ascending order.

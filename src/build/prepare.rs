@@ -174,16 +174,28 @@ impl<'a> Stage0<'a> {
 
     /// Everything. If `given` is a [`Grid`] over bounds that contain the mesh, that grid is used instead of a new one.
     pub fn prepare(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
+        (0..Self::PARTS).try_for_each(|part| self.part(r, part, given))
+    }
+
+    /// Number of parts that can be submitted one by one.
+    pub const PARTS: u32 = 3;
+
+    /// One part of everything.
+    pub fn part(&self, r: &mut Recorder<'_>, part: u32, given: Option<BufferRef>) -> Result<()> {
         let &MeshArrays { status, neighbours, .. } = self.arrays;
-        r.stage("mesh.clear", |r| {
-            r.fill(status, 0);
-            self.clear(r);
-            cmd_fill(r, self.scratch.table, u32::MAX)?;
-            cmd_fill(r, neighbours, 0)
-        })?;
-        self.measure(r, given)?;
-        self.match_faces(r)?;
-        self.boundary(r, 1)
+        match part {
+            0 => {
+                r.stage("mesh.clear", |r| {
+                    r.fill(status, 0);
+                    self.clear(r);
+                    cmd_fill(r, self.scratch.table, u32::MAX)?;
+                    cmd_fill(r, neighbours, 0)
+                })?;
+                self.measure(r, given)
+            }
+            1 => self.match_faces(r),
+            _ => self.boundary(r, 1),
+        }
     }
 
     /// Everything but the search for neighbours.

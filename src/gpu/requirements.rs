@@ -91,6 +91,7 @@ pub(crate) fn text(chars: &[c_char]) -> String {
 /// The properties of a device that decide whether it meets the requirements.
 struct Offer {
     api: u32,
+    driver: vk::DriverId,
     invocations: u32,
     shared_bytes: u32,
     /// Subgroup operations supported in compute shaders.
@@ -104,6 +105,10 @@ fn missing(offer: &Offer) -> Vec<String> {
     let (major, minor) = (vk::api_version_major(offer.api), vk::api_version_minor(offer.api));
     if (major, minor) < (1, 2) {
         missing.push(format!("Vulkan 1.2 (has {major}.{minor})"));
+    }
+    // Kernels size arrays by specialization constants, which it heeds since the version that brought Vulkan 1.3.
+    if offer.driver == vk::DriverId::MOLTENVK && (major, minor) < (1, 3) {
+        missing.push("MoltenVK 1.3".into());
     }
     if offer.invocations < 256 {
         missing.push(format!("256 invocations per workgroup (has {})", offer.invocations));
@@ -126,6 +131,15 @@ fn missing(offer: &Offer) -> Vec<String> {
         missing.push("a compute queue".into());
     }
     missing
+}
+
+/// The queue family to use: preferably one without graphics, since long work there does not delay the desktop, and
+/// systems let it take longer. One without timestamps could not tell what takes how long.
+fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
+    let has = |f: &vk::QueueFamilyProperties, flags| f.queue_flags.contains(flags);
+    let computes = |f: &vk::QueueFamilyProperties| has(f, vk::QueueFlags::COMPUTE);
+    let alone = families.iter().position(|f| computes(f) && !has(f, vk::QueueFlags::GRAPHICS) && f.timestamp_valid_bits > 0);
+    alone.or_else(|| families.iter().position(computes))
 }
 
 /// The subgroup size that kernels are compiled for: the usual one. Intel's usual size is the largest, 32, which leaves
@@ -156,9 +170,11 @@ impl Requirements {
     pub unsafe fn check(instance: &ash::Instance, device: vk::PhysicalDevice) -> Self {
         let mut subgroup = vk::PhysicalDeviceSubgroupProperties::default();
         let mut control = vk::PhysicalDeviceSubgroupSizeControlProperties::default();
+        let mut driver = vk::PhysicalDeviceDriverProperties::default();
         // SAFETY: the caller promises that the handle is one of this instance; the structs live until the calls return.
         let (properties, listed, families) = unsafe {
-            let mut properties = vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut control);
+            let mut properties =
+                vk::PhysicalDeviceProperties2::default().push_next(&mut subgroup).push_next(&mut control).push_next(&mut driver);
             instance.get_physical_device_properties2(device, &mut properties);
             (
                 properties.properties,
@@ -166,11 +182,11 @@ impl Requirements {
                 instance.get_physical_device_queue_family_properties(device),
             )
         };
-        let queue_family = families.iter().position(|f| f.queue_flags.contains(vk::QueueFlags::COMPUTE));
-        let queue_family = queue_family.map(|i| (i as u32, families[i].timestamp_valid_bits));
+        let queue_family = compute_family(&families).map(|i| (i as u32, families[i].timestamp_valid_bits));
         let in_compute = subgroup.supported_stages.contains(vk::ShaderStageFlags::COMPUTE);
         let missing = missing(&Offer {
             api: properties.api_version,
+            driver: driver.driver_id,
             invocations: properties.limits.max_compute_work_group_invocations,
             shared_bytes: properties.limits.max_compute_shared_memory_size,
             subgroup: if in_compute { subgroup.supported_operations } else { vk::SubgroupFeatureFlags::empty() },
@@ -336,9 +352,21 @@ mod tests {
     }
 
     #[test]
+    fn a_family_without_graphics_is_preferred() {
+        let (graphics, compute, transfer) = (vk::QueueFlags::GRAPHICS, vk::QueueFlags::COMPUTE, vk::QueueFlags::TRANSFER);
+        let family = |(flags, bits)| vk::QueueFamilyProperties { queue_flags: flags, timestamp_valid_bits: bits, ..Default::default() };
+        let chosen = |families: &[(vk::QueueFlags, u32)]| compute_family(&families.iter().copied().map(family).collect::<Vec<_>>());
+        assert_eq!(chosen(&[(graphics | compute, 64), (transfer, 64), (compute | transfer, 64)]), Some(2));
+        assert_eq!(chosen(&[(graphics | compute, 64), (compute, 0)]), Some(0), "the other one has no timestamps");
+        assert_eq!(chosen(&[(graphics, 64), (compute, 0)]), Some(1));
+        assert_eq!(chosen(&[(graphics, 64), (transfer, 64)]), None);
+    }
+
+    #[test]
     fn what_is_missing_is_named() {
         let least = || Offer {
             api: vk::API_VERSION_1_2,
+            driver: vk::DriverId::default(),
             invocations: 256,
             shared_bytes: 16384,
             subgroup: vk::SubgroupFeatureFlags::BASIC
@@ -353,7 +381,10 @@ mod tests {
         assert_eq!(missing(&Offer { shared_bytes: 8192, ..least() }), ["16 KiB of shared memory (has 8192 bytes)"]);
         let no_ballot = least().subgroup & !vk::SubgroupFeatureFlags::BALLOT;
         assert_eq!(missing(&Offer { subgroup: no_ballot, ..least() }), ["subgroup ballot operations in compute"]);
-        let nothing = Offer { api: 0, invocations: 0, shared_bytes: 0, subgroup: vk::SubgroupFeatureFlags::empty(), compute_queue: false };
+        assert_eq!(missing(&Offer { driver: vk::DriverId::MOLTENVK, ..least() }), ["MoltenVK 1.3"]);
+        assert!(missing(&Offer { driver: vk::DriverId::MOLTENVK, api: vk::API_VERSION_1_3, ..least() }).is_empty());
+        let subgroup = vk::SubgroupFeatureFlags::empty();
+        let nothing = Offer { api: 0, invocations: 0, shared_bytes: 0, subgroup, compute_queue: false, ..least() };
         assert_eq!(missing(&nothing).len(), 8);
     }
 }

@@ -106,12 +106,13 @@ impl Gpu {
             let mut recorder = Recorder::new(self, commands, timed.then_some((submission.queries, TIMESTAMPS)));
             let value = record(&mut recorder)?;
             recorder.finish()?;
-            // Makes the results visible to the host.
+            // Makes the results visible to the host, and to the submissions that follow.
             let barrier = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
-                .dst_access_mask(vk::AccessFlags::HOST_READ)];
+                .dst_access_mask(vk::AccessFlags::HOST_READ | vk::AccessFlags::MEMORY_READ | vk::AccessFlags::MEMORY_WRITE)];
             let source = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
-            device.cmd_pipeline_barrier(commands, source, vk::PipelineStageFlags::HOST, vk::DependencyFlags::empty(), &barrier, &[], &[]);
+            let target = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
+            device.cmd_pipeline_barrier(commands, source, target, vk::DependencyFlags::empty(), &barrier, &[], &[]);
             device.end_command_buffer(commands).map_err(failed("vkEndCommandBuffer"))?;
             submission.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
             let buffers = [commands];

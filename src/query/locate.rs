@@ -241,6 +241,15 @@ pub fn cmd_interpolate(
     r.stage("query.interpolate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
 }
 
+/// Entries that one submission tests if every point searches the longest list: about a second on a slow device, whose
+/// system may end work that takes longer.
+const WORK: usize = 1 << 31;
+
+/// Points that one submission locates.
+fn points_at_once(longest_leaf: u32) -> usize {
+    (WORK / (longest_leaf as usize).max(1)).clamp(1024, CHUNK)
+}
+
 /// Answers in host memory.
 #[derive(Clone, Debug, Default)]
 pub struct Located {
@@ -272,14 +281,15 @@ pub fn locate(
     let scene = Scene::new(mesh, tree)?;
     let field = field.map(|field| upload_field(mesh, field)).transpose()?;
     let mut all = Located::default();
-    let most = points.len().min(CHUNK) as u64;
+    let at_once = points_at_once(scene.longest_leaf);
+    let most = points.len().min(at_once) as u64;
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
     let values = gpu.buffer("olbvh.query.values", 4 * most)?;
     let sorted = options.method == LocateMethod::Sorted;
     let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
     let (_memory, order) = Arena::reserve(gpu, "olbvh.query.order", carve)?;
-    for chunk in points.chunks(CHUNK) {
+    for chunk in points.chunks(at_once) {
         let input = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let n = u64::from(count);
@@ -306,4 +316,15 @@ pub fn locate(
         report(all.owners.len() as u64, points.len() as u64);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn submissions_get_shorter_where_lists_get_longer() {
+        assert_eq!([0, 1, 2048].map(points_at_once), [CHUNK; 3]);
+        assert_eq!([4096, 1 << 20, u32::MAX].map(points_at_once), [CHUNK / 2, 2048, 1024]);
+    }
 }

@@ -27,8 +27,10 @@ use crate::primitives::Arena;
 use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{Effort, Overlap, members};
 
-/// Rounds of the search per submission.
-const ROUNDS: u32 = 3;
+/// Rounds of the search per submission; for large meshes one, so that no submission takes long.
+fn rounds_at_once(tets: u32) -> u32 {
+    if tets < 1 << 20 { 3 } else { 1 }
+}
 
 /// A mesh and its tree.
 #[derive(Clone, Copy, Debug)]
@@ -77,11 +79,12 @@ impl Job<'_> {
         let [a, b] = &self.scenes;
         let carve = |arena: &mut Arena| OverlapMemory::carve(arena, a, b);
         let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap", carve)?;
-        let mut rounds = Rounds::begin(ROUNDS);
+        let at_once = rounds_at_once(a.mesh.input.tets.max(b.mesh.input.tets));
+        let mut rounds = Rounds::begin(at_once);
         let statuses = loop {
             self.submit(|r, [a, b]| cmd_overlap(r, a, b, &memory, rounds))?;
             let statuses = memory.frames.statuses(self.gpu, &buffer)?;
-            rounds = Rounds::resume(ROUNDS);
+            rounds = Rounds::resume(at_once);
             let sum = |pick: fn(&OverlapStatus) -> u32| statuses.iter().map(|s| u64::from(pick(s))).sum::<u64>();
             let (waiting, unfinished) = (sum(|s| s.waiting), sum(|s| s.unfinished));
             (self.report)(waiting - unfinished, waiting);

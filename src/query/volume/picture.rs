@@ -13,8 +13,11 @@ use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, up
 use crate::render::{Plan, RenderStats, TABLE_SIZE};
 use bytemuck::Pod;
 
-/// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long.
-const STRIP: u32 = 1 << 20;
+/// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long: systems end
+/// those of GPUs after a few seconds, and integrated ones may be slower than a processor.
+fn strip(gpu: &Gpu) -> u32 {
+    if matches!(gpu.report().kind, "discrete" | "cpu") { 1 << 20 } else { 1 << 18 }
+}
 
 /// A finished picture, and what it cost; times are those of the device.
 #[derive(Clone, Debug, Default)]
@@ -99,7 +102,7 @@ impl<'a> Canvas<'a> {
             Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
         };
         let in_strips = in_strips && matches!(searched.structure, Structure::Octree(_));
-        let mut rows = if in_strips { strip_rows(plan.size) } else { plan.size[1] }.max(1);
+        let mut rows = if in_strips { strip_rows(strip(gpu), plan.size) } else { plan.size[1] }.max(1);
         while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > gpu.memory_left() - gpu.memory_left() / 4 {
             rows = rows.div_ceil(2).next_multiple_of(BLOCK);
         }
@@ -192,9 +195,9 @@ impl<'a> Canvas<'a> {
     }
 }
 
-/// Rows of a strip of about [`STRIP`] rays.
-fn strip_rows([width, height]: [u32; 2]) -> u32 {
-    (STRIP / width.max(1)).max(1).next_multiple_of(BLOCK).min(height)
+/// Rows of a strip of about this many rays.
+fn strip_rows(rays: u32, [width, height]: [u32; 2]) -> u32 {
+    (rays / width.max(1)).max(1).next_multiple_of(BLOCK).min(height)
 }
 
 /// Draws a plan of a field (values per point or per tetrahedron). `normals` has one normal per point, for shading.
@@ -213,7 +216,7 @@ pub fn render(
 ) -> Result<Rendered> {
     let [width, height] = plan.size;
     let rays = u64::from(width) * u64::from(height);
-    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(STRIP))?;
+    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(strip(mesh.gpu())))?;
     super::rays(plan.size)?;
     let mut colors = Vec::with_capacity(rays as usize);
     for row in (0..height).step_by(canvas.rows as usize) {
