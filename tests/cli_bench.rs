@@ -189,6 +189,21 @@ fn two_results_are_compared() {
     assert_eq!(bench(folder.path(), &["kuhn:2,2,2", "--compare", "a.json", "b.json"]).status.code(), Some(2));
 }
 
+/// The other meshes are measured, their results are written with what failed, and the run ends with code 1.
+#[test]
+fn a_mesh_that_fails_does_not_end_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let brief = ["--suite", "scaling", "--points", "64", "--repeat", "1", "--seconds", "0"];
+    let out = bench(folder.path(), &[&["nothing.vtu", "kuhn:1,1,1", "-o", "out.json"][..], &brief].concat());
+    let message = String::from_utf8_lossy(&out.stderr);
+    assert!(out.status.code() == Some(1) && message.contains("1 of 2 meshes could not be measured"), "{message}");
+    let report: Value = serde_json::from_str(&std::fs::read_to_string(folder.path().join("out.json")).unwrap()).unwrap();
+    assert_eq!(strings(&report["meshes"], "name"), ["kuhn:1,1,1"]);
+    let failed = report["failed"].as_array().unwrap();
+    assert!(failed.len() == 1 && failed[0].as_str().unwrap().starts_with("nothing.vtu: "), "{failed:?}");
+    assert!(String::from_utf8_lossy(&out.stdout).contains("not measured: nothing.vtu: "), "the text tells as well");
+}
+
 #[test]
 fn wrong_arguments_are_refused() {
     let folder = tempfile::tempdir().unwrap();

@@ -122,7 +122,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let json = serde_json::to_value(&report).map_err(|e| Failure::Failed(e.to_string()))?;
     output::summary(common, &json, &text(&report))?;
-    if failures.is_empty() { Ok(()) } else { Err(Failure::Failed(format!("{} of {total} meshes were not measured", failures.len()))) }
+    if failures.is_empty() { Ok(()) } else { Err(Failure::Failed(format!("{} of {total} meshes could not be measured", failures.len()))) }
 }
 
 /// Compares two result files; the comparison is also written to a file, if one is named.
