@@ -2,7 +2,7 @@
 
 use super::prepare::{MeshArrays, MeshInput, MeshScratch, MeshView, Stage0, check_tets};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
+use crate::gpu::{Buffer, BufferRef, Gpu, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{Grid, MeshStatus};
 use crate::mesh::Mesh;
@@ -94,14 +94,12 @@ impl DeviceMesh {
         let (_memory, scratch) = Arena::reserve(gpu, "olbvh.mesh.scratch", carve)?;
         let stage0 = Stage0::new(&input, &arrays, &scratch)?;
         let given = given.as_ref().map(Buffer::all);
-        let mut stages = Vec::new();
-        if tets < LARGE {
-            stages = gpu.submit("olbvh.mesh", |r| stage0.prepare(r, given))?.1.stages;
+        let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), time)| time.stages);
+        let stages = if tets < LARGE {
+            submit(&|r| stage0.prepare(r, given))?
         } else {
-            for part in 0..Stage0::PARTS {
-                stages.extend(gpu.submit("olbvh.mesh", |r| stage0.part(r, part, given))?.1.stages);
-            }
-        }
+            [submit(&|r| stage0.begin(r, given))?, submit(&|r| stage0.match_faces(r))?, submit(&|r| stage0.boundary(r, 1))?].concat()
+        };
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {

@@ -174,28 +174,21 @@ impl<'a> Stage0<'a> {
 
     /// Everything. If `given` is a [`Grid`] over bounds that contain the mesh, that grid is used instead of a new one.
     pub fn prepare(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
-        (0..Self::PARTS).try_for_each(|part| self.part(r, part, given))
+        self.begin(r, given)?;
+        self.match_faces(r)?;
+        self.boundary(r, 1)
     }
 
-    /// Number of parts that can be submitted one by one.
-    pub const PARTS: u32 = 3;
-
-    /// One part of everything.
-    pub fn part(&self, r: &mut Recorder<'_>, part: u32, given: Option<BufferRef>) -> Result<()> {
+    /// Everything before the search for neighbours.
+    pub fn begin(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
         let &MeshArrays { status, neighbours, .. } = self.arrays;
-        match part {
-            0 => {
-                r.stage("mesh.clear", |r| {
-                    r.fill(status, 0);
-                    self.clear(r);
-                    cmd_fill(r, self.scratch.table, u32::MAX)?;
-                    cmd_fill(r, neighbours, 0)
-                })?;
-                self.measure(r, given)
-            }
-            1 => self.match_faces(r),
-            _ => self.boundary(r, 1),
-        }
+        r.stage("mesh.clear", |r| {
+            r.fill(status, 0);
+            self.clear(r);
+            cmd_fill(r, self.scratch.table, u32::MAX)?;
+            cmd_fill(r, neighbours, 0)
+        })?;
+        self.measure(r, given)
     }
 
     /// Everything but the search for neighbours.
@@ -255,7 +248,7 @@ impl<'a> Stage0<'a> {
     }
 
     /// The mates of faces, in the place of neighbours.
-    fn match_faces(&self, r: &mut Recorder<'_>) -> Result<()> {
+    pub fn match_faces(&self, r: &mut Recorder<'_>) -> Result<()> {
         let MeshInput { points, cells, tets, .. } = *self.input;
         let MeshArrays { status, bad, neighbours, .. } = *self.arrays;
         let table = self.scratch.table;
@@ -271,7 +264,7 @@ impl<'a> Stage0<'a> {
     }
 
     /// Boundary bits; `mates`: 1 if the neighbours are mates of faces that are still to be named, else 0.
-    fn boundary(&self, r: &mut Recorder<'_>, mates: u32) -> Result<()> {
+    pub fn boundary(&self, r: &mut Recorder<'_>, mates: u32) -> Result<()> {
         let MeshInput { cells, tets, .. } = *self.input;
         let MeshArrays { status, bad, boundary, neighbours, .. } = *self.arrays;
         let MeshScratch { shapes, thin, .. } = *self.scratch;

@@ -133,8 +133,8 @@ fn missing(offer: &Offer) -> Vec<String> {
     missing
 }
 
-/// The queue family to use: preferably one without graphics, since long work there does not delay the desktop, and
-/// systems let it take longer. One without timestamps could not tell what takes how long.
+/// The queue family to use: preferably one without graphics, so that the desktop does not wait for long work. One
+/// without timestamps could not tell what takes how long.
 fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
     let has = |f: &vk::QueueFamilyProperties, flags| f.queue_flags.contains(flags);
     let computes = |f: &vk::QueueFamilyProperties| has(f, vk::QueueFlags::COMPUTE);

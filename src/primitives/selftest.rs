@@ -22,8 +22,9 @@ fn compare(device: &str, test: &'static str, expected: &[u32], found: &[u32]) ->
 /// Three floats for each of 64 invocations, none of whose results is denormal. First sums and products in the middle
 /// between two floats, then whatever. The third is the rounded product.
 fn operands() -> Vec<[f32; 3]> {
-    let [ulp, half] = [f32::EPSILON, f32::EPSILON / 2.0];
-    let ties = [[1.0, half], [1.0 + ulp, half], [1.0 + 64.0 * half.sqrt(), 1.0 + half.sqrt() / 64.0], [3.0, 1.0 + ulp]];
+    let one_and = |exponent: i32| 1.0 + 2f32.powi(exponent);
+    let half = 2f32.powi(-24);
+    let ties = [[1.0, half], [one_and(-23), half], [one_and(-6), one_and(-18)], [3.0, one_and(-23)]];
     let mut state = 1u32;
     let mut next = || {
         state = state.wrapping_mul(1_664_525).wrapping_add(1_013_904_223);

@@ -241,8 +241,8 @@ pub fn cmd_interpolate(
     r.stage("query.interpolate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
 }
 
-/// Entries that one submission tests if every point searches the longest list: about a second on a slow device, whose
-/// system may end work that takes longer.
+/// Most entries that one submission tests even if every point searches the longest list, unless a thousand points test
+/// more: systems end submissions that take seconds.
 const WORK: usize = 1 << 31;
 
 /// Points that one submission locates.

@@ -13,8 +13,8 @@ use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, up
 use crate::render::{Plan, RenderStats, TABLE_SIZE};
 use bytemuck::Pod;
 
-/// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long: systems end
-/// those of GPUs after a few seconds, and integrated ones may be slower than a processor.
+/// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long. Fewer for
+/// integrated GPUs, which may be slow, and whose systems end submissions that take seconds.
 fn strip(gpu: &Gpu) -> u32 {
     if matches!(gpu.report().kind, "discrete" | "cpu") { 1 << 20 } else { 1 << 18 }
 }
