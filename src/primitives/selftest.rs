@@ -4,19 +4,15 @@ use super::{Arena, Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, Groups};
 use crate::kernels::{LONGEST_LOOP, SelfTest, SelfTestSpec};
+use std::fmt::Debug;
 
 /// Pairs to sort and values to scan: several tiles, the last one partial.
 const ITEMS: u32 = 9_001;
 
-fn wrong(device: &str, test: &'static str, at: usize, expected: u32, found: u32) -> Error {
-    Error::SelfTest { device: device.into(), test, detail: format!("at {at}: expected {expected}, found {found}") }
-}
-
-fn compare(device: &str, test: &'static str, expected: &[u32], found: &[u32]) -> Result<()> {
-    match (0..expected.len()).find(|&i| found.get(i) != Some(&expected[i])) {
-        Some(i) => Err(wrong(device, test, i, expected[i], found.get(i).copied().unwrap_or(0))),
-        None => Ok(()),
-    }
+fn compare<T: Copy + Debug + Default + PartialEq>(device: &str, test: &'static str, expected: &[T], found: &[T]) -> Result<()> {
+    let Some(at) = (0..expected.len()).find(|&i| found.get(i) != Some(&expected[i])) else { return Ok(()) };
+    let (expected, found) = (expected[at], found.get(at).copied().unwrap_or_default());
+    Err(Error::SelfTest { device: device.into(), test, detail: format!("at {at}: expected {expected:?}, found {found:?}") })
 }
 
 /// Three floats for each of 64 invocations, none of whose results is denormal. First sums and products in the middle
@@ -47,10 +43,9 @@ fn check_floats(device: &str, operands: &[[f32; 3]], found: &[u32]) -> Result<()
         ("floor", |[a, ..]| (a * 64.0).floor()),
     ];
     tests.iter().zip(found.chunks_exact(64)).try_for_each(|((test, of), found)| {
-        let expected: Vec<u32> = operands.iter().map(|&triple| of(triple).to_bits()).collect();
-        // The sign of a zero decides nothing.
-        let plain = |bits: &u32| if bits << 1 == 0 { 0 } else { *bits };
-        compare(device, test, &expected.iter().map(plain).collect::<Vec<_>>(), &found.iter().map(plain).collect::<Vec<_>>())
+        let expected: Vec<f32> = operands.iter().map(|&triple| of(triple)).collect();
+        // As floats: the sign of a zero decides nothing.
+        compare(device, test, &expected, &found.iter().copied().map(f32::from_bits).collect::<Vec<_>>())
     })
 }
 
@@ -126,7 +121,7 @@ mod tests {
         assert_eq!(check(|[a, b, c]| [a + b, a * b, a * b - c, (a + b) - a, (a * 64.0).floor()]), Ok(()));
         assert!(operands.iter().all(|[a, b, _]| [a + b, a * b].iter().all(|x| x.is_normal())), "denormals may be flushed");
         let sums = |[a, b, c]: [f32; 3]| [to_zero(f64::from(a) + f64::from(b)), a * b, a * b - c, (a + b) - a, (a * 64.0).floor()];
-        assert!(check(sums).is_err_and(|e| e.contains("rounded sum")));
+        assert!(check(sums).is_err_and(|e| e.contains("rounded sum`: at 4: expected 1.0000002, found 1.0000001")));
         let products = |[a, b, c]: [f32; 3]| [a + b, to_zero(f64::from(a) * f64::from(b)), a * b - c, (a + b) - a, (a * 64.0).floor()];
         assert!(check(products).is_err_and(|e| e.contains("rounded product")));
         let fused = |[a, b, c]: [f32; 3]| [a + b, a * b, a.mul_add(b, -c), (a + b) - a, (a * 64.0).floor()];
