@@ -32,7 +32,7 @@
 /*
  Version of this interface. A header and a library with different versions are incompatible.
  */
-#define OLBVH_ABI 2
+#define OLBVH_ABI 3
 
 /*
  Result of a call.
@@ -300,6 +300,10 @@ typedef struct olbvh_picture_settings {
    The camera, in the form of `olbvh render --camera`; null: it sees the whole mesh from an oblique direction.
    */
   const char *camera;
+  /*
+   Half-spaces that are left out, each in the form of `olbvh render --clip`, separated by spaces; null: none.
+   */
+  const char *clips;
   /*
    Name of a colour map, as for `olbvh render --tf`; null: the default.
    */
@@ -613,7 +617,7 @@ typedef struct olbvh_field {
  */
 typedef struct olbvh_view {
   /*
-   Rays, light, step, range of values, and values of iso-surfaces.
+   Rays, clips, light, step, range of values, and values of iso-surfaces.
    */
   uint32_t frame[64];
   /*

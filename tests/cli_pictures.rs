@@ -16,7 +16,8 @@ fn render_takes_every_setting() {
     std::fs::write(folder.path().join("t.json"), r#"{"map": "magma", "opacity": [[0, 0], [1, 1]]}"#).unwrap();
     let settings = [
         "--camera -x,ortho,zoom=2",
-        "--camera azimuth=-40,elevation=10 --tf t.json",
+        "--camera azimuth=-40,elevation=10 --tf t.json --supersample 2",
+        "--clip -x --clip view=60% --clip 1,1,0=2.5 --clip z=1e2",
         "--tf inferno_r --background black --no-shading",
         "--iso 0.3,-1,0.6 --opacity 0.5",
         "--opacity 0:0,0.5:0.2,1:1 --range -0.5:1.5 --light -1,0,1 --outline 0",
@@ -42,6 +43,33 @@ fn what_nobody_sees_is_skipped() {
     assert!(of(&narrow, "skipped_samples") > 0 && of(&narrow, "samples") < of(&opaque, "samples"), "{narrow:#}");
     let surface = json(folder.path(), &[&picture[..], &["--iso", "0.65"]].concat());
     assert!(of(&surface, "skipped_samples") > of(&surface, "samples") && surface["iso"].as_array().unwrap().len() == 1, "{surface:#}");
+}
+
+/// The mesh has 5 x 4 x 3 cubes, and its samples lie evenly in it.
+#[test]
+fn what_is_cut_away_is_not_drawn() {
+    let folder = TempDir::new().unwrap();
+    let found = |clips: &str| {
+        let clear = ["--camera", "front,ortho", "--opacity", "0.001"];
+        let clips: Vec<&str> = clips.split_whitespace().flat_map(|clip| ["--clip", clip]).collect();
+        json(folder.path(), &[RENDER, &clear, &clips].concat())["found_samples"].as_f64().unwrap()
+    };
+    let all = found("");
+    assert!(all > 30_000.0, "{all}");
+    for (clips, part) in
+        [("x", 0.5), ("-x=4", 0.2), ("x=4", 0.8), ("y=75%", 0.75), ("view=-1", 0.75), ("0,0,2=1", 1.0 / 3.0), ("z=2 -z=1 x=40%", 0.4 / 3.0)]
+    {
+        let share = found(clips) / all;
+        assert!((share - part).abs() < 0.03, "{clips}: {share}, not {part}");
+    }
+    let out = olbvh(folder.path(), &[RENDER, &["--clip", "x=0"]].concat());
+    assert!(out.status.success() && text(&out.stderr).contains("the picture is empty"), "{}", text(&out.stderr));
+    for (wrong, why) in [("up", "`up` has no direction; a clip is DIRECTION"), ("x=y", "after `=`")] {
+        let out = olbvh(folder.path(), &[RENDER, &["--clip", wrong]].concat());
+        assert!(out.status.code() == Some(2) && text(&out.stderr).contains(why), "{}", text(&out.stderr));
+    }
+    let five = olbvh(folder.path(), &[RENDER, &["--clip", "x"].repeat(5)].concat());
+    assert!(five.status.code() == Some(2) && text(&five.stderr).contains("up to 4"), "{}", text(&five.stderr));
 }
 
 /// A picture that shows nothing, or not what was meant, is no failure, but it is told.

@@ -41,6 +41,33 @@ fn render_writes_a_picture_and_its_figures() {
     assert_eq!(names, ["a.png"], "nothing else is left");
 }
 
+/// A pixel is the mean of its rays: of black and white ones, as the mesh is seen or the background.
+#[test]
+fn rays_of_a_pixel_are_averaged() {
+    let folder = TempDir::new().unwrap();
+    let picture = |name: &str, more: &[&str]| {
+        let white = ["--tf", "grey", "--range=-9:-8", "--opacity", "1", "--opacity-scale", "1000", "--no-shading", "--background", "black"];
+        let result = json(folder.path(), &[&["render", "kuhn:5,4,3", "-o", name, "--device", "cpu"], &white[..], more].concat());
+        let file = std::io::BufReader::new(std::fs::File::open(folder.path().join(name)).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
+        let channels = reader.next_frame(&mut pixels).unwrap().color_type.samples();
+        (result, pixels.chunks(channels).map(|pixel| u32::from(pixel[0])).collect::<Vec<_>>())
+    };
+    let (rays, of_rays) = picture("rays.png", &["--size", "80x60"]);
+    let (result, of_pixels) = picture("pixels.png", &["--size", "40x30", "--supersample", "2"]);
+    assert_eq!([&result["width"], &result["height"], &result["supersample"]], [40, 30, 2]);
+    assert_eq!(result["samples"], rays["samples"], "the same rays");
+    for (i, &pixel) in of_pixels.iter().enumerate() {
+        let corner = i / 40 * 2 * 80 + i % 40 * 2;
+        let sum: u32 = [0, 1, 80, 81].iter().map(|beside| of_rays[corner + beside]).sum();
+        assert!(pixel.abs_diff(sum / 4) <= 1, "pixel {i} is {pixel}, its rays sum up to {sum}");
+    }
+    assert!(of_pixels.iter().filter(|&&pixel| (60..200).contains(&pixel)).count() > 40, "edges are smooth");
+    let message = fails(folder.path(), 2, &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "9000", "--supersample", "2"]);
+    assert!(message.contains("16384 rays"), "{message}");
+}
+
 /// Two tetrahedra with points of their own and a common face.
 #[test]
 fn points_that_coincide_are_merged_on_demand() {

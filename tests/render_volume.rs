@@ -9,7 +9,7 @@ use olbvh::query::SILENT;
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
-use olbvh::render::{Background, Bounds, RenderSettings, TransferFunction};
+use olbvh::render::{Background, Bounds, RenderSettings, RenderStats, TransferFunction};
 
 /// A jittered grid with the analytic field, moved away from the origin.
 fn grid(cells: [u32; 3]) -> Mesh {
@@ -24,10 +24,22 @@ fn settings(camera: &str) -> RenderSettings {
     RenderSettings { size: [36, 30], camera: camera.parse().unwrap(), transfer, ..RenderSettings::default() }
 }
 
-fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &RenderSettings) -> Picture {
+/// A picture with a ray per pixel, and what it cost.
+struct Drawn {
+    pixels: Vec<u8>,
+    stats: RenderStats,
+}
+
+impl Drawn {
+    fn of(scene: &Scene<'_>) -> Self {
+        let Picture { colors, stats } = render(scene, SILENT);
+        Self { pixels: scene.plan().pixels(&colors, 1), stats }
+    }
+}
+
+fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &RenderSettings) -> Drawn {
     let tree = build(mesh, topology, options).unwrap();
-    let scene = Scene::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap();
-    render(&scene, SILENT)
+    Drawn::of(&Scene::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap())
 }
 
 /// The largest difference between two pictures.
@@ -91,7 +103,7 @@ fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
     let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
     let scene = Scene::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
     let expected = brute_force(&scene, settings, &Bounds::from(&tree.grid));
-    let picture = render(&scene, SILENT);
+    let picture = Drawn::of(&scene);
     let off = picture.pixels.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
     assert!(off * 1000 <= expected.len() / 4, "{what}: {off} of {} pixels differ", expected.len() / 4);
     assert!(picture.stats.found_samples > 1000, "{what}: an empty picture proves nothing");
@@ -105,6 +117,10 @@ fn pictures_agree_with_brute_force() {
     }
     let plain = RenderSettings { shading: false, background: Background::Transparent, opacity_scale: 3.0, ..settings("iso") };
     assert_as_brute_force("without shading", &mesh, &plain);
+    for clips in ["view", "x=60% -x=90% 1,2,3=60%"] {
+        let clips = clips.split_whitespace().map(|clip| clip.parse().unwrap()).collect();
+        assert_as_brute_force("clipped", &mesh, &RenderSettings { clips, ..settings("iso") });
+    }
     assert_as_brute_force("coarse step", &mesh, &RenderSettings { step: Some(0.21), termination: 0.7, ..settings("iso") });
 }
 
@@ -126,8 +142,8 @@ fn skipped_samples_have_nothing_to_add() {
             let settings = RenderSettings { range: (on == On::Cells).then_some([0.0, 7.7]), ..peak(camera) };
             let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
             let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-            let picture = render(&scene, SILENT);
-            let every = render(&scene.without_skipping(), SILENT);
+            let picture = Drawn::of(&scene);
+            let every = Drawn::of(&scene.without_skipping());
             assert_eq!(picture.pixels, every.pixels, "{camera} {on:?}");
             assert!(picture.stats.skipped_samples > 0 && every.stats.skipped_samples == 0, "{camera} {on:?}");
             assert!(picture.stats.samples < every.stats.samples, "{camera} {on:?}: {} of {}", picture.stats.samples, every.stats.samples);
@@ -161,7 +177,7 @@ fn surfaces_of_a_linear_field_are_planes() {
     mesh.fields = vec![Field { name: "linear".into(), on: On::Points, values: mesh.points.iter().map(|&p| value(p)).collect() }];
     let topology = topology(&mesh).unwrap();
     let isos = [-2.0, 0.5];
-    for (opacity, shading) in [(None, true), (Some(0.5), false)] {
+    for (opacity, shading, clips) in [(None, true, ""), (Some(0.5), false, ""), (Some(0.5), false, "view=80% 0.3,-1,0.2=85%")] {
         let mut transfer = TransferFunction::named("viridis").unwrap();
         if let Some(opacity) = opacity {
             transfer = transfer.with_opacity(vec![(0.0, opacity), (1.0, opacity)]).unwrap();
@@ -169,6 +185,7 @@ fn surfaces_of_a_linear_field_are_planes() {
         let settings = RenderSettings {
             transfer,
             iso: vec![isos[1], isos[0], isos[1]],
+            clips: clips.split_whitespace().map(|clip| clip.parse().unwrap()).collect(),
             shading,
             outline: 0.0,
             step: Some(0.05),
@@ -177,7 +194,7 @@ fn surfaces_of_a_linear_field_are_planes() {
         };
         let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
         let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-        let picture = render(&scene, SILENT);
+        let picture = Drawn::of(&scene);
         assert!(picture.stats.skipped_samples > 1000, "{}", picture.stats.skipped_samples);
         for options in [
             BuildOptions { alpha: 1.0, assign: Assign::Exact, ..BuildOptions::default() },
@@ -195,9 +212,13 @@ fn surfaces_of_a_linear_field_are_planes() {
             let mut hits: Vec<(f32, f32)> = isos.iter().map(|&iso| ((iso - value(origin)) / rise, iso)).collect();
             hits.sort_by(|a, b| a.0.total_cmp(&b.0));
             let depth = |t: f32| {
-                (0..3).map(|c| origin[c] + t * direction[c]).enumerate().map(|(c, x)| (x - lo[c]).min(hi[c] - x)).fold(f32::MAX, f32::min)
+                let at = [0, 1, 2].map(|c| origin[c] + t * direction[c]);
+                let beside = plan.clips.iter().map(|n| n[3] - (0..3).map(|c| n[c] * at[c]).sum::<f32>());
+                (0..3).map(|c| (at[c] - lo[c]).min(hi[c] - at[c])).chain(beside).fold(f32::MAX, f32::min)
             };
-            if hits.iter().any(|&(t, _)| depth(t).abs() < 1e-4) {
+            // A wedge between clips may be thinner than a step, without any sample.
+            let is_sampled = || (0..300).any(|k| depth((k as f32 + 0.5) * plan.step) > 0.0);
+            if hits.iter().any(|&(t, _)| depth(t).abs() < 1e-4) || !clips.is_empty() && !is_sampled() {
                 continue;
             }
             let what = format!(

@@ -132,9 +132,9 @@ void main() {
         if (stands) enter(state.hint);
         for (uint work = 0u; state.next < count && work < BUDGET; ++work) {
             // Voxel after voxel, as long as strides succeed: the structure is not searched, and mostly no other
-            // tetrahedron is read.
+            // tetrahedron is read. Walks are not cut short, so that owners do not depend on the budget.
             uint misses = 0u;
-            for (; stands && state.next < count && work < BUDGET; ++work) {
+            for (; stands && state.next < count && (work < BUDGET || misses > 0u); ++work) {
                 vec3 at = voxel_centre(plan, row_origin(plan, row), column);
                 if (!is_ours(g, at)) break;
                 vec3 x = normalise(g, at);

@@ -13,6 +13,7 @@
 #include "shared/rays.glsl"
 layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint PART = 0;
+layout(constant_id = 4) const uint ISO = 0;
 ARGUMENTS(6 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
@@ -30,6 +31,7 @@ RenderPlan plan;
 vec3 origin, inverse_direction;
 float first, last;
 float entered, left;
+#include "shared/clip.glsl"
 
 // Where the ray enters and leaves the slabs between the sides of a box.
 struct Slabs {
@@ -210,8 +212,12 @@ void main() {
         if (first <= last && !opaque) {
             precise float begin = floor(clamp(first * view.inverse_step - 1.5, 0.0, MAX_SAMPLES));
             precise float end = floor(clamp(last * view.inverse_step + 1.5, 0.0, MAX_SAMPLES));
-            state.next = uint(begin);
-            state.end = uint(end);
+            // Sample k lies k + 1/2 steps from the origin. Iso-surfaces also lie between samples, up to a clip.
+            vec2 kept = kept_stretch(origin, direction);
+            float more = ISO != 0u ? 1.0 : 0.0;
+            precise float first_kept = ceil(kept.x - 0.5) - more, behind_kept = floor(kept.y - 0.5) + 1.0 + more;
+            state.next = uint(max(begin, first_kept));
+            state.end = max(uint(max(min(end, behind_kept), 0.0)), state.next);
         }
         if (PART != 0u) state = go_on(state, states.at[i], direction);
     }

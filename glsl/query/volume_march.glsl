@@ -32,6 +32,7 @@ STRUCTURE(10)
 
 RenderView view;
 RenderPlan plan;
+#include "shared/clip.glsl"
 #include "shared/skip.glsl"
 #include "shared/held.glsl"
 
@@ -40,6 +41,7 @@ const uint BURST = 32u; // passes along walks before rays that wait for the stru
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;
+vec2 unclipped; // the stretch that no clip leaves out
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
@@ -167,8 +169,8 @@ void find_ends(uint k, Sides here, float value, bool joins, out Place from, out 
     to = place_beside(to, way_within(here.w, next.w), rise);
 }
 
-// Adds the surfaces between two places of the ray, between which the value is linear. Light takes them to lie in the
-// stand.
+// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip. Light
+// takes them to lie in the stand.
 void add_surfaces(Place from, Place to) {
     Grid g = grid.at[0];
     bool rises = from.rank < to.rank;
@@ -176,7 +178,9 @@ void add_surfaces(Place from, Place to) {
         float iso = view.iso[rises ? i : i - 1u];
         precise float rise = clamp(to.value - from.value, -1e37, 1e37);
         precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - from.value) * reciprocal(rise), 0.0, 1.0);
-        precise float s = (from.at + (to.at - from.at) * part) * view.step_size;
+        precise float steps = from.at + (to.at - from.at) * part;
+        if (steps < unclipped.x || steps > unclipped.y) continue;
+        precise float s = steps * view.step_size;
         precise vec3 at = origin + direction * s;
         vec4 b = max(barycentric(sides_of(stand, normalise(g, at))), vec4(0.0));
         precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
@@ -258,18 +262,19 @@ void main() {
             halfway = unit;
         }
         inverse_direction = inverse_of(direction);
+        unclipped = kept_stretch(origin, direction);
         bool stands = state.tet != NONE && state.cursor == 0u;
         if (stands) enter(state.tet);
         ahead = 1u;
-        uint misses = 0u; // steps of the walk to the next sample
         uint known = state.check >> 30u; // flags of the best candidate
         state.check &= 0x3fffffffu;
         for (uint work = 0u; state.next < state.end && work < budget; ++work) {
             // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed.
             // Rays wait until all of the subgroup stand in the mesh, and then walk together; to iso-surfaces, walks are
-            // too short for that.
+            // too short for that. Walks are not cut short, so that owners do not depend on when a ray has to wait.
             bool walks = ISO != 0u || subgroupAll(stands);
-            for (uint pass = 0u; pass < BURST && walks && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
+            uint misses = 0u; // steps of the walk to the next sample
+            for (uint pass = 0u; (pass < BURST || misses > 0u) && walks && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
                 vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
                 Sides sides = sides_of(stand, x);
                 if (!sides.clear) {
@@ -302,7 +307,6 @@ void main() {
             if (stands || state.next >= state.end || is_to_look()) continue;
             vec3 at = sample_at(view, origin, direction, state.next);
             vec3 x = normalise(g, at);
-            misses = 0u;
             uint owner = NONE;
             // Outside of the bounds there is nothing to find.
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {

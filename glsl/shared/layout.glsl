@@ -58,8 +58,10 @@ struct RenderView {
     float value_scale; // Places of the table per unit of value.
     float termination; // A ray ends once it is this opaque.
     uint isos;       // Number of iso-surfaces.
-    uint pad[2];     // Unused.
+    uint clips;      // Number of clips.
+    uint pad;        // Unused.
     float iso[8];    // Values of the iso-surfaces, ascending.
+    vec4 clip[4];    // Planes beyond which nothing is drawn: unit normal n, and d. Points p with n·p ≤ d are kept.
 };
 
 // What the device computes from a view.

@@ -170,6 +170,10 @@ impl Job<'_> {
         // More than the distance by which rounding can move samples out of their cells.
         let more = self.source.extent() / 1024.0;
         let box_around = [lo.map(|x| x - more), hi.map(|x| x + more)];
+        // Iso-surfaces on this side of a clip may need a sample beyond it.
+        if plan.iso.is_empty() && plan.clips.iter().any(|&clip| is_beyond(clip, box_around)) {
+            return vec![false; height as usize];
+        }
         let seen = |x: u32, y: u32| rays.colors[(y as usize) * width as usize + x as usize][3] < plan.termination;
         (0..height).into_par_iter().map(|y| any_meets(&plan.rays, box_around, 0..width, y, &|x| seen(x, y))).collect()
     }
@@ -180,6 +184,12 @@ const NO_RANGE: [f32; 2] = [f32::INFINITY, f32::NEG_INFINITY];
 
 fn union(a: [f32; 2], b: [f32; 2]) -> [f32; 2] {
     [a[0].min(b[0]), a[1].max(b[1])]
+}
+
+/// Whether a box lies beyond a clip as a whole.
+fn is_beyond([x, y, z, d]: [f32; 4], [lo, hi]: [[f64; 3]; 2]) -> bool {
+    let nearest: f64 = [x, y, z].into_iter().map(f64::from).zip(lo.into_iter().zip(hi)).map(|(n, (lo, hi))| (n * lo).min(n * hi)).sum();
+    nearest > f64::from(d)
 }
 
 /// Whether any of these pixels of a row is `seen` and has a ray that may meet a box. Spans of pixels are halved as long

@@ -24,6 +24,8 @@ pub struct OlbvhPictureSettings {
     pub height: u32,
     /// The camera, in the form of `olbvh render --camera`; null: it sees the whole mesh from an oblique direction.
     pub camera: *const c_char,
+    /// Half-spaces that are left out, each in the form of `olbvh render --clip`, separated by spaces; null: none.
+    pub clips: *const c_char,
     /// Name of a colour map, as for `olbvh render --tf`; null: the default.
     pub colors: *const c_char,
     /// Opacity, in the form of `olbvh render --opacity`; null: `olbvh_render` adapts it to the field, `olbvh_view_make`
@@ -93,6 +95,9 @@ impl OlbvhPictureSettings {
         }
         if let Some(camera) = text(self.camera) {
             settings.camera = camera.parse()?;
+        }
+        if let Some(clips) = text(self.clips) {
+            settings.clips = clips.split_whitespace().map(str::parse).collect::<Result<_>>()?;
         }
         if let Some(colors) = text(self.colors) {
             settings.transfer = TransferFunction::named(&colors)?;
@@ -217,12 +222,13 @@ pub extern "C" fn olbvh_locate(
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_default_picture_settings() -> OlbvhPictureSettings {
     let RenderSettings { size: [width, height], opacity_scale, termination, shading, outline, light, .. } = RenderSettings::default();
-    let [camera, colors, opacity] = [std::ptr::null(); 3];
+    let [camera, clips, colors, opacity] = [std::ptr::null(); 4];
     let (iso, iso_count, range, step, shading) = ([0.0; 8], 0, [1.0, 0.0], 0.0, u32::from(shading));
     OlbvhPictureSettings {
         width,
         height,
         camera,
+        clips,
         colors,
         opacity,
         iso,

@@ -4,6 +4,7 @@ use super::failure::{Verdict, compare, compare_one, fail};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
+use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
@@ -17,6 +18,8 @@ use crate::render::{Plan, RenderSettings, TransferFunction};
 pub(crate) struct PictureCase {
     pub mesh: MeshRecipe,
     pub camera: &'static str,
+    /// Half-spaces that are left out, separated by spaces.
+    pub clips: &'static str,
     pub on: On,
     pub shading: bool,
     /// Opacity points; `None`: opacities that fit the field.
@@ -46,6 +49,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
     let settings = RenderSettings {
         size: [40, 34],
         camera: case.camera.parse()?,
+        clips: case.clips.split_whitespace().map(str::parse).collect::<Result<_>>()?,
         shading: case.shading,
         transfer,
         iso: case.iso.to_vec(),
@@ -62,13 +66,13 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let normals = &scene.prepared.normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
         let drawn = render(device, &tree, plan, (&field.values, field.on), normals, SILENT)?;
-        let pixels = plan.pixels(&drawn.colors);
+        let pixels = plan.pixels(&drawn.colors, 1);
         let expected = draw(&scene, SILENT);
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // Ray intervals depend on the leaves of the tree, the picture does not.
         compare_one(&stage, "found samples", &expected.stats.found_samples, &drawn.stats.found_samples)?;
         compare_one(&stage, "skipped samples", &expected.stats.skipped_samples, &drawn.stats.skipped_samples)?;
-        near(&stage, "pixels", &expected.pixels, &pixels, 2, 1)?;
+        near(&stage, "pixels", &plan.pixels(&expected.colors, 1), &pixels, 2, 1)?;
         // The colours must equal, to the bit, those of pictures that are drawn in other ways.
         let mut others = Vec::new();
         let hides = plan.hides(&field.values);

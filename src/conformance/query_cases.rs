@@ -37,6 +37,8 @@ const PEAK: &str = "0:0,0.3:0,0.33:0.8,0.36:0,0.7:0,0.7:0.1,0.72:0.1,0.72:0,1:0"
 const PEAKED: &str = "jitter-12x13x11";
 /// A camera in this mesh, with a wide angle.
 const WITHIN: &str = "eye=6.3,6.1,5.2,target=1,2,11,fov=110";
+/// Clips across the view and, from the top, along it.
+const CLIPS: &str = "view=60% x=70%";
 /// Meshes that are drawn.
 const DRAWN: [&str; 5] = ["one-tet", "kuhn-5x3x7", "jitter-12x13x11", "two-apart", "renumbered"];
 
@@ -68,18 +70,21 @@ pub(super) fn add(cases: &mut Vec<Case>) {
         }
         // Iso-surfaces that are seen through one another, and opaque ones.
         let surfaces: &[f32] = &[0.2, -0.3, 0.9];
-        for (camera, opacity, iso, parts) in [
-            ("iso", Some(PEAK), &[][..], false),
-            ("top,ortho", Some(PEAK), &[], false),
-            (WITHIN, Some(PEAK), &[], false),
-            ("front", Some(PEAK), &[], true),
-            ("iso", Some("0.4"), surfaces, true),
-            ("top,ortho", None, surfaces, false),
+        for (camera, clips, opacity, iso, parts) in [
+            ("iso", "", Some(PEAK), &[][..], false),
+            ("top,ortho", "", Some(PEAK), &[], false),
+            (WITHIN, "", Some(PEAK), &[], false),
+            ("front", "", Some(PEAK), &[], true),
+            ("iso", "", Some("0.4"), surfaces, true),
+            ("top,ortho", "", None, surfaces, false),
+            ("iso", CLIPS, Some(PEAK), &[], true),
+            ("top,ortho", CLIPS, Some(PEAK), &[], false),
+            ("iso", CLIPS, Some("0.4"), surfaces, true),
         ]
         .into_iter()
         .filter(|_| mesh.name == PEAKED)
         {
-            add_picture(cases, Group::Quick, PictureCase { mesh, camera, on: On::Points, shading: true, opacity, iso, parts });
+            add_picture(cases, Group::Quick, PictureCase { mesh, camera, clips, on: On::Points, shading: true, opacity, iso, parts });
         }
     }
 }
@@ -94,7 +99,7 @@ pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     add_picture(
         cases,
         Group::Quick,
-        PictureCase { mesh, camera: "iso", on: On::Points, shading: true, opacity: None, iso: &[], parts: false },
+        PictureCase { mesh, camera: "iso", clips: "", on: On::Points, shading: true, opacity: None, iso: &[], parts: false },
     );
     add_ranges(cases, RangesCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists: Lists::All, on: On::Points });
     add_slices(cases, mesh);
@@ -119,15 +124,16 @@ fn add_pictures(cases: &mut Vec<Case>, mesh: MeshRecipe) {
     for camera in ["iso", "top,ortho"] {
         for (on, shading) in [(On::Points, true), (On::Points, false), (On::Cells, false)] {
             let group = if camera == "iso" && shading { mesh.group } else { Group::Full };
-            add_picture(cases, group, PictureCase { mesh, camera, on, shading, opacity: None, iso: &[], parts: false });
+            add_picture(cases, group, PictureCase { mesh, camera, clips: "", on, shading, opacity: None, iso: &[], parts: false });
         }
     }
 }
 
 fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
-    let PictureCase { mesh, camera, on, shading, opacity, iso, parts } = case;
+    let PictureCase { mesh, camera, clips, on, shading, opacity, iso, parts } = case;
     let camera = if camera == WITHIN { "within" } else { camera.split(',').next().unwrap_or(camera) };
     let parts = if parts { "/parts" } else { "" };
+    let clipped = if clips.is_empty() { "" } else { "/clipped" };
     let light = if shading { "/shaded" } else { "" };
     let transfer = if !iso.is_empty() {
         "/surfaces"
@@ -136,7 +142,7 @@ fn add_picture(cases: &mut Vec<Case>, group: Group, case: PictureCase) {
     } else {
         ""
     };
-    push(cases, format!("render/{}/{camera}/{}{light}{transfer}{parts}", mesh.name, values(on)), group, Work::Picture(case));
+    push(cases, format!("render/{}/{camera}/{}{light}{transfer}{clipped}{parts}", mesh.name, values(on)), group, Work::Picture(case));
 }
 
 fn values(on: On) -> &'static str {

@@ -275,7 +275,8 @@ fn cmd_intervals(
     visible: Option<Visible>,
 ) -> Result<()> {
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
-    let (mesh, arrays, stack, part) = (&searched.mesh.input, &searched.mesh.arrays, STACK, u32::from(input.cells().is_some()));
+    let (mesh, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
+    let (stack, part, iso) = (STACK, u32::from(input.cells().is_some()), u32::from(input.iso));
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
         dispatch!(r, groups, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
@@ -285,7 +286,7 @@ fn cmd_intervals(
             states: memory.rays,
             colors: memory.colors,
             items: rays,
-        }, { stack, part })
+        }, { stack, part, iso })
     })
 }
 

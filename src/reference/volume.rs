@@ -27,11 +27,11 @@ use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// A finished picture, and what it cost.
+/// What rays gather, and what it cost.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
-    /// Straight RGBA, 8 bits per channel, row 0 on top.
-    pub pixels: Vec<u8>,
+    /// Premultiplied colour and opacity per ray, row 0 on top.
+    pub colors: Vec<[f32; 4]>,
     /// Numbers of samples, and times.
     pub stats: RenderStats,
 }
@@ -109,15 +109,14 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();
-    let row = |(y, pixels): (usize, &mut [u8])| {
+    let row = |(y, colors): (usize, &mut [[f32; 4]])| {
         let y = y as u32;
         let begin = Instant::now();
         let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y))).collect();
         let middle = Instant::now();
         let mut marcher = Marcher::new(scene);
-        for (x, (span, pixel)) in spans.into_iter().zip(pixels.chunks_exact_mut(4)).enumerate() {
-            let color = marcher.march(plan.rays.ray(x as u32, y), span);
-            pixel.copy_from_slice(&plan.background.pixel(color, y, height));
+        for (x, (span, color)) in spans.into_iter().zip(colors).enumerate() {
+            *color = marcher.march(plan.rays.ray(x as u32, y), span);
         }
         interval_ns.fetch_add((middle - begin).as_nanos() as u64, Ordering::Relaxed);
         march_ns.fetch_add(middle.elapsed().as_nanos() as u64, Ordering::Relaxed);
@@ -126,8 +125,8 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
         found.fetch_add(marcher.found_samples, Ordering::Relaxed);
         report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height));
     };
-    let mut pixels = vec![0; width as usize * height as usize * 4];
-    pixels.par_chunks_exact_mut(width as usize * 4).enumerate().for_each(row);
+    let mut colors = vec![[0.0; 4]; width as usize * height as usize];
+    colors.par_chunks_exact_mut(width as usize).enumerate().for_each(row);
     // Both stages run side by side on all threads, so the elapsed time is divided in proportion to the time that the
     // threads spent in each.
     let share = |part: &AtomicU64| {
@@ -138,5 +137,5 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
     let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
     let ranges_ms = scene.ranges_ms;
-    Picture { pixels, stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 } }
+    Picture { colors, stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 } }
 }

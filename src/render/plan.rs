@@ -1,6 +1,7 @@
 //! The settings of a picture evaluated for one mesh and field: everything that the kernels and the reference renderer
 //! need.
 
+use super::clip::MAX_CLIPS;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::visible_values::visible_values;
 use super::{
@@ -8,7 +9,7 @@ use super::{
     shading_normals,
 };
 use crate::error::{Error, Result};
-use crate::grid::{canonical, two_to};
+use crate::grid::{canonical, reciprocal, two_to};
 use crate::layout::{Grid, RenderView};
 use crate::mesh::{Field, Mesh, On};
 use glam::DVec3;
@@ -23,10 +24,13 @@ const MAX_DISTANCE: f64 = 1e9;
 /// flags from bit 30 on.
 pub const MAX_SAMPLES: u32 = 1 << 23;
 
+/// A clip whose normal is as good as across a ray does not meet it.
+pub const PARALLEL: f32 = 1e-20;
+
 /// A picture to draw.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Plan {
-    /// Width and height in pixels.
+    /// Width and height in rays: in pixels, unless a pixel has several.
     pub size: [u32; 2],
     /// The rays.
     pub rays: RayGrid,
@@ -43,6 +47,8 @@ pub struct Plan {
     pub visible_values: Vec<[f32; 2]>,
     /// Values of the iso-surfaces that are drawn instead of the volume, ascending and distinct.
     pub iso: Vec<f32>,
+    /// Planes (unit normal n, and d) beyond which nothing is drawn: only points p with n·p ≤ d are.
+    pub clips: Vec<[f32; 4]>,
     /// Opacity at which a ray ends.
     pub termination: f32,
     /// The light; `None`: colours are not lit.
@@ -63,14 +69,20 @@ impl Plan {
         settings.check()?;
         let [width, height] = settings.size.map(f64::from);
         let camera = settings.camera.resolve(bounds, origin, width / height)?;
-        Self::with_camera(settings, &camera, bounds, field_range)
+        Self::with_camera(settings, &camera, bounds, origin, field_range)
     }
 
     /// As [`Plan::new`], but with `camera` instead of the camera of the settings.
     ///
     /// # Errors
     /// As [`Plan::new`].
-    pub fn with_camera(settings: &RenderSettings, camera: &Camera, bounds: &Bounds, field_range: Option<[f32; 2]>) -> Result<Self> {
+    pub fn with_camera(
+        settings: &RenderSettings,
+        camera: &Camera,
+        bounds: &Bounds,
+        origin: [f64; 3],
+        field_range: Option<[f32; 2]>,
+    ) -> Result<Self> {
         settings.check()?;
         let diagonal = bounds.diagonal();
         let step = settings.step.unwrap_or(diagonal / DEFAULT_STEPS);
@@ -108,6 +120,7 @@ impl Plan {
                 reach / f64::from(MAX_SAMPLES)
             ));
         }
+        let clips = settings.clips.iter().map(|clip| clip.resolve(bounds, origin, camera)).collect::<Result<_>>()?;
         let [right, up, back] = settings.light.map(f64::from);
         let to_light = (camera.right * right + camera.up * up - camera.forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
         let range = value_range(settings.range.or(settings.transfer.range()).or(field_range));
@@ -136,6 +149,7 @@ impl Plan {
             visible_values: if surfaces { iso.iter().map(|&v| [v; 2]).collect() } else { visible_values(&table, value_lo, value_scale) },
             table,
             iso,
+            clips,
             termination: settings.termination,
             lighting: settings.shading.then(|| Lighting::new(to_light, (1.0 - (1.0 - f64::from(settings.outline)).powf(exponent)) as f32)),
             background: settings.background,
@@ -159,6 +173,8 @@ impl Plan {
             self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
         let mut iso = [0.0; MAX_ISO];
         iso.iter_mut().zip(&self.iso).for_each(|(to, v)| *to = *v);
+        let mut clip = [[0.0; 4]; MAX_CLIPS];
+        clip.iter_mut().zip(&self.clips).for_each(|(to, plane)| *to = *plane);
         RenderView {
             origin: wide(self.rays.origin),
             origin_x: wide(self.rays.origin_x),
@@ -174,17 +190,28 @@ impl Plan {
             value_scale: self.value_scale,
             termination: self.termination,
             isos: self.iso.len().min(MAX_ISO) as u32,
-            pad: [0; 2],
+            clips: self.clips.len().min(MAX_CLIPS) as u32,
+            pad: 0,
             iso,
+            clip,
         }
     }
 
     /// The picture for `colors` as in [`crate::query::Rendered`], composited over the background: four bytes per pixel,
-    /// straight alpha.
-    pub fn pixels(&self, colors: &[[f32; 4]]) -> Vec<u8> {
-        let [width, height] = self.size;
-        let rows = colors.chunks(width.max(1) as usize).zip(0..height);
-        rows.flat_map(|(row, y)| row.iter().flat_map(move |&color| self.background.pixel(color, y, height))).collect()
+    /// straight alpha. A pixel is the mean of `across` by `across` rays; rays at the right and at the bottom that fill
+    /// no pixel are left out.
+    pub fn pixels(&self, colors: &[[f32; 4]], across: u32) -> Vec<u8> {
+        let n = across.max(1);
+        let [width, height] = self.size.map(|rays| rays / n);
+        let share = 1.0 / (n * n) as f32;
+        let rows: Vec<&[[f32; 4]]> = colors.chunks_exact(self.size[0].max(1) as usize).collect();
+        let pixel = |rows: &[&[[f32; 4]]], x: u32, y: u32| {
+            let rays = rows.iter().flat_map(|row| &row[(x * n) as usize..((x + 1) * n) as usize]);
+            let sum = rays.fold([0.0; 4], |sum, color| [0, 1, 2, 3].map(|c| sum[c] + color[c]));
+            self.background.pixel(sum.map(|v| v * share), y, height)
+        };
+        let of_row = |(rows, y)| (0..width).flat_map(move |x| pixel(rows, x, y));
+        rows.chunks_exact(n as usize).zip(0..height).flat_map(of_row).collect()
     }
 
     /// The reciprocal of the step.
@@ -196,6 +223,28 @@ impl Plan {
     pub fn sample(&self, (origin, direction): ([f32; 3], [f32; 3]), k: u32) -> [f32; 3] {
         let t = (k as f32 + 0.5) * self.step;
         [0, 1, 2].map(|c| origin[c] + direction[c] * t)
+    }
+
+    /// The stretch of a ray (origin, unit direction) that no clip leaves out, in steps from the origin. Clip (n, d)
+    /// meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if n·direction is below
+    /// [`PARALLEL`]. Nothing is left if the end is less than the start.
+    pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [f32; 2] {
+        let mut kept = [0.0, MAX_SAMPLES as f32];
+        for &[x, y, z, d] in &self.clips {
+            let dot = |v: [f32; 3]| (x * v[0] + y * v[1]) + z * v[2];
+            let (before, speed) = (d - dot(origin), dot(direction));
+            if speed.abs() < PARALLEL {
+                kept[1] = if before < 0.0 { -1.0 } else { kept[1] };
+                continue;
+            }
+            let at = ((before * reciprocal(speed)) * self.inverse_step()).clamp(-1.0, MAX_SAMPLES as f32);
+            if speed > 0.0 {
+                kept[1] = kept[1].min(at);
+            } else {
+                kept[0] = kept[0].max(at);
+            }
+        }
+        kept
     }
 
     /// Colour, and opacity of one step, at a finite value. With `x = clamp((value − lo)·scale, 0, 1)·1023`, i =
@@ -259,7 +308,7 @@ impl Prepared {
         let points: Vec<DVec3> = points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect();
         let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
         let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
-        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, None)?;
+        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
         let normals = match (settings.shading, settings.iso.is_empty()) {
             (false, _) => Vec::new(),
             (true, true) => shading_normals(mesh, valid, field, range),

@@ -1,6 +1,7 @@
 //! The settings of a picture.
 
-use super::{CameraSpec, TransferFunction, transfer};
+use super::clip::MAX_CLIPS;
+use super::{CameraSpec, Clip, TransferFunction, transfer};
 use crate::error::{Error, Result};
 
 /// The length that opacities of a transfer function refer to, as a part of the diagonal of the mesh's bounds.
@@ -30,6 +31,8 @@ pub struct RenderSettings {
     pub size: [u32; 2],
     /// The camera.
     pub camera: CameraSpec,
+    /// Half-spaces that are left out, up to [`MAX_CLIPS`].
+    pub clips: Vec<Clip>,
     /// Colours and opacities.
     pub transfer: TransferFunction,
     /// Values whose iso-surfaces are drawn instead of the volume, up to [`MAX_ISO`]; if empty, the volume is drawn.
@@ -61,6 +64,7 @@ impl Default for RenderSettings {
         Self {
             size: [1024, 1024],
             camera: CameraSpec::default(),
+            clips: Vec::new(),
             transfer: TransferFunction::default(),
             iso: Vec::new(),
             range: None,
@@ -90,6 +94,9 @@ impl RenderSettings {
         }
         if let Some([lo, hi]) = self.range.filter(|[lo, hi]| !(lo <= hi && lo.is_finite() && hi.is_finite())) {
             return fail(format!("a range from {lo} to {hi}; it needs finite numbers, the first not above the second"));
+        }
+        if self.clips.len() > MAX_CLIPS {
+            return fail(format!("{} clips; give up to {MAX_CLIPS}", self.clips.len()));
         }
         if self.iso.len() > MAX_ISO || !self.iso.iter().all(|v| v.is_finite()) {
             return fail(format!("iso-surfaces at {:?}; give up to {MAX_ISO} finite values", self.iso));

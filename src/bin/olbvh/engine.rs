@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
+use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh};
@@ -15,7 +15,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
-use olbvh::render::{Bounds, RenderStats};
+use olbvh::render::Bounds;
 use olbvh::slicing::Band;
 use olbvh::tree::TreeBytes;
 
@@ -44,18 +44,6 @@ pub trait Engine {
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks>;
-}
-
-/// A picture and the values that were derived for it.
-pub struct Picture {
-    /// Straight RGBA, 8 bits per channel, row 0 on top.
-    pub pixels: Vec<u8>,
-    /// Numbers of samples, and times.
-    pub stats: RenderStats,
-    /// The field's values at the ends of the transfer function.
-    pub range: [f32; 2],
-    /// Distance between two samples on a ray.
-    pub step: f32,
 }
 
 /// Figures about a mesh and its tree.

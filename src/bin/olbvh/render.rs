@@ -2,18 +2,20 @@
 
 use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Outcome};
-use crate::engine::{self, Picture};
+use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::View;
-use olbvh::error::Result;
+use olbvh::blocks::{Picture, View};
+use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::Fineness;
 use olbvh::render::camera::{CameraSpec, HELP};
+use olbvh::render::clip;
 use olbvh::render::maps::MAPS;
-use olbvh::render::{Background, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
+use olbvh::render::settings::MAX_SIZE;
+use olbvh::render::{Background, Clip, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -22,9 +24,10 @@ const EXAMPLES: &str = "\
 Examples:
   olbvh render bracket.vtu -o bracket.png
   olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
-  olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900
+  olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900 --supersample 2
   olbvh render bracket.vtu -o part.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   some of the values
   olbvh render bracket.vtu -o iso.png --iso 40,55,70 --opacity 0.5   three translucent iso-surfaces
+  olbvh render bracket.vtu -o half.png --clip view --opacity 1       the half near the viewer cut away
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
 By default, the camera sees the whole mesh. An opacity, of --opacity or a transfer function, is that of a layer as thick as 1/100 of the diagonal of \
@@ -48,6 +51,9 @@ pub struct Args {
     /// Width and height in pixels; a single number gives a square.
     #[arg(long, default_value = "1024x1024", value_name = "WxH", value_parser = size, allow_negative_numbers = true)]
     size: [u32; 2],
+    /// Rays per pixel in each direction, 1 to 8: N×N rays are averaged, which smooths edges and takes N×N times as long.
+    #[arg(long, default_value_t = 1, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=8), allow_negative_numbers = true)]
+    supersample: u32,
     /// Distance between two samples on a ray, in units of the mesh. Default: 1/512 of the diagonal of the mesh's
     /// bounds; less where walls are thinner than 12 such steps, or layers of cells thinner than one, down to 1/8192. An
     /// iso-surface may have gaps where the mesh or its cells are thinner than a step.
@@ -57,6 +63,10 @@ pub struct Args {
     /// degrees; --help lists all).
     #[arg(long, default_value = "iso", allow_hyphen_values = true, value_parser = named::<CameraSpec>, long_help = format!("Camera: {HELP}"))]
     camera: CameraSpec,
+    /// Cut away what lies beyond a plane, for example `x`, `view`, `z=40%` or `-y=12.5`; up to four times (--help
+    /// explains it).
+    #[arg(long = "clip", value_name = "DIRECTION[=PLACE]", allow_hyphen_values = true, value_parser = named::<Clip>, long_help = format!("Cut away what lies farther in a direction than a place; up to {} times. A clip is {}.", clip::MAX_CLIPS, clip::HELP))]
+    clips: Vec<Clip>,
     /// Colours and opacities: the name of a colour map, or a .json file (--help lists the maps and describes the file).
     #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP|FILE.json")]
     tf: String,
@@ -114,8 +124,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     settings.check()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
-    let [width, height] = settings.size.map(|n| n as usize);
-    if options.fineness == Fineness::Pictures && 2 * width * height < loaded.mesh.tets.len() {
+    let [width, height] = args.size;
+    let rays: u64 = settings.size.into_iter().map(u64::from).product();
+    if options.fineness == Fineness::Pictures && 2 * rays < loaded.mesh.tets.len() as u64 {
         options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves
     }
     let field = args.field(&loaded.mesh, common)?;
@@ -126,12 +137,13 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
     let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
-    let Picture { pixels, stats, range: [lo, hi], step } = picture;
+    let Picture { rendered, plan, range: [lo, hi] } = picture;
+    let (pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
-    let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height as u32);
-    if expected && pixels.chunks(4 * width).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
-        common.remark("the picture is empty: the camera (--camera) does not see the mesh, or only what is transparent (--opacity)");
+    let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height);
+    if expected && pixels.chunks(4 * width as usize).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
+        common.remark("the picture is empty: the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)");
     }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
         common.remark(format_args!(
@@ -139,9 +151,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         ));
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
-    write_png(output.path(), settings.size[0], settings.size[1], &pixels)?;
+    write_png(output.path(), width, height, &pixels)?;
     let json = json!({
-        "file": args.output.display().to_string(), "width": settings.size[0], "height": settings.size[1],
+        "file": args.output.display().to_string(), "width": width, "height": height, "supersample": args.supersample,
         "field": field.name, "range": [single(lo), single(hi)], "iso": settings.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
         "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
         "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
@@ -149,11 +161,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         "seconds": seconds, "device": engine.name(),
     });
     let text = format!(
-        "{}: {} from {lo} to {hi}, {}x{} pixels, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
+        "{}: {} from {lo} to {hi}, {width}x{height} pixels{}, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
         args.output.display(),
         printable(&field.name),
-        settings.size[0],
-        settings.size[1],
+        if args.supersample > 1 { format!(" of {0}x{0} rays", args.supersample) } else { String::new() },
         single(step),
         grouped(stats.samples),
         grouped(stats.found_samples),
@@ -173,9 +184,18 @@ impl Args {
             transfer = transfer.with_opacity(points.clone())?;
         }
         let defaults = RenderSettings::default();
+        let ([width, height], n) = (self.size, self.supersample);
+        let size = self.size.map(|pixels| pixels.saturating_mul(n));
+        if n > 1 && size.iter().any(|&rays| rays > MAX_SIZE) {
+            return Err(Error::Invalid(format!(
+                "{width}x{height} pixels of {n}x{n} rays; a picture has at most {MAX_SIZE} rays in each direction"
+            ))
+            .into());
+        }
         Ok(RenderSettings {
-            size: self.size,
+            size,
             camera: self.camera,
+            clips: self.clips.clone(),
             transfer,
             iso: self.iso.as_ref().map(|iso| iso.0.clone()).unwrap_or_default(),
             range: self.range,

@@ -16,7 +16,7 @@ use std::mem::offset_of;
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhView {
-    /// Rays, light, step, range of values, and values of iso-surfaces.
+    /// Rays, clips, light, step, range of values, and values of iso-surfaces.
     pub frame: [u32; 64],
     /// The transfer function over the range of values: colour, and opacity of one step or of one surface.
     pub table: [[f32; 4]; 1024],

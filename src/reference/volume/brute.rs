@@ -15,7 +15,7 @@ struct Cell {
 }
 
 /// Draws what [`super::render`] should draw for `settings`, in time proportional to samples × tetrahedra, as straight
-/// RGBA. The transfer function of `settings` must have opacities. Only size and light are taken from the scene's plan.
+/// RGBA. The transfer function of `settings` must have opacities. Only size, clips and light are taken from the scene's plan.
 pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
     let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.range(), &scene.prepared.camera);
     let [width, height] = plan.size.map(f64::from);
@@ -23,6 +23,7 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
     let step = settings.step.unwrap_or(diagonal / 512.0);
     let corner = |i: u32| DVec3::from_array([0, 1, 2].map(|c| f64::from(if i >> c & 1 == 0 { bounds.lo[c] } else { bounds.hi[c] })));
     let near = (0..8).map(|i| (corner(i) - camera.eye).dot(camera.forward)).fold(f64::MAX, f64::min);
+    let clips: Vec<_> = plan.clips.iter().map(|&[x, y, z, d]| (DVec3::new(x.into(), y.into(), z.into()), f64::from(d))).collect();
     let span = f64::from(range[1]) - f64::from(range[0]);
     let pixel = |i: u32| {
         let (x, y) = (f64::from(i % plan.size[0]), f64::from(i / plan.size[0]));
@@ -42,6 +43,9 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
         let samples = ((start - corner(0)).length() + 2.0 * diagonal) / step;
         for k in 0..samples as u32 {
             let p = start + way * ((f64::from(k) + 0.5) * step);
+            if clips.iter().any(|&(n, d)| n.dot(p) > d) {
+                continue;
+            }
             let Some((value, normal)) = sample(scene, &cells, p) else { continue };
             let place = ((value - f64::from(range[0])) / span).clamp(0.0, 1.0);
             let [r, g, b, a] = settings.transfer.at(place as f32);

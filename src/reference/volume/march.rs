@@ -138,10 +138,11 @@ impl<'a> Marcher<'a> {
         [begin, place(way_within(here.w, next.w))]
     }
 
-    /// Adds the surfaces between two places of the ray, between which the value is linear. Light takes them to lie in
-    /// `stand`.
+    /// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip.
+    /// Light takes them to lie in `stand`.
     fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), [from, to]: [Place; 2], stand: &Stand) {
         let plan = self.plan;
+        let kept = plan.kept_stretch(ray);
         let n = plan.iso.len();
         let in_order = (0..n).map(|i| plan.iso[if from.value < to.value { i } else { n - 1 - i }]);
         for iso in in_order.filter(|&iso| (from.value < iso) != (to.value < iso)) {
@@ -150,7 +151,11 @@ impl<'a> Marcher<'a> {
             }
             let rise = (to.value - from.value).clamp(-1e37, 1e37);
             let part = if canonical(rise) == 0.0 { 1.0 } else { ((iso - from.value) * reciprocal(rise)).clamp(0.0, 1.0) };
-            let s = (from.at + (to.at - from.at) * part) * plan.step;
+            let steps = from.at + (to.at - from.at) * part;
+            if steps < kept[0] || steps > kept[1] {
+                continue;
+            }
+            let s = steps * plan.step;
             let at = [0, 1, 2].map(|c| ray.0[c] + ray.1[c] * s);
             let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
             let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));

@@ -46,7 +46,7 @@ fn sample_numbers_are_held_down() {
     };
     let plan = |camera: &Camera, step: f64| {
         let settings = RenderSettings { size: [16_384, 1], step: Some(step), ..RenderSettings::default() };
-        Plan::with_camera(&settings, camera, &BOX, None)
+        Plan::with_camera(&settings, camera, &BOX, [0.0; 3], None)
     };
     // One camera is far beside the box, which appears at the edge of a very wide picture; the other is equally far
     // in front of it.
@@ -118,4 +118,19 @@ fn values_as_places_do_not_move_with_the_range() {
         assert!(plan.lookup(lo)[3] < 1e-3 && (plan.lookup(hi)[3] - 0.5).abs() < 1e-3, "{range:?}");
         assert!((plan.lookup(30.0)[0] - fraction(30.0)).abs() < 1e-3, "{range:?}");
     }
+}
+
+#[test]
+fn pixels_are_means_of_rays() {
+    let settings = RenderSettings { size: [5, 4], background: Background::Transparent, ..RenderSettings::default() };
+    let plan = Plan::new(&settings, &BOX, [0.0; 3], None).unwrap();
+    let colors: Vec<_> = (0..20).map(|ray| [f32::from(ray == 6), 0.0, 0.0, f32::from(ray == 6 || ray == 7)]).collect();
+    let alone = plan.pixels(&colors, 1);
+    assert_eq!((alone.len(), &alone[24..32]), (80, &[255, 0, 0, 255, 0, 0, 0, 255][..]));
+    // Rays 6 and 7 belong to different pixels; the fifth column of rays is left out.
+    let opaque = 64; // a quarter of 255
+    let expected = [[255, 0, 0, opaque], [0, 0, 0, opaque], [0; 4], [0; 4]].concat();
+    assert_eq!(plan.pixels(&colors, 2), expected);
+    assert_eq!(plan.pixels(&colors[..12], 2), expected[..8], "rows that are not there");
+    assert_eq!((plan.pixels(&colors, 0), plan.pixels(&colors, 6)), (alone, Vec::new()));
 }

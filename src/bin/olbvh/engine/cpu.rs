@@ -1,11 +1,11 @@
 //! The engine that computes on the CPU with the reference implementation.
 
-use super::{Engine, OnProgress, Picture, Sink, Summary};
-use olbvh::blocks::{InBlocks, Meshes, Points, Stack, View};
+use super::{Engine, OnProgress, Sink, Summary};
+use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateMethod, LocateOptions, Located};
+use olbvh::query::{LocateMethod, LocateOptions, Located, Rendered};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::{self, Locator, order_of};
@@ -92,8 +92,8 @@ impl Engine for Cpu {
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Scene::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
-            let volume::Picture { pixels, stats } = volume::render(&scene, report);
-            Ok(Picture { pixels, stats, range: scene.range(), step: scene.plan().step })
+            let volume::Picture { colors, stats } = volume::render(&scene, report);
+            Ok(Picture { rendered: Rendered { colors, stats }, plan: scene.plan().clone(), range: scene.range() })
         })
     }
 

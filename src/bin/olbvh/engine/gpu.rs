@@ -1,8 +1,8 @@
 //! The engine that computes on a Vulkan device.
 
-use super::{Engine, OnProgress, Picture, Shapes, Sink, Summary};
+use super::{Engine, OnProgress, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, Meshes, Points, Stack, View};
+use olbvh::blocks::{self, InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
@@ -101,8 +101,7 @@ impl Engine for Device {
     }
 
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
-        let (blocks::Picture { rendered, plan, range }, took) = blocks::render(&self.0, self.memory(memory), asked, report)?.into_parts();
-        Ok(took.with(Picture { pixels: plan.pixels(&rendered.colors), stats: rendered.stats, range, step: plan.step }))
+        blocks::render(&self.0, self.memory(memory), asked, report)
     }
 
     fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks> {
