@@ -41,7 +41,7 @@ const uint BURST = 32u; // passes along walks before rays that wait for the stru
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;
-vec2 unclipped; // the stretch that no clip leaves out
+vec2 unclipped; // the stretch without what clips leave out, for iso-surfaces; samples are those of the interval
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
@@ -226,12 +226,12 @@ void take(Sides sides) {
     float value = value_of(held_values, b);
     if ((floatBitsToUint(value) & 0x7f800000u) == 0x7f800000u) return;
     if (ISO != 0u) {
-        Place from, to;
-        find_ends(k, sides, value, last != NONE, from, to);
-        if (last != NONE) add_surfaces(place_at(state.last_at, uintBitsToFloat(last)), from);
-        state.last = floatBitsToUint(to.value);
-        state.last_at = to.at;
-        add_surfaces(from, to);
+        Place ends[3];
+        find_ends(k, sides, value, last != NONE, ends[1], ends[2]);
+        ends[0] = last != NONE ? place_at(state.last_at, uintBitsToFloat(last)) : ends[1];
+        state.last = floatBitsToUint(ends[2].value);
+        state.last_at = ends[2].at;
+        [[dont_unroll]] for (uint piece = 0u; piece < 2u; ++piece) add_surfaces(ends[piece], ends[piece + 1u]);
         return;
     }
     vec4 color = lookup(value);
@@ -262,27 +262,36 @@ void main() {
             halfway = unit;
         }
         inverse_direction = inverse_of(direction);
-        unclipped = kept_stretch(origin, direction);
-        bool stands = state.tet != NONE && state.cursor == 0u;
-        if (stands) enter(state.tet);
+        if (ISO != 0u) unclipped = kept_stretch(origin, direction);
+        // Each of the following has one place in the loop, since kernels with several copies take long to compile: the
+        // ray enters a tetrahedron, takes a sample, searches the structure.
+        uint target = state.cursor == 0u ? state.tet : NONE; // the tetrahedron to enter
+        bool stands = false;
+        bool is_owner = false; // the target is known to own the next sample
         ahead = 1u;
         uint known = state.check >> 30u; // flags of the best candidate
         state.check &= 0x3fffffffu;
-        for (uint work = 0u; state.next < state.end && work < budget; ++work) {
+        for (uint work = 0u; state.next < state.end && (work < budget || is_owner); ++work) {
+            if (target != NONE) {
+                enter(target);
+                target = NONE;
+                stands = true;
+            }
             // As long as the walk succeeds, the tree is not searched. A pass is one sample, after one step if needed.
             // Rays wait until all of the subgroup stand in the mesh, and then walk together; to iso-surfaces, walks are
             // too short for that. Walks are not cut short, so that owners do not depend on when a ray has to wait.
             bool walks = ISO != 0u || subgroupAll(stands);
             uint misses = 0u; // steps of the walk to the next sample
-            for (uint pass = 0u; (pass < BURST || misses > 0u) && walks && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
+            for (uint pass = 0u; (pass < BURST || misses > 0u) && (walks || is_owner) && stands && state.next < state.end && !is_to_look(); ++pass, ++work) {
                 vec3 x = normalise(g, sample_at(view, origin, direction, state.next));
                 Sides sides = sides_of(stand, x);
-                if (!sides.clear) {
+                if (!sides.clear && !is_owner) {
                     stands = ++misses < WALK && go_on(sides);
                     if (stands) sides = sides_of(stand, x);
                 }
-                if (stands && sides.clear) {
+                if (stands && (sides.clear || is_owner)) {
                     misses = 0u;
+                    is_owner = false;
                     take(sides);
                 }
             }
@@ -304,7 +313,7 @@ void main() {
                 }
             }
 #endif
-            if (stands || state.next >= state.end || is_to_look()) continue;
+            if (stands || state.next >= state.end || is_to_look() || work >= budget) continue;
             vec3 at = sample_at(view, origin, direction, state.next);
             vec3 x = normalise(g, at);
             uint owner = NONE;
@@ -319,13 +328,9 @@ void main() {
                 state.smallest = search.best.smallest;
                 if (!ended) break;
             }
-            stands = owner != NONE; // after a gap, the structure is searched first
-            if (stands) {
-                enter(owner);
-                take(sides_of(stand, x));
-            } else {
-                pass_by();
-            }
+            target = owner;
+            is_owner = owner != NONE;
+            if (!is_owner) pass_by(); // after a gap, the structure is searched first
         }
         if (ahead > 1u) state.check = state.next; // `ahead` is not stored: the tree is asked again
         state.check |= known << 30u;

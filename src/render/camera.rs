@@ -220,6 +220,10 @@ pub fn three_quarter(extent: DVec3) -> DVec3 {
     DVec3::new(0.58 * weight[0], -weight[1], 0.55 * weight[2])
 }
 
+/// Smaller components of a ray's direction count as this, so that reciprocals are finite. Twin of `LEAST` in
+/// glsl/shared/rays.glsl.
+pub const LEAST: f32 = 1e-20;
+
 /// The rays of a picture, in the form that kernels take: six vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RayGrid {

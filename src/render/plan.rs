@@ -1,6 +1,7 @@
 //! The settings of a picture evaluated for one mesh and field: everything that the kernels and the reference renderer
 //! need.
 
+use super::camera::LEAST;
 use super::clip::MAX_CLIPS;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::visible_values::visible_values;
@@ -23,9 +24,6 @@ const MAX_DISTANCE: f64 = 1e9;
 /// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
 /// flags from bit 30 on.
 pub const MAX_SAMPLES: u32 = 1 << 23;
-
-/// A clip whose normal is as good as across a ray does not meet it.
-pub const PARALLEL: f32 = 1e-20;
 
 /// A picture to draw.
 #[derive(Clone, Debug, PartialEq)]
@@ -227,13 +225,13 @@ impl Plan {
 
     /// The stretch of a ray (origin, unit direction) that no clip leaves out, in steps from the origin. Clip (n, d)
     /// meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if n·direction is below
-    /// [`PARALLEL`]. Nothing is left if the end is less than the start.
+    /// [`LEAST`]. Nothing is left if the end is less than the start.
     pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [f32; 2] {
         let mut kept = [0.0, MAX_SAMPLES as f32];
         for &[x, y, z, d] in &self.clips {
             let dot = |v: [f32; 3]| (x * v[0] + y * v[1]) + z * v[2];
             let (before, speed) = (d - dot(origin), dot(direction));
-            if speed.abs() < PARALLEL {
+            if speed.abs() < LEAST {
                 kept[1] = if before < 0.0 { -1.0 } else { kept[1] };
                 continue;
             }

@@ -14,10 +14,13 @@ pub fn pictures(tree: *mut OlbvhTree, values: &[f32], prepare: &dyn Fn(&OlbvhPic
     let given = OlbvhPictureSettings { shading: 0, camera, ..settings() };
     let lit = OlbvhPictureSettings { shading: 1, ..given };
     let iso = OlbvhPictureSettings { iso: [1.75; 8], iso_count: 1, ..given };
+    let clipped = OlbvhPictureSettings { clips: c"view=90% z=80%".as_ptr(), ..given };
+    assert_eq!([&clipped, &given].map(|settings| prepare(settings).plan.clips.len()), [2, 0]);
     let held = || [mesh.copy.mesh.get().is_some(), mesh.copy.neighbours.get().is_some(), mesh.copy.bad.get().is_some()];
     for (settings, needed) in [
         (given, [false; 3]),
         (iso, [false; 3]),
+        (clipped, [false; 3]),
         (OlbvhPictureSettings { camera: null(), ..given }, [true, false, false]),
         (OlbvhPictureSettings { camera: c"eye=9,-8,7,ortho".as_ptr(), ..given }, [true, false, false]),
         (OlbvhPictureSettings { range: [1.0, 0.0], ..given }, [true, false, false]),

@@ -4,10 +4,8 @@ use crate::grid::{MAX_LEVEL, morton, reciprocal};
 use crate::layout::bit;
 use crate::reference::leaves::cell_side;
 use crate::render::Plan;
+use crate::render::camera::LEAST;
 use crate::tree::TreeArrays;
-
-/// Components of a direction are taken to be at least this large, so that their reciprocals are finite.
-const LEAST: f32 = 1e-20;
 
 /// The reciprocals of the components of a direction.
 pub fn inverse_of(direction: [f32; 3]) -> [f32; 3] {
