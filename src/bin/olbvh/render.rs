@@ -65,7 +65,7 @@ pub struct Args {
     camera: CameraSpec,
     /// Cut away what lies beyond a plane, for example `x`, `view`, `z=40%` or `-y=12.5`; up to four times (--help
     /// explains it).
-    #[arg(long = "clip", value_name = "DIRECTION[=PLACE]", allow_hyphen_values = true, value_parser = named::<Clip>, long_help = format!("Cut away what lies farther in a direction than a place; up to {} times. A clip is {}.", clip::MAX_CLIPS, clip::HELP))]
+    #[arg(long = "clip", value_name = "DIRECTION[=PLACE]", allow_hyphen_values = true, value_parser = named::<Clip>, long_help = format!("Cut away what lies farther in a direction than a place; up to {} times. A clip is {}", clip::MAX_CLIPS, clip::HELP))]
     clips: Vec<Clip>,
     /// Colours and opacities: the name of a colour map, or a .json file (--help lists the maps and describes the file).
     #[arg(long, default_value = transfer::DEFAULT_MAP, value_name = "MAP|FILE.json")]
