@@ -201,7 +201,7 @@ impl Plan {
     pub fn pixels(&self, colors: &[[f32; 4]], across: u32) -> Vec<u8> {
         let n = across.max(1);
         let [width, height] = self.size.map(|rays| rays / n);
-        let share = 1.0 / (n * n) as f32;
+        let share = 1.0 / (n as f32 * n as f32);
         let rows: Vec<&[[f32; 4]]> = colors.chunks_exact(self.size[0].max(1) as usize).collect();
         let pixel = |rows: &[&[[f32; 4]]], x: u32, y: u32| {
             let rays = rows.iter().flat_map(|row| &row[(x * n) as usize..((x + 1) * n) as usize]);

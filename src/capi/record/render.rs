@@ -6,6 +6,7 @@ use crate::build::{cmd_ranges, range_bytes};
 use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::error::Result;
+use crate::layout::RenderView;
 use crate::primitives::Arena;
 use crate::query::{RenderInput, RenderMemory, Scene, StructureView, Visibility, cmd_render};
 use crate::render::{Bounds, Plan};
@@ -26,6 +27,9 @@ pub struct OlbvhView {
     /// Number of ranges in `drawn` that are used.
     pub drawn_count: u32,
 }
+
+// The view of a picture must fit, since it is copied as far as there is room.
+const _: () = assert!(size_of::<RenderView>() <= size_of::<[u32; 64]>());
 
 /// What is drawn, and where. The contents of the buffers are read when the commands are executed, so a new view or new
 /// values need no new recording.

@@ -132,5 +132,5 @@ fn pixels_are_means_of_rays() {
     let expected = [[255, 0, 0, opaque], [0, 0, 0, opaque], [0; 4], [0; 4]].concat();
     assert_eq!(plan.pixels(&colors, 2), expected);
     assert_eq!(plan.pixels(&colors[..12], 2), expected[..8], "rows that are not there");
-    assert_eq!((plan.pixels(&colors, 0), plan.pixels(&colors, 6)), (alone, Vec::new()));
+    assert_eq!((plan.pixels(&colors, 0), plan.pixels(&colors, 6), plan.pixels(&colors, u32::MAX)), (alone, Vec::new(), Vec::new()));
 }
