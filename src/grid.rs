@@ -10,6 +10,12 @@ pub(crate) const fn two_to(n: i32) -> f32 {
     f32::from_bits(((n + 127) as u32) << 23)
 }
 
+/// What `of` gives for each axis. Compilers make straight code of it, but a call of `[0, 1, 2].map`.
+#[inline]
+pub(crate) fn per_axis<T>(mut of: impl FnMut(usize) -> T) -> [T; 3] {
+    [of(0), of(1), of(2)]
+}
+
 /// Level of the finest grid, which is also the number of bits per axis of its 32-bit Morton codes.
 pub const MAX_LEVEL: u32 = 10;
 /// Coordinates of this magnitude and beyond count as infinite, so that differences and scales stay in the range of
@@ -32,7 +38,7 @@ impl Grid {
     pub fn new(lo: [f32; 3], hi: [f32; 3]) -> Self {
         let empty = (0..3).any(|c| lo[c] > hi[c]);
         let (lo, hi) = if empty { ([0.0; 3], [0.0; 3]) } else { (lo.map(canonical), hi.map(canonical)) };
-        let extent = [0, 1, 2].map(|c| canonical(hi[c] - lo[c]));
+        let extent = per_axis(|c| canonical(hi[c] - lo[c]));
         let largest = extent.into_iter().fold(MIN_EXTENT, f32::max);
         let exponent = (largest.to_bits() >> 23) as i32 - 127;
         let scale = two_to(-exponent);
@@ -45,7 +51,7 @@ impl Grid {
 
     /// The cell of the finest grid that contains `x`; points outside the grid are clamped to it.
     pub fn quantize(&self, x: [f32; 3]) -> [u32; 3] {
-        [0, 1, 2].map(|c| {
+        per_axis(|c| {
             let q = (canonical(canonical(x[c]) - self.lo[c]) * self.inv[c]).floor();
             q.clamp(0.0, 1023.0) as u32
         })
@@ -54,7 +60,7 @@ impl Grid {
     /// `x` in normalised coordinates, in which the lower corner of the bounds is at 0 and the largest extent is in
     /// [2^40, 2^41).
     pub fn normalise(&self, x: [f32; 3]) -> [f32; 3] {
-        [0, 1, 2].map(|c| {
+        per_axis(|c| {
             let unit = canonical(canonical(canonical(x[c]) - self.lo[c]) * self.scale);
             (unit * GRID_UP).floor() * GRID_DOWN
         })
@@ -95,13 +101,13 @@ impl CellRange {
 
     /// The intersection of two boxes; `None` if it is empty.
     pub fn common(&self, other: &Self) -> Option<Self> {
-        let range = Self { lo: [0, 1, 2].map(|c| self.lo[c].max(other.lo[c])), hi: [0, 1, 2].map(|c| self.hi[c].min(other.hi[c])) };
+        let range = Self { lo: per_axis(|c| self.lo[c].max(other.lo[c])), hi: per_axis(|c| self.hi[c].min(other.hi[c])) };
         (0..3).all(|c| range.lo[c] <= range.hi[c]).then_some(range)
     }
 
     /// Number of cells per axis.
     pub fn size(&self) -> [u32; 3] {
-        [0, 1, 2].map(|c| self.hi[c] - self.lo[c] + 1)
+        per_axis(|c| self.hi[c] - self.lo[c] + 1)
     }
 
     /// Number of cells.

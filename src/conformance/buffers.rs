@@ -42,19 +42,21 @@ impl Guarded {
 
     /// Reads the words; fails if the guard has been overwritten.
     pub(crate) fn read(&self, gpu: &Gpu, stage: &str) -> Verdict<Vec<u32>> {
-        let mut content: Vec<u32> = gpu.download(&self.buffer, self.buffer.all())?;
-        if let Some(i) = content[self.words..].iter().position(|&w| w != FILL) {
-            let found = format!("{:#x}", content[self.words + i]);
-            return Err(fail(
-                stage,
-                &format!("{} (guard after {} words)", self.name, self.words),
-                Some(self.words + i),
-                "untouched",
-                &found,
-            ));
-        }
-        content.truncate(self.words);
-        Ok(content)
+        self.check_guard(gpu, stage)?;
+        Ok(gpu.download(&self.buffer, self.all())?)
+    }
+
+    /// Reads the first words of a part; unlike [`Guarded::read`], it does not look at the guard.
+    pub(crate) fn read_part(&self, gpu: &Gpu, part: BufferRef, words: usize) -> Verdict<Vec<u32>> {
+        Ok(gpu.download(&self.buffer, part.part(0, 4 * words as u64))?)
+    }
+
+    /// Fails if the guard has been overwritten.
+    pub(crate) fn check_guard(&self, gpu: &Gpu, stage: &str) -> Verdict {
+        let guard: Vec<u32> = gpu.download(&self.buffer, self.buffer.all().part(4 * self.words as u64, 4 * GUARD as u64))?;
+        let Some(i) = guard.iter().position(|&w| w != FILL) else { return Ok(()) };
+        let array = format!("{} (guard after {} words)", self.name, self.words);
+        Err(fail(stage, &array, Some(self.words + i), "untouched", &format!("{:#x}", guard[i])))
     }
 }
 

@@ -147,7 +147,7 @@ pub(crate) fn reduce(gpu: &Gpu, case: ReduceCase) -> Verdict {
         Reduction::Max => live.fold(0, u32::max),
     };
     let stage = "primitives.reduce";
-    scratch.read(gpu, stage)?;
+    scratch.check_guard(gpu, stage)?;
     compare(stage, "values", &data, &values.read(gpu, stage)?)?;
     compare(stage, "result", &[expected], &result.read(gpu, stage)?)
 }
@@ -172,7 +172,7 @@ pub(crate) fn scan(gpu: &Gpu, case: ScanCase) -> Verdict {
     // Items beyond the count must be left unchanged.
     expected.extend(data[items..].iter().map(|&v| if case.in_place { v } else { FILL }));
     let stage = "primitives.scan";
-    memory.read(gpu, stage)?;
+    memory.check_guard(gpu, stage)?;
     compare(stage, "scanned", &expected, &scanned.read(gpu, stage)?)?;
     if !case.in_place {
         compare(stage, "values", &data, &values.read(gpu, stage)?)?;
@@ -196,7 +196,7 @@ pub(crate) fn sort(gpu: &Gpu, case: SortCase) -> Verdict {
     order.sort_by_key(|&i| data[i as usize] & mask);
     let expected: Vec<u32> = order.iter().map(|&i| data[i as usize]).collect();
     let stage = "primitives.sort";
-    memory.read(gpu, stage)?;
+    memory.check_guard(gpu, stage)?;
     // The order of pairs beyond the count is unspecified.
     compare(stage, "keys", &expected, &keys.read(gpu, stage)?[..items])?;
     compare(stage, "values", &order, &values.read(gpu, stage)?[..items])

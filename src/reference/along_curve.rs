@@ -2,7 +2,7 @@
 
 use super::boundary::{fault_of, is_usable, valid_grid};
 use crate::error::{Error, Result};
-use crate::grid::morton;
+use crate::grid::{morton, per_axis};
 use crate::mesh::{Mesh, On};
 use rayon::prelude::*;
 
@@ -33,7 +33,7 @@ impl Mesh {
                 return u32::MAX;
             }
             let [a, b, c, d] = self.tets[t as usize].map(|v| self.points[v as usize]);
-            code([0, 1, 2].map(|k| 0.25 * ((a[k] + b[k]) + (c[k] + d[k]))))
+            code(per_axis(|k| 0.25 * ((a[k] + b[k]) + (c[k] + d[k]))))
         });
         let mut place = vec![0; points.len()];
         (0..).zip(&points).for_each(|(new, &old)| place[old as usize] = new);

@@ -23,7 +23,7 @@
 //! `(B·reciprocal(|V|))·2^-16` of the width, and slivers with `|V| ≤ B·2^-12` have no edge tests.
 
 use super::tet::{EDGES, FACES, Tet, Vec3, abs, cross, cross_bound, dot, sub};
-use crate::grid::{Grid, reciprocal, two_to};
+use crate::grid::{Grid, per_axis, reciprocal, two_to};
 use crate::options::Assign;
 
 /// A face plane. A box is outside if `dot(normal, centre − at) > limit`.
@@ -57,17 +57,17 @@ pub struct Filter {
 /// Half the size of a cell of `level` per axis in normalised coordinates, without allowance for rounding.
 pub fn half_cell(grid: &Grid, level: u32) -> Vec3 {
     let scale = two_to(-1 - level as i32);
-    [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { grid.extent[c] * 0.5 } else { grid.extent[c] * scale })
+    per_axis(|c| if grid.inv[c] == 0.0 { grid.extent[c] * 0.5 } else { grid.extent[c] * scale })
 }
 
 /// Half the size of a cell's box, with the allowance for rounding.
 pub fn inflated(grid: &Grid, h: Vec3) -> Vec3 {
-    [0, 1, 2].map(|c| h[c] + (grid.extent[c] * two_to(-20) + two_to(-41)))
+    per_axis(|c| h[c] + (grid.extent[c] * two_to(-20) + two_to(-41)))
 }
 
 /// Centre of the box of a cell with half size `h`.
 pub fn cell_centre(h: Vec3, cell: [u32; 3]) -> Vec3 {
-    [0, 1, 2].map(|c| (((2 * cell[c] + 1) as f32 * h[c]) * two_to(42)).floor() * two_to(-42))
+    per_axis(|c| (((2 * cell[c] + 1) as f32 * h[c]) * two_to(42)).floor() * two_to(-42))
 }
 
 impl Filter {
@@ -88,11 +88,11 @@ impl Filter {
         }
         let v = &tet.v;
         let half = inflated(grid, h);
-        let size = [0, 1, 2].map(|c| {
+        let size = per_axis(|c| {
             let hi = v[0][c].max(v[1][c]).max(v[2][c].max(v[3][c]));
             hi - v[0][c].min(v[1][c]).min(v[2][c].min(v[3][c]))
         });
-        let slack = [0, 1, 2].map(|c| (size[c] + 2.0 * half[c]) * two_to(-18) + two_to(-42));
+        let slack = per_axis(|c| (size[c] + 2.0 * half[c]) * two_to(-18) + two_to(-42));
         let volume = tet.volume();
         // The normal points outward according to the sign of the volume that `Tet::weights` uses.
         let s = if volume < 0.0 { -1.0 } else { 1.0 };

@@ -4,7 +4,7 @@
 use super::corners::{MOST_THIN, thin_corners_at};
 use super::tet::Tet;
 use crate::error::{Error, Result};
-use crate::grid::{COORDINATE_LIMIT, Grid, canonical};
+use crate::grid::{COORDINATE_LIMIT, Grid, canonical, per_axis};
 use crate::layout::bit;
 use crate::mesh::Mesh;
 use rayon::prelude::*;
@@ -168,8 +168,7 @@ pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
 
 fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {
     let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    let join =
-        |a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])| ([0, 1, 2].map(|c| a.0[c].min(b.0[c])), [0, 1, 2].map(|c| a.1[c].max(b.1[c])));
+    let join = |a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])| (per_axis(|c| a.0[c].min(b.0[c])), per_axis(|c| a.1[c].max(b.1[c])));
     let of = |bounds, (t, ids): (usize, &[u32; 4])| {
         let points = ids.iter().filter(|_| bit(valid, t as u32)).map(|&v| mesh.points[v as usize].map(canonical));
         points.fold(bounds, |b, p| join(b, (p, p)))

@@ -13,7 +13,7 @@
 //! is at least half as long as the longest.
 
 use super::tet::{Bounds, Tet, Vec3, dot};
-use crate::grid::{canonical, two_to};
+use crate::grid::{canonical, per_axis, two_to};
 use crate::layout::bit;
 use crate::mesh::Mesh;
 
@@ -23,11 +23,11 @@ pub const MOST_THIN: u32 = 46;
 /// Whether the corner at each vertex, in ascending index, is thin.
 pub fn thin_corners(tet: &Tet) -> [bool; 4] {
     let bounds = Bounds::new(tet.v);
-    let size = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
+    let size = per_axis(|c| bounds.hi[c] - bounds.lo[c]);
     // Coordinates are multiples of 2^-42.
     let exponent = ((size[0].max(size[1]).max(size[2]).to_bits() >> 23) as i32 - 127).max(-42);
     let squared = |a: Vec3, b: Vec3| {
-        let edge = [0, 1, 2].map(|c| ((b[c] - a[c]).abs() * two_to(20 - exponent)).ceil() * two_to(-20));
+        let edge = per_axis(|c| ((b[c] - a[c]).abs() * two_to(20 - exponent)).ceil() * two_to(-20));
         dot(edge, edge)
     };
     let [a, b, c, d] = tet.v;

@@ -4,7 +4,7 @@
 use super::boundary::Topology;
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
-use crate::grid::{Grid, MAX_LEVEL, canonical};
+use crate::grid::{Grid, MAX_LEVEL, canonical, per_axis};
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, usual_capacity};
 use crate::tree::TreeBytes;
@@ -42,7 +42,7 @@ pub fn measure(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Sizes {
             let finest = vertices.cells(ids, MAX_LEVEL);
             for (level, entries) in sizes.entries.iter_mut().enumerate() {
                 let shift = LEVELS - 1 - level;
-                let [x, y, z] = [0, 1, 2].map(|c| u64::from((finest.hi[c] >> shift) - (finest.lo[c] >> shift) + 1));
+                let [x, y, z] = per_axis(|c| u64::from((finest.hi[c] >> shift) - (finest.lo[c] >> shift) + 1));
                 *entries += x * y * z;
             }
         }

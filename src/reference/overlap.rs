@@ -30,7 +30,7 @@ use super::separate::{box_touches, tets_touch};
 use super::tet::{Tet, Vec3, sub};
 use super::traverse::Node;
 use crate::grid::CellRange;
-use crate::grid::{Grid, MAX_LEVEL, canonical, two_to, unmorton};
+use crate::grid::{Grid, MAX_LEVEL, canonical, per_axis, two_to, unmorton};
 use crate::layout::NodeFrame;
 use crate::layout::bit;
 use crate::mesh::Mesh;
@@ -84,8 +84,8 @@ pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
         [true, false] => Grid::new(three(a.lo), three(a.hi)),
         [false, _] => Grid::new(three(b.lo), three(b.hi)),
         [true, true] => {
-            let lo = [0, 1, 2].map(|c| a.lo[c].min(b.lo[c]));
-            Grid::new(lo, [0, 1, 2].map(|c| a.hi[c].max(b.hi[c])))
+            let lo = per_axis(|c| a.lo[c].min(b.lo[c]));
+            Grid::new(lo, per_axis(|c| a.hi[c].max(b.hi[c])))
         }
     }
 }
@@ -93,8 +93,8 @@ pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
 /// The cells of the tree with grid `grid`, in normalised coordinates of the joint grid.
 pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
     let corner = joint.normalise([grid.lo[0], grid.lo[1], grid.lo[2]]);
-    let half = [0, 1, 2].map(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * two_to(39));
-    let flat = [0, 1, 2].map(|c| if grid.inv[c] == 0.0 { 1.0 } else { 0.0 });
+    let half = per_axis(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * two_to(39));
+    let flat = per_axis(|c| if grid.inv[c] == 0.0 { 1.0 } else { 0.0 });
     let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
     NodeFrame {
         corner: pad(corner),
@@ -109,17 +109,16 @@ pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
 /// Centre and half size of the box of a node, the half size with the allowance of step 2.
 fn node_box(frame: &NodeFrame, node: Node) -> (Vec3, Vec3) {
     let cell = unmorton(node.code);
-    let half =
-        [0, 1, 2].map(|c| if frame.flat_axis[c] == 0.0 { frame.half_size[c] * two_to(-(node.level as i32)) } else { frame.half_size[c] });
+    let half = per_axis(|c| if frame.flat_axis[c] == 0.0 { frame.half_size[c] * two_to(-(node.level as i32)) } else { frame.half_size[c] });
     let at = |c: usize| frame.corner[c] + (2 * cell[c] + 1) as f32 * half[c];
-    let centre = [0, 1, 2].map(|c| (at(c) * two_to(42)).floor() * two_to(-42));
+    let centre = per_axis(|c| (at(c) * two_to(42)).floor() * two_to(-42));
     (centre, half.map(|h| h + two_to(18)))
 }
 
 /// Closed bounding box of a tetrahedron in the units of the mesh.
 fn raw_box(mesh: &Mesh, t: u32) -> (Vec3, Vec3) {
     let v = mesh.tets[t as usize].map(|i| mesh.points[i as usize].map(canonical));
-    let fold = |pick: fn(f32, f32) -> f32| [0, 1, 2].map(|c| pick(pick(v[0][c], v[1][c]), pick(v[2][c], v[3][c])));
+    let fold = |pick: fn(f32, f32) -> f32| per_axis(|c| pick(pick(v[0][c], v[1][c]), pick(v[2][c], v[3][c])));
     (fold(f32::min), fold(f32::max))
 }
 
@@ -185,7 +184,7 @@ impl Direction<'_> {
         if self.other.tree.assign != Assign::Aabb {
             return true;
         }
-        let corner = [0, 1, 2].map(|c| own.0[c].max(other.0[c]));
+        let corner = per_axis(|c| own.0[c].max(other.0[c]));
         self.other.tree.grid.quantize(corner).map(|q| q >> (MAX_LEVEL - leaf.level)) == unmorton(leaf.code)
     }
 

@@ -16,7 +16,7 @@
 
 use super::vertices::Vertices;
 use crate::grid::CellRange;
-use crate::grid::{Grid, MAX_LEVEL, two_to, unmorton};
+use crate::grid::{Grid, MAX_LEVEL, per_axis, two_to, unmorton};
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
@@ -43,7 +43,7 @@ fn cuts(grid: &Grid) -> u32 {
 /// The number of finest cells by which boxes are enlarged on each axis: `least`, or the whole grid on axes that are too
 /// short.
 fn grown(grid: &Grid, least: u32) -> [u32; 3] {
-    [0, 1, 2].map(|c| if grid.extent[c] < COARSE { 1024 } else { least })
+    per_axis(|c| if grid.extent[c] < COARSE { 1024 } else { least })
 }
 
 /// The quarters of the leaf's cell with Morton code `code` that a box of finest cells is near; `grid` is that of the

@@ -16,7 +16,7 @@
 //! cross product changes only its sign.
 
 use super::tet::{EDGES, FACES, Vec3, abs, cross, cross_bound, dot, sub};
-use crate::grid::{canonical, reciprocal, two_to};
+use crate::grid::{canonical, per_axis, reciprocal, two_to};
 
 /// The smallest and the largest of four values.
 fn range4(x: [f32; 4]) -> (f32, f32) {
@@ -25,7 +25,7 @@ fn range4(x: [f32; 4]) -> (f32, f32) {
 
 /// The closed bounding box of four points.
 pub fn bounds(v: &[Vec3; 4]) -> (Vec3, Vec3) {
-    let range = [0, 1, 2].map(|c| range4(v.map(|p| p[c])));
+    let range = per_axis(|c| range4(v.map(|p| p[c])));
     (range.map(|r| r.0), range.map(|r| r.1))
 }
 
@@ -34,7 +34,7 @@ pub fn bounds(v: &[Vec3; 4]) -> (Vec3, Vec3) {
 /// 2^-42.
 pub fn touch_slack(v: &[Vec3; 4], h: &[Vec3; 3]) -> Vec3 {
     let (lo, hi) = bounds(v);
-    [0, 1, 2].map(|c| {
+    per_axis(|c| {
         let far = hi[c].abs().max(lo[c].abs());
         let extent = (h[0][c].abs() + h[1][c].abs()) + h[2][c].abs();
         (far + extent) * two_to(-20) + two_to(-42)
@@ -112,7 +112,7 @@ pub struct Closest {
 /// Squared distance from 0 to the bounding box of `v`, scaled by 2^-42.
 pub fn box_square(v: &[Vec3; 4]) -> f32 {
     let (lo, hi) = bounds(v);
-    let d = [0, 1, 2].map(|c| (lo[c].max(-hi[c]).max(0.0)) * two_to(-21));
+    let d = per_axis(|c| (lo[c].max(-hi[c]).max(0.0)) * two_to(-21));
     dot(d, d)
 }
 
@@ -163,7 +163,7 @@ pub fn closest(v: &[Vec3; 4]) -> Closest {
     let mut best = Closest { square: f32::MAX, weights: [0.0; 4] };
     for [p, q, r] in FACES {
         let w = closest_in_triangle(s[p], s[q], s[r]);
-        let at = [0, 1, 2].map(|c| (w[0] * s[p][c] + w[1] * s[q][c]) + w[2] * s[r][c]);
+        let at = per_axis(|c| (w[0] * s[p][c] + w[1] * s[q][c]) + w[2] * s[r][c]);
         let square = canonical(canonical(canonical(at[0] * at[0]) + canonical(at[1] * at[1])) + canonical(at[2] * at[2]));
         if square < best.square {
             best = Closest { square, weights: [0.0; 4] };

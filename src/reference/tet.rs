@@ -4,7 +4,7 @@
 //! The vertices of a tetrahedron are taken in ascending global index, so that two neighbours get bit-identical results
 //! for their common face.
 
-use crate::grid::{reciprocal, two_to};
+use crate::grid::{per_axis, reciprocal, two_to};
 
 /// A point in normalised coordinates.
 pub type Vec3 = [f32; 3];
@@ -83,8 +83,8 @@ pub struct Bounds {
 impl Bounds {
     /// The bounding box and margin of four vertices.
     pub fn new([a, b, c, d]: [Vec3; 4]) -> Self {
-        let lo = [0, 1, 2].map(|k| a[k].min(b[k]).min(c[k].min(d[k])));
-        let hi = [0, 1, 2].map(|k| a[k].max(b[k]).max(c[k].max(d[k])));
+        let lo = per_axis(|k| a[k].min(b[k]).min(c[k].min(d[k])));
+        let hi = per_axis(|k| a[k].max(b[k]).max(c[k].max(d[k])));
         let size = sub(hi, lo);
         Self { lo, hi, margin: ((size[0] * size[1]) * size[2]) * two_to(-16) }
     }

@@ -2,7 +2,7 @@
 //! 2.1). Twin of `glsl/build/02_normalise_vertices`.
 
 use super::tet::{Tet, Vec3};
-use crate::grid::{CellRange, Grid, MAX_LEVEL};
+use crate::grid::{CellRange, Grid, MAX_LEVEL, per_axis};
 use crate::mesh::Mesh;
 use rayon::prelude::*;
 
@@ -33,8 +33,8 @@ impl Vertices {
     pub fn cells(&self, ids: [u32; 4], level: u32) -> CellRange {
         let [a, b, c, d] = ids.map(|id| self.cell[id as usize]);
         let shift = MAX_LEVEL - level;
-        let lo = [0, 1, 2].map(|k| u32::from(a[k].min(b[k]).min(c[k].min(d[k]))) >> shift);
-        let hi = [0, 1, 2].map(|k| u32::from(a[k].max(b[k]).max(c[k].max(d[k]))) >> shift);
+        let lo = per_axis(|k| u32::from(a[k].min(b[k]).min(c[k].min(d[k]))) >> shift);
+        let hi = per_axis(|k| u32::from(a[k].max(b[k]).max(c[k].max(d[k]))) >> shift);
         CellRange { lo, hi }
     }
 }

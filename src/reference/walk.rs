@@ -19,7 +19,7 @@
 use super::boundary::NONE;
 use super::candidates::Best;
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
-use crate::grid::{reciprocal, two_to};
+use crate::grid::{per_axis, reciprocal, two_to};
 use crate::mesh::{Field, Mesh, On};
 
 /// Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see [`super::corners`].
@@ -92,7 +92,7 @@ impl Stand {
 
 /// Interpolates the values `v` at the vertices to barycentric coordinates `b`.
 pub fn weighed(b: [f32; 4], v: [f32; 4]) -> f32 {
-    let beside = [0, 1, 2].map(|k| v[k] - v[3]);
+    let beside = per_axis(|k| v[k] - v[3]);
     ((b[0] * beside[0] + b[1] * beside[1]) + b[2] * beside[2]) + v[3]
 }
 
@@ -292,7 +292,7 @@ impl Walker<'_> {
 impl LeafCell {
     /// Point number `k` of the cell; number 0 is the centre.
     fn point(&self, k: u32) -> Vec3 {
-        [0, 1, 2].map(|c| {
+        per_axis(|c| {
             // A pseudorandom place in the cell, by Fibonacci hashing.
             let part = ((3 * k + c as u32).wrapping_mul(0x9e37_79b9) >> 8) as f32 * two_to(-23) - 1.0;
             let away = if k == 0 { 0.0 } else { part };

@@ -2,7 +2,7 @@
 
 use super::Scene;
 use super::skip::{Skips, inverse_of};
-use crate::grid::{canonical, reciprocal};
+use crate::grid::{canonical, per_axis, reciprocal};
 use crate::reference::tet::Sides;
 use crate::reference::walk::{Stand, way_before, weighed};
 use crate::render::{Lighting, Plan};
@@ -44,7 +44,7 @@ impl Gathered<'_> {
     fn add(&mut self, [red, green, blue, mut a]: [f32; 4], stand: &Stand, b: [f32; 4]) {
         let mut color = [red, green, blue];
         if let Some((light, half)) = &self.light {
-            let n = [0, 1, 2].map(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])));
+            let n = per_axis(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])));
             let shade = light.shade(n, self.direction, *half);
             color = color.map(|c| (c * shade.factor + shade.added).min(1.0));
             a += (1.0 - a) * shade.rim;
@@ -156,7 +156,7 @@ impl<'a> Marcher<'a> {
                 continue;
             }
             let s = steps * plan.step;
-            let at = [0, 1, 2].map(|c| ray.0[c] + ray.1[c] * s);
+            let at = per_axis(|c| ray.0[c] + ray.1[c] * s);
             let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
             let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));
             let color = plan.lookup(iso);
