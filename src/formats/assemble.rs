@@ -1,11 +1,11 @@
 //! Conversion of the points, cells and arrays of a file to a [`Mesh`] and its [`Report`], shared by all formats.
 
-use std::collections::HashMap;
 use std::ops::Range;
+use std::path::PathBuf;
 
 use super::array::{Array, Names};
 use super::budget::Budget;
-use super::cells::{CellType, Shape, split};
+use super::cells::{CellType, Shape, ghost, split};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, excerpt};
 use super::{LoadOptions, Merge};
@@ -15,8 +15,11 @@ use crate::mesh::{Field, Mesh, On};
 
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
 /// [`finish`](Assembly::finish).
-pub(crate) struct Assembly<'a> {
-    source: &'a Source,
+pub(crate) struct Assembly {
+    /// File that errors name.
+    path: PathBuf,
+    /// Number, over all files, of the first cell of that file.
+    first_cell: usize,
     pub format: String,
     /// Size of all files read.
     pub bytes: u64,
@@ -45,10 +48,11 @@ pub(crate) struct Assembly<'a> {
     n_corners: u64,
 }
 
-impl<'a> Assembly<'a> {
-    pub fn new(source: &'a Source, options: &LoadOptions, format: String) -> Self {
+impl Assembly {
+    pub fn new(source: &Source, options: &LoadOptions, format: String) -> Self {
         Self {
-            source,
+            path: source.path.clone(),
+            first_cell: 0,
             format,
             bytes: source.len() as u64,
             points: Vec::new(),
@@ -69,6 +73,11 @@ impl<'a> Assembly<'a> {
             corners: Vec::new(),
             n_corners: 0,
         }
+    }
+
+    /// An error at a place described in words.
+    fn error_in(&self, place: impl std::fmt::Display, message: impl Into<String>) -> Error {
+        Error::File { path: self.path.clone(), place: format!("{place}: "), message: message.into() }
     }
 
     /// Number of points of the file.
@@ -95,19 +104,19 @@ impl<'a> Assembly<'a> {
     /// Adds the next cell of the file. `nodes` are indices of points of a piece, which has the points `piece`.
     pub fn push_within(&mut self, kind: CellType, nodes: &[i64], piece: Range<usize>) -> Result<()> {
         let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
-        let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.source.path.display())))?;
-        let place = |cell: u32| format!("cell {cell} ({})", kind.name);
+        let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.path.display())))?;
+        let place = |cell: u32| format!("cell {} ({})", cell as usize - self.first_cell, kind.name);
         let corners = kind.shape.corners();
         if kind.nodes.map_or(nodes.len() < corners, |n| n != nodes.len()) {
             let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
-            return Err(self.source.error_in(place(id), format!("{} points, but this type has {wanted}", nodes.len())));
+            return Err(self.error_in(place(id), format!("{} points, but this type has {wanted}", nodes.len())));
         }
         let n_points = piece.len();
         if let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) {
             let shown = bad.saturating_add(self.first_point);
             let last = (n_points as i64 - 1).saturating_add(self.first_point);
             let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
-            return Err(self.source.error_in(place(id), format!("names point {shown}, but {range}")));
+            return Err(self.error_in(place(id), format!("names point {shown}, but {range}")));
         }
         let point = |&v: &i64| {
             let point = piece.start + v as usize;
@@ -189,10 +198,11 @@ impl<'a> Assembly<'a> {
             let found = if found.is_empty() { "and no other cells".into() } else { format!("only {}", found.join(", ")) };
             let also = self.warnings.join("; ");
             let also = if also.is_empty() { also } else { format!(" ({also})") };
-            return Err(self.source.error(format!("the file has no tetrahedra, hexahedra, wedges or pyramids, {found}{also}")));
+            let message = format!("the file has no tetrahedra, hexahedra, wedges or pyramids, {found}{also}");
+            return Err(Error::File { path: self.path, place: String::new(), message });
         }
         if self.points.len() >= u32::MAX as usize || self.tets.len() >= (u32::MAX / 4) as usize {
-            let message = format!("{}: {} points and {} tetrahedra", self.source.path.display(), self.points.len(), self.tets.len());
+            let message = format!("{}: {} points and {} tetrahedra", self.path.display(), self.points.len(), self.tets.len());
             return Err(Error::TooLarge(message));
         }
         let used = self.used()?;
@@ -249,7 +259,7 @@ impl<'a> Assembly<'a> {
         let [x, y, z] = self.points[point];
         let number = self.point_tags.get(point).copied().unwrap_or((point as i64).saturating_add(self.first_point));
         let place = format!("point {number} (of cell {cell})");
-        self.source.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
+        self.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
     }
 
     /// The vector to subtract from all points: on each axis the lower bound if the mesh is small compared with its
@@ -279,7 +289,8 @@ impl<'a> Assembly<'a> {
     fn fields(&mut self, n_points: usize) -> Vec<Field> {
         let mut fields = Vec::new();
         let mut names = Names::default();
-        for mut array in std::mem::take(&mut self.arrays) {
+        // What marks ghost cells and points is no field.
+        for mut array in std::mem::take(&mut self.arrays).into_iter().filter(|array| ghost(&array.name).is_none()) {
             let count = if array.on == On::Points { n_points } else { self.n_cells };
             let shown = excerpt(array.name.as_bytes());
             if array.components == 0 || array.components > 9 {
@@ -327,67 +338,6 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
         .fold(start, |(lo, hi), (p, _)| ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))))
 }
 
-/// Functions for meshes that consist of several pieces.
-impl Assembly<'_> {
-    /// Fills arrays with NaN for the pieces that do not have them; arrays that would need too many are left out.
-    pub fn complete_arrays(&mut self) {
-        self.arrays.retain_mut(|array| {
-            let count = if array.on == On::Points { self.points.len() } else { self.n_cells };
-            let filled = array.fill(count, &mut self.padding);
-            if let Err(limit) = &filled {
-                let name = excerpt(array.name.as_bytes());
-                self.warnings.push(format!("array `{name}` is left out: few pieces have it, and NaN for the others would take {limit}"));
-            }
-            filled.is_ok()
-        });
-    }
-
-    /// Sets the points of all pieces; `starts` holds the first point of each. A cell that is pushed later uses the
-    /// first of several points with equal coordinates, within the limits of the option, so that cells which share a
-    /// face cut it in the same way.
-    pub fn set_points(&mut self, points: Vec<[f64; 3]>, starts: &[usize]) {
-        self.points = points;
-        if self.merge == Merge::Nothing || (self.merge == Merge::Pieces && starts.len() < 2) {
-            return;
-        }
-        let piece_start = |i: usize| starts[..starts.partition_point(|&start| start <= i)].last().copied().unwrap_or(0);
-        let limit = |i: usize| if self.merge == Merge::All { i } else { piece_start(i) };
-        let mut first: HashMap<[u64; 3], u32> = HashMap::with_capacity(self.points.len());
-        let replacement = |(i, p): (usize, &[f64; 3])| {
-            // Adding 0 turns -0 into 0.
-            let first = *first.entry(p.map(|x| (x + 0.0).to_bits())).or_insert(i as u32);
-            if (first as usize) < limit(i) { first } else { i as u32 }
-        };
-        let merged: Vec<u32> = self.points.iter().enumerate().map(replacement).collect();
-        let n = merged.iter().enumerate().filter(|&(i, &point)| point as usize != i).count();
-        if n > 0 {
-            let pieces = if starts.len() > 1 { format!("{} pieces; ", starts.len()) } else { String::new() };
-            self.warnings.push(format!("{pieces}{n} points that coincide with others are merged"));
-            self.merged = merged;
-        }
-    }
-
-    /// Removes the points that are replaced, and their values, and moves together what is kept.
-    fn remove_replaced(&mut self, points: &mut Vec<[f32; 3]>) {
-        if self.merged.is_empty() {
-            return;
-        }
-        let kept = |i: usize| self.merged.get(i).is_some_and(|&point| point as usize == i);
-        let mut new = vec![0; points.len()];
-        (0..points.len()).filter(|&i| kept(i)).zip(0..).for_each(|(i, position)| new[i] = position);
-        self.tets.as_flattened_mut().iter_mut().for_each(|v| *v = new[*v as usize]);
-        retain(points, kept);
-        for array in self.arrays.iter_mut().filter(|a| a.on == On::Points) {
-            retain(&mut array.values, |i| kept(i / array.components));
-        }
-    }
-}
-
-/// Keeps the values whose position satisfies a condition.
-fn retain<T>(values: &mut Vec<T>, kept: impl Fn(usize) -> bool) {
-    let mut positions = 0..;
-    values.retain(|_| positions.next().is_some_and(&kept));
-}
-
+mod pieces;
 #[cfg(test)]
 mod tests;

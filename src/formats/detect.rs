@@ -19,7 +19,7 @@ pub(crate) enum Format {
 }
 
 /// File name extensions of the formats that can be read.
-pub(crate) const READABLE: &str = ".vtu, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
+pub(crate) const READABLE: &str = ".vtu, .pvtu, .vtm, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
@@ -55,7 +55,7 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     }
     let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
     match ending.as_str() {
-        "vtu" => Ok(Format::VtkXml),
+        "vtu" | "pvtu" | "vtm" | "pvd" => Ok(Format::VtkXml),
         "vtk" => Ok(Format::VtkLegacy),
         "msh" => Ok(Format::Gmsh),
         "mesh" | "meshb" if medit_binary => Ok(Format::MeditBinary),

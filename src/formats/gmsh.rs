@@ -28,7 +28,7 @@ struct Content {
     skipped: Vec<String>,
 }
 
-pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut reader = Reader::new(source);
     let mut version = None;
     let mut content = Content::default();
@@ -95,7 +95,7 @@ pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Asse
 }
 
 impl Content {
-    fn assemble(mut self, source: &Source, assembly: &mut Assembly<'_>) -> Result<()> {
+    fn assemble(mut self, source: &Source, assembly: &mut Assembly) -> Result<()> {
         if let Some(bad) = self.tags.iter().find(|&&t| t < 1) {
             return Err(source.error_in("$Nodes", format!("node number {bad}; they must be positive")));
         }
@@ -142,7 +142,7 @@ impl Content {
     }
 
     /// Adds the physical group and the geometric entity of each element as fields, if any of them is not 0.
-    fn marks(&self, assembly: &mut Assembly<'_>) {
+    fn marks(&self, assembly: &mut Assembly) {
         let physical: Vec<i64> = if self.groups.is_empty() {
             self.elements.physical.clone()
         } else {

@@ -22,7 +22,7 @@ pub(crate) fn has_tetrahedra(source: &Source) -> Result<bool> {
     Ok(false)
 }
 
-pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut assembly = Assembly::new(source, options, "Isaac Gym .tet".into());
     let mut lines = Lines::new(source);
     let (mut points, mut tets) = (Vec::new(), Vec::<[i64; 4]>::new());

@@ -52,7 +52,7 @@ pub(crate) struct Content {
 
 impl Content {
     /// Builds the mesh; points are numbered from 1.
-    pub fn assemble(self, source: &Source, assembly: &mut Assembly<'_>) -> Result<()> {
+    pub fn assemble(self, source: &Source, assembly: &mut Assembly) -> Result<()> {
         let missing = || source.error_line(source.len(), "the file ends, and there was no section Vertices");
         assembly.set_points(self.points.ok_or_else(missing)?, &[0]);
         assembly.first_point = 1;
@@ -81,7 +81,7 @@ impl Content {
     }
 }
 
-pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut tokens = Tokens::new(source, Some(b'#'));
     let mut content = Content::default();
     let mut version = None;

@@ -19,7 +19,7 @@ struct Reader<'a> {
     version: i64,
 }
 
-pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut tokens = Tokens::new(source, None);
     let big_endian = tokens.bytes(4)?.is_some_and(|code| code[0] == 0);
     let mut reader = Reader { source, tokens, big_endian, version: 1 };

@@ -41,7 +41,9 @@ mod vtk_attributes;
 mod vtk_reader;
 mod vtu;
 mod vtu_data;
+mod vtu_files;
 mod vtu_outline;
+mod vtu_parser;
 mod write;
 
 use std::path::Path;

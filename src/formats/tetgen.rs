@@ -25,7 +25,7 @@ pub(crate) fn companion(source: &Source) -> Result<Source> {
 }
 
 /// Reads a mesh. `main` is the file that the user named; errors about the whole mesh refer to it.
-pub(crate) fn read<'a>(main: &'a Source, companion: &Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(main: &Source, companion: &Source, options: &LoadOptions) -> Result<Assembly> {
     let (node, ele) = if ending(&main.path) == "node" { (main, companion) } else { (companion, main) };
     let mut assembly = Assembly::new(main, options, "TetGen .node and .ele".into());
     assembly.bytes = (node.len() + ele.len()) as u64;
@@ -114,7 +114,7 @@ fn header<const N: usize>(source: &Source, line: &Line<'_>, need: usize, what: &
     Ok(counts)
 }
 
-fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
+fn nodes(source: &Source, assembly: &mut Assembly) -> Result<Tags> {
     let mut lines = Lines::new(source);
     let line = lines.need("the first line")?;
     let at = line.at;
@@ -159,7 +159,7 @@ fn nodes(source: &Source, assembly: &mut Assembly<'_>) -> Result<Tags> {
     Ok(numbers)
 }
 
-fn elements(source: &Source, points: &Tags, assembly: &mut Assembly<'_>) -> Result<()> {
+fn elements(source: &Source, points: &Tags, assembly: &mut Assembly) -> Result<()> {
     let mut lines = Lines::new(source);
     let line = lines.need("the first line")?;
     let at = line.at;

@@ -35,7 +35,7 @@ impl Cells<'_> {
     }
 }
 
-pub(crate) fn read<'a>(source: &'a Source, options: &LoadOptions) -> Result<Assembly<'a>> {
+pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut reader = Reader { source, tokens: Tokens::new(source, None), binary: false };
     let format = reader.header()?;
     let mut assembly = Assembly::new(source, options, format);

@@ -53,8 +53,8 @@ pub struct TreeArgs {
 /// Arguments that say how a mesh file is read.
 #[derive(clap::Args)]
 pub struct ReadArgs {
-    /// Which points that have equal coordinates become one. pieces: those of different pieces of a .vtu file, so that
-    /// no boundary lies between pieces. all: for files in which each cell has points of its own; closes slits as well.
+    /// Which points that have equal coordinates become one. pieces: those of different pieces of a .vtu file, or of
+    /// different files of a .pvtu, so that no boundary lies between pieces. all: for files in which each cell has points of its own; closes slits as well.
     /// nothing: none, so that the pieces remain separate parts.
     #[arg(long, default_value_t = Merge::default(), value_parser = named::<Merge>, value_name = "nothing|pieces|all")]
     merge: Merge,

@@ -1,0 +1,141 @@
+//! The grids of a VTK XML file: its own, or those of the files that it lists (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`).
+
+use std::collections::{BTreeMap, BTreeSet, HashSet};
+use std::path::{Path, PathBuf};
+
+use super::LoadOptions;
+use super::budget::Budget;
+use super::detect::ending;
+use super::source::{Source, excerpt};
+use super::vtu_data::Codec;
+use super::vtu_parser::{Document, List, Piece, Skeleton, parse};
+use crate::error::Result;
+
+/// Most files that a list and the lists in it may name.
+const MOST_FILES: usize = 1 << 16;
+/// Most lists within each other.
+const MOST_DEEP: usize = 4;
+/// Endings of files of VTK that hold no unstructured grid.
+const OTHERS: [&str; 11] = ["vtp", "vti", "vtr", "vts", "vth", "htg", "vtt", "pvtp", "pvti", "pvtr", "pvts"];
+
+/// Where a grid is.
+pub(crate) enum Origin<'a> {
+    /// In the file that was named.
+    Named(&'a Source),
+    /// In a file that is listed. It is opened whenever it is read: there may be more files than a process may keep open.
+    Listed(PathBuf),
+}
+
+impl Origin<'_> {
+    /// The file; `opened` keeps it open.
+    pub fn open<'s>(&'s self, opened: &'s mut Option<Source>) -> Result<&'s Source> {
+        match self {
+            Self::Named(source) => Ok(source),
+            Self::Listed(path) => Ok(opened.insert(Source::open(path, ".vtu")?)),
+        }
+    }
+}
+
+/// A grid, without the values of its arrays.
+pub(crate) struct Grid<'a> {
+    pub origin: Origin<'a>,
+    pub codec: Codec,
+    pub pieces: Vec<Piece>,
+}
+
+impl<'a> Grid<'a> {
+    fn new(origin: Origin<'a>, skeleton: Skeleton, bytes: usize, options: &LoadOptions) -> Self {
+        let Skeleton { mut codec, pieces, .. } = skeleton;
+        codec.budget = Budget::new(bytes, options);
+        Self { origin, codec, pieces }
+    }
+}
+
+/// What a file, or those that it lists, consist of.
+pub(crate) struct Files<'a> {
+    pub format: String,
+    pub grids: Vec<Grid<'a>>,
+    /// Size of all files read.
+    pub bytes: usize,
+    pub warnings: Vec<String>,
+}
+
+/// Finds the grids of a file.
+pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Files<'a>> {
+    let bytes = source.len();
+    let list = match parse(source)? {
+        Document::Grid(skeleton) => {
+            let format = skeleton.format.clone();
+            return Ok(Files {
+                format,
+                grids: vec![Grid::new(Origin::Named(source), skeleton, bytes, options)],
+                bytes,
+                warnings: Vec::new(),
+            });
+        }
+        Document::List(list) => list,
+    };
+    let mut found = Found { options, grids: Vec::new(), bytes, seen: HashSet::new(), others: BTreeMap::new() };
+    found.add(source, &list, 1)?;
+    let others = found.others.iter().map(|(ending, n)| format!("{n} .{ending}")).collect::<Vec<_>>().join(", ");
+    if found.grids.is_empty() {
+        let others = if others.is_empty() { others } else { format!(", only {others}") };
+        return Err(source.error(format!("it lists no file with an unstructured grid{others}")));
+    }
+    let warnings = if others.is_empty() { Vec::new() } else { vec![format!("listed files without volume cells are left out: {others}")] };
+    let format = format!("{}, {} listed files", list.format, found.grids.len());
+    Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
+}
+
+/// What has been found in lists.
+struct Found<'a, 'o> {
+    options: &'o LoadOptions,
+    grids: Vec<Grid<'a>>,
+    bytes: usize,
+    seen: HashSet<PathBuf>,
+    /// Files of other kinds, by ending.
+    others: BTreeMap<String, usize>,
+}
+
+impl Found<'_, '_> {
+    /// Adds the grids of a list that lies in `deep - 1` others.
+    fn add(&mut self, source: &Source, list: &List, deep: usize) -> Result<()> {
+        let steps: BTreeSet<_> = list.files.iter().filter_map(|file| file.step.as_deref()).collect();
+        if steps.len() > 1 {
+            let last = list.files.last().map_or("", |file| &file.path);
+            let message =
+                format!("a series of {} time steps; open one of its files, for example `{}`", steps.len(), excerpt(last.as_bytes()));
+            return Err(source.error(message));
+        }
+        let folder = source.path.parent().unwrap_or(Path::new(""));
+        for listed in &list.files {
+            let fail = |message: String| Err(source.error_line(listed.at, format!("`{}`: {message}", excerpt(listed.path.as_bytes()))));
+            let path = folder.join(&listed.path);
+            let kind = ending(&path);
+            if OTHERS.contains(&kind.as_str()) {
+                *self.others.entry(kind).or_default() += 1;
+                continue;
+            }
+            if !self.seen.insert(path.clone()) {
+                return fail("the file is listed twice".into());
+            }
+            if self.seen.len() > MOST_FILES {
+                return fail(format!("more than {MOST_FILES} files are listed"));
+            }
+            if !path.is_file() {
+                return fail("there is no such file".into());
+            }
+            let opened = match Source::open(&path, ".vtu") {
+                Ok(opened) => opened,
+                Err(error) => return fail(format!("the listed file cannot be read ({error})")),
+            };
+            self.bytes += opened.len();
+            match parse(&opened)? {
+                Document::Grid(skeleton) => self.grids.push(Grid::new(Origin::Listed(path), skeleton, opened.len(), self.options)),
+                Document::List(list) if deep < MOST_DEEP => self.add(&opened, &list, deep + 1)?,
+                Document::List(_) => return fail(format!("lists lie more than {MOST_DEEP} deep within each other")),
+            }
+        }
+        Ok(())
+    }
+}

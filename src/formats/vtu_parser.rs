@@ -1,0 +1,294 @@
+//! Parser for the structure of VTK XML files: unstructured grids, without the values of their arrays, and files that list
+//! other files.
+
+use std::ops::Range;
+
+use quick_xml::Reader;
+use quick_xml::events::{BytesStart, Event};
+
+use super::scalar::Scalar;
+use super::source::{Source, excerpt};
+use super::tokens::Tokens;
+use super::vtu_data::{Appended, Codec, Place, StoredArray};
+use super::vtu_outline::Outline;
+use crate::error::Result;
+
+/// What a file contains.
+pub(crate) enum Document {
+    Grid(Skeleton),
+    List(List),
+}
+
+/// The content of the XML elements of an unstructured grid, without the values of arrays.
+pub(crate) struct Skeleton {
+    pub codec: Codec,
+    pub pieces: Vec<Piece>,
+    pub format: String,
+}
+
+/// One `Piece` of the grid.
+#[derive(Default)]
+pub(crate) struct Piece {
+    pub at: usize,
+    pub points: u64,
+    pub cells: u64,
+    /// Arrays, by the element that contains them.
+    pub point_data: Vec<StoredArray>,
+    pub cell_data: Vec<StoredArray>,
+    pub positions: Option<StoredArray>,
+    pub topology: Vec<StoredArray>,
+}
+
+/// A file that lists other files.
+pub(crate) struct List {
+    pub format: String,
+    pub files: Vec<Listed>,
+}
+
+/// A file that is listed.
+pub(crate) struct Listed {
+    /// Path, relative to the folder of the list.
+    pub path: String,
+    /// Time step in a series.
+    pub step: Option<String>,
+    /// Position of the XML element.
+    pub at: usize,
+}
+
+/// The root of a file.
+enum Root {
+    Grid(Codec, String),
+    List(List),
+}
+
+/// Types of files that list others in elements `DataSet`.
+const LISTS: [&str; 4] = ["vtkMultiBlockDataSet", "vtkPartitionedDataSet", "vtkPartitionedDataSetCollection", "Collection"];
+
+/// Parses a file.
+pub(crate) fn parse(source: &Source) -> Result<Document> {
+    let outline = Outline::read(source)?;
+    let reader = Reader::from_str(&outline.text);
+    Parser { source, outline: &outline, reader, stack: Vec::new(), root: None, pieces: Vec::new() }.run()
+}
+
+struct Parser<'a, 't> {
+    source: &'a Source,
+    outline: &'t Outline,
+    reader: Reader<&'t [u8]>,
+    stack: Vec<String>,
+    root: Option<Root>,
+    pieces: Vec<Piece>,
+}
+
+impl Parser<'_, '_> {
+    fn run(mut self) -> Result<Document> {
+        let mut appended = None;
+        loop {
+            let start = self.outline.in_file(self.reader.buffer_position() as usize);
+            let event = self.reader.read_event();
+            let end = self.reader.buffer_position() as usize;
+            let fail = |message: String| Err(self.source.error_line(start, message));
+            match event {
+                Err(error) => {
+                    let at = self.outline.in_file(self.reader.error_position() as usize);
+                    return Err(self.source.error_line(at, format!("not well-formed XML: {error}")));
+                }
+                Ok(Event::Eof) if self.stack.is_empty() => break,
+                Ok(Event::Eof) => return fail(format!("the file ends inside <{}>", self.stack.join("><"))),
+                Ok(Event::DocType(e)) if e.trim_start().get(..4).is_some_and(|t| t.eq_ignore_ascii_case("html")) => {
+                    return fail("an HTML page, not a mesh".into());
+                }
+                Ok(Event::DocType(_)) => {
+                    return fail("a document type declaration; VTK files have none, and entities are not expanded".into());
+                }
+                Ok(Event::GeneralRef(_)) if self.stack.last().is_some_and(|element| element == "DataArray") => {
+                    return fail("an entity reference in the data".into());
+                }
+                Ok(Event::Text(_)) => self.text(start..self.outline.in_file(end)),
+                Ok(Event::CData(_)) => self.text(start + "<![CDATA[".len()..self.outline.in_file(end) - "]]>".len()),
+                Ok(Event::Start(e)) => {
+                    if e.name().as_ref() == "AppendedData" {
+                        appended = Some((self.attributes(&e, start)?, self.outline.in_file(end)));
+                        break;
+                    }
+                    if self.stack.len() > 32 {
+                        return fail("elements nested more than 32 deep".into());
+                    }
+                    self.open(&e, start)?;
+                    self.stack.push(excerpt(e.name().as_ref().as_bytes()));
+                    if let Some(range) = self.outline.cut_at(end) {
+                        self.text(range);
+                    }
+                }
+                Ok(Event::Empty(e)) => self.open(&e, start)?,
+                Ok(Event::End(_)) => {
+                    self.stack.pop();
+                }
+                Ok(Event::Comment(_) | Event::Decl(_) | Event::PI(_) | Event::GeneralRef(_)) => {}
+            }
+        }
+        let (mut codec, format) = match self.root.take() {
+            None => return Err(self.source.error("no element <VTKFile>: not a VTK file")),
+            Some(Root::List(list)) => return Ok(Document::List(list)),
+            Some(Root::Grid(codec, format)) => (codec, format),
+        };
+        if self.pieces.is_empty() {
+            return Err(self.source.error("there is no element <Piece>"));
+        }
+        if let Some((attributes, end)) = appended {
+            codec.appended = self.appended(&attributes, end)?;
+        }
+        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format }))
+    }
+
+    /// Locates the appended data, whose element starts before byte `end` of the file; `None` if it is empty.
+    fn appended(&self, attributes: &[(String, String)], end: usize) -> Result<Option<Appended>> {
+        let encoding = get(attributes, "encoding").unwrap_or("base64");
+        let base64 = match encoding {
+            "raw" => false,
+            "base64" => true,
+            other => return Err(self.source.error_line(end, format!("appended data in encoding `{}`", excerpt(other.as_bytes())))),
+        };
+        let mut tokens = Tokens::new(self.source, None);
+        tokens.at = end;
+        tokens.skip_space()?;
+        if tokens.starts_with(b"</AppendedData")? {
+            return Ok(None);
+        }
+        if !tokens.starts_with(b"_")? {
+            return Err(self.source.error_byte(tokens.at, "the appended data must begin with an underscore"));
+        }
+        let start = tokens.at + 1;
+        let mut stop = self.source.len();
+        if base64 {
+            tokens.skip_until(|bytes| memchr::memchr(b'<', bytes))?;
+            stop = tokens.at;
+        }
+        Ok(Some(Appended { base64, range: start..stop }))
+    }
+
+    fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {
+        let mut found = Vec::new();
+        // The check for duplicates is quadratic, so it is disabled; no element of this format has more than 64
+        // attributes.
+        for attribute in element.attributes().with_checks(false).take(64) {
+            let attribute = attribute.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            let value = quick_xml::escape::unescape(&attribute.value);
+            let value = value.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+        }
+        Ok(found)
+    }
+
+    fn root(&self, attributes: &[(String, String)], at: usize) -> Result<Root> {
+        let kind = get(attributes, "type").unwrap_or("");
+        let version = excerpt(get(attributes, "version").unwrap_or("without a version").as_bytes());
+        if kind == "PUnstructuredGrid" || LISTS.contains(&kind) {
+            return Ok(Root::List(List { format: format!("VTK XML {kind} {version}"), files: Vec::new() }));
+        }
+        if kind != "UnstructuredGrid" {
+            return Err(self.source.error_line(at, format!("a VTK XML file of type `{}`, not UnstructuredGrid", excerpt(kind.as_bytes()))));
+        }
+        let codec = Codec::new(|name| get(attributes, name)).map_err(|message| self.source.error_line(at, message))?;
+        let format = format!("VTK XML unstructured grid {version}{}", codec.describe());
+        Ok(Root::Grid(codec, format))
+    }
+
+    fn open(&mut self, element: &BytesStart<'_>, at: usize) -> Result<()> {
+        let parent = self.stack.last().map(String::as_str);
+        match (element.name().as_ref(), parent) {
+            ("VTKFile", None) => {
+                let attributes = self.attributes(element, at)?;
+                self.root = Some(self.root(&attributes, at)?);
+            }
+            (name, None) => {
+                let message = format!("an XML or HTML document <{}>, not a VTK file", excerpt(name.as_bytes()));
+                return Err(self.source.error_line(at, message));
+            }
+            (name @ ("Piece" | "DataSet"), _) if matches!(self.root, Some(Root::List(_))) => {
+                let attributes = self.attributes(element, at)?;
+                let path = get(&attributes, if name == "Piece" { "Source" } else { "file" });
+                let listed = path.map(|path| Listed { path: path.into(), step: get(&attributes, "timestep").map(Into::into), at });
+                // A block without a file is empty.
+                if let Some(Root::List(list)) = &mut self.root {
+                    list.files.extend(listed);
+                }
+            }
+            ("Piece", _) => {
+                let attributes = self.attributes(element, at)?;
+                let number = |name: &str| {
+                    let text = get(&attributes, name).unwrap_or("");
+                    let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", excerpt(text.as_bytes())));
+                    text.trim().parse::<u64>().map_err(|_| wrong())
+                };
+                let piece = Piece { at, points: number("NumberOfPoints")?, cells: number("NumberOfCells")?, ..Piece::default() };
+                self.pieces.push(piece);
+            }
+            ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
+                let group = group.to_owned();
+                let array = self.array(&self.attributes(element, at)?, at)?;
+                if let Some(piece) = self.pieces.last_mut() {
+                    match group.as_str() {
+                        "PointData" => piece.point_data.push(array),
+                        "CellData" => piece.cell_data.push(array),
+                        "Points" => piece.positions = Some(array),
+                        _ => piece.topology.push(array),
+                    }
+                }
+            }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn array(&self, attributes: &[(String, String)], at: usize) -> Result<StoredArray> {
+        let name = get(attributes, "Name").unwrap_or("unnamed").to_owned();
+        let fail = |message: String| self.source.error_line(at, format!("array `{}`: {message}", excerpt(name.as_bytes())));
+        let kind = get(attributes, "type").unwrap_or("");
+        let scalar = match kind {
+            "String" | "Bit" => None,
+            _ => Some(Scalar::vtk_xml(kind).ok_or_else(|| fail(format!("unknown type `{}`", excerpt(kind.as_bytes()))))?),
+        };
+        let components = match get(attributes, "NumberOfComponents") {
+            None => 1,
+            Some(text) => {
+                let n = text.trim().parse::<u64>().ok().filter(|&n| u32::try_from(n).is_ok());
+                n.ok_or_else(|| fail(format!("NumberOfComponents=\"{}\"", excerpt(text.as_bytes()))))?
+            }
+        };
+        let place = match get(attributes, "format").unwrap_or("ascii") {
+            "ascii" => Place::Ascii(Vec::new()),
+            "binary" => Place::Inline(Vec::new()),
+            "appended" => {
+                let text = get(attributes, "offset").unwrap_or("");
+                let offset = text.trim().parse::<u64>();
+                Place::Appended(offset.map_err(|_| fail(format!("offset=\"{}\" is not a number", excerpt(text.as_bytes()))))?)
+            }
+            other => return Err(fail(format!("unknown format `{}`", excerpt(other.as_bytes())))),
+        };
+        Ok(StoredArray { name, scalar, components, place, at })
+    }
+
+    /// Assigns text to the array whose element is innermost.
+    fn text(&mut self, range: Range<usize>) {
+        let [.., group, last] = self.stack.as_slice() else { return };
+        if last != "DataArray" {
+            return;
+        }
+        let Some(piece) = self.pieces.last_mut() else { return };
+        let array = match group.as_str() {
+            "PointData" => piece.point_data.last_mut(),
+            "CellData" => piece.cell_data.last_mut(),
+            "Points" => piece.positions.as_mut(),
+            "Cells" => piece.topology.last_mut(),
+            _ => None,
+        };
+        if let Some(StoredArray { place: Place::Ascii(parts) | Place::Inline(parts), .. }) = array {
+            parts.push(range);
+        }
+    }
+}
+
+fn get<'s>(attributes: &'s [(String, String)], name: &str) -> Option<&'s str> {
+    attributes.iter().find(|(key, _)| key == name).map(|(_, value)| value.as_str())
+}
