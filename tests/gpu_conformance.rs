@@ -55,10 +55,11 @@ fn families(binding: Binding) -> Vec<(String, Vec<Case>)> {
     let part = |case: &Case| match case.name.split('/').next() {
         _ if driver == "swiftshader" => "meshes",
         Some("locate" | "overlap") => "points",
-        Some("render" | "slice") => "pictures",
+        Some("render") => "pictures",
+        Some("slice") => "slices",
         _ => "trees",
     };
-    for name in ["trees", "points", "pictures", "meshes"] {
+    for name in ["trees", "points", "slices", "pictures", "meshes"] {
         let cases: Vec<Case> = over_meshes.iter().filter(|case| part(case) == name).cloned().collect();
         if !cases.is_empty() {
             families.insert(0, (name.to_string(), cases));

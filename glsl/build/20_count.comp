@@ -1,7 +1,7 @@
 #version 460
 // Codes, 1 of 2: counts the candidates of every tetrahedron, or its shares of up to SHARE candidates, of which it has
-// at least one. `counts` has one more element, for the total. With CLEAR, the kernel also clears the marks that a finer
-// level has left.
+// at least one. `counts` has one more element, for the total. With CLEAR, the kernel also clears the marks of the level,
+// whatever they were.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

@@ -14,13 +14,16 @@ struct Over {
     /// The word that receives the number of shares.
     total: BufferRef,
     coarser: Option<CoarserScratch>,
-    /// The marks that a finer level left and that must be cleared.
+    /// The marks to be cleared, those of the level that is counted.
     marks: Option<BufferRef>,
 }
 
+/// Most words of marks that an invocation clears.
+const CLEARED: u32 = 256;
+
 impl Over {
-    fn all(scratch: &CountScratch) -> Self {
-        Self { total: scratch.total, coarser: None, marks: None }
+    fn all(scratch: &CountScratch, marks: Option<BufferRef>) -> Self {
+        Self { total: scratch.total, coarser: None, marks }
     }
 
     /// The workgroups of a dispatch over `items` items; `slot` is its place among the three dispatches that [`Fit`]
@@ -32,20 +35,30 @@ impl Over {
 
 impl Build<'_> {
     /// Stage 2, first part: the number of candidates of every tetrahedron (or of shares of them, where they are
-    /// filtered), and the offset of its first.
+    /// filtered), and the offset of its first. Where there is memory for them, marks are cleared in passing: as many as
+    /// the level has, which only the device knows.
     pub fn count(&self, r: &mut Recorder<'_>) -> Result<()> {
-        r.stage("build.count", |r| self.count_candidates(r, Over::all(self.counts)))
+        r.stage("build.count", |r| self.count_candidates(r, Over::all(self.counts, self.marks())))
+    }
+
+    /// Bits of the cells that the surface may pass through.
+    pub(super) fn marks(&self) -> Option<BufferRef> {
+        self.filter.and_then(|f| f.seeds).map(|seeds| seeds.marks)
+    }
+
+    /// Clears all marks there is memory for, where they had none when candidates were counted.
+    pub fn clear_marks(&self, r: &mut Recorder<'_>) -> Result<()> {
+        let Some(marks) = self.marks() else { return Ok(()) };
+        r.stage("build.filter", |r| {
+            r.fill(marks, 0);
+            Ok(())
+        })
     }
 
     /// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`.
     pub fn filter(&self, r: &mut Recorder<'_>) -> Result<()> {
         let Some(filter) = self.filter else { return Ok(()) };
-        r.stage("build.filter", |r| {
-            if let Some(seeds) = &filter.seeds {
-                r.fill(seeds.marks, 0);
-            }
-            self.filter_candidates(r, filter, Over::all(self.counts))
-        })
+        r.stage("build.filter", |r| self.filter_candidates(r, filter, Over::all(self.counts, None)))
     }
 
     /// Stage 2, where entries may exceed the capacity: counts and filters coarser levels until the entries fit.
@@ -56,7 +69,7 @@ impl Build<'_> {
         let (shares, entries, capacity, levels) = (counts.total, filter.entries, capacity.entries, capacity.level);
         let fit = Fit { grid, status, shares, entries, tried_shares, tried_entries, live, groups, tets, capacity, first: 1 };
         let spec = FitSpec { workgroup: r.gpu().subgroup_size(), each: r.gpu().target().each, ..Default::default() };
-        let over = Over { total: tried_shares, coarser: Some(coarser), marks: filter.seeds.map(|seeds| seeds.marks) };
+        let over = Over { total: tried_shares, coarser: Some(coarser), marks: self.marks() };
         r.stage("build.fit", |r| {
             r.barrier("codes.scan → fit");
             r.dispatch(&fit, spec, Groups::Count(1))?;
@@ -79,7 +92,8 @@ impl Build<'_> {
         let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
         let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
         let spec = CountSpec { workgroup, share, clear, ..Default::default() };
-        r.dispatch(&count, spec, over.groups(0, tets + 1, workgroup))?;
+        let clearing = over.marks.map_or(0, |marks| (marks.size / 4).div_ceil(u64::from(CLEARED)) as u32);
+        r.dispatch(&count, spec, over.groups(0, clearing.max(tets + 1), workgroup))?;
         let all = over.coarser.map_or(Count::host(tets + 1), |coarser| Count::device(tets + 1, coarser.live));
         cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
     }

@@ -196,12 +196,12 @@ impl Build<'_> {
 
     /// Stage 4, first part: the leaves (Alg. 1).
     pub fn leaves(&self, r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
-        let Self { mesh, status, grid, filter, .. } = *self;
+        let Self { mesh, status, grid, .. } = *self;
         let target = r.gpu().target();
         let TreeMemory { p, po, flags, masks, .. } = *tree;
         let entries = self.entries(&tree.capacity);
         // The cells marked by the filter are those with boundary tetrahedra.
-        let marks = filter.and_then(|f| f.seeds).map(|s| s.marks);
+        let marks = self.marks();
         r.stage("build.leaves", |r| {
             let groups = Groups::Indirect(scratch.arguments.part(0, 12));
             let (live, run, capacity) = (entries.word(r.gpu()), target.run, tree.capacity.entries);
