@@ -10,7 +10,7 @@ pub(crate) const fn two_to(n: i32) -> f32 {
     f32::from_bits(((n + 127) as u32) << 23)
 }
 
-/// What `of` gives for each axis. Compilers make straight code of it, but a call of `[0, 1, 2].map`.
+/// What `of` gives for each axis. It becomes straight code, unlike `[0, 1, 2].map`, which rustc 1.95 leaves a call.
 #[inline]
 pub(crate) fn per_axis<T>(mut of: impl FnMut(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]

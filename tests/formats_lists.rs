@@ -94,10 +94,12 @@ fn errors_name_the_list_or_the_listed_file() {
     let list = |sources: &[&str]| format!("<Piece Source='{}'/>", sources.join("'/>\n<Piece Source='"));
     let broken = file("UnstructuredGrid", &piece("0 0 0 1 0 0 0 1 0 0 0 1", 7).replace(">0 1 2 3 0 1 2 3<", ">0 1 2 3 0 1 2 4<"));
     fs::write(folder.path().join("broken.vtu"), broken.replace("Name='vtkGhostType'", "Name='g'")).unwrap();
+    fs::write(folder.path().join("far.vtu"), file("UnstructuredGrid", &piece("0 0 0 1 0 nan 0 1 0 0 0 1", 7))).unwrap();
     for (sources, wanted) in [
         (&["c/grid.vtu", "gone.vtu"][..], "case.pvtu: line 4: `gone.vtu`: there is no such file"),
         (&["c/grid.vtu", "c/grid.vtu"], "case.pvtu: line 4: `c/grid.vtu`: the file is listed twice"),
         (&["c/grid.vtu", "broken.vtu"], "broken.vtu: cell 1 (tetrahedron): names point 4, but points are 0 to 3"),
+        (&["c/grid.vtu", "far.vtu"], "far.vtu: a point (of cell 0): (1.0, 0.0, NaN): its coordinates must be finite"),
         // Neither folders nor devices, which may have no end.
         (&["c"], "case.pvtu: line 3: `c`: there is no such file"),
         (&["/dev/zero"], "case.pvtu: line 3: `/dev/zero`: there is no such file"),

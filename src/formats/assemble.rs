@@ -16,10 +16,10 @@ use crate::mesh::{Field, Mesh, On};
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
 /// [`finish`](Assembly::finish).
 pub(crate) struct Assembly {
-    /// File that errors name.
+    /// The file that was named.
     path: PathBuf,
-    /// Number, over all files, of the first cell of that file.
-    first_cell: usize,
+    /// The files that it lists, and the number of the first cell of each.
+    files: Vec<(PathBuf, usize)>,
     pub format: String,
     /// Size of all files read.
     pub bytes: u64,
@@ -52,7 +52,7 @@ impl Assembly {
     pub fn new(source: &Source, options: &LoadOptions, format: String) -> Self {
         Self {
             path: source.path.clone(),
-            first_cell: 0,
+            files: Vec::new(),
             format,
             bytes: source.len() as u64,
             points: Vec::new(),
@@ -75,9 +75,11 @@ impl Assembly {
         }
     }
 
-    /// An error at a place described in words.
-    fn error_in(&self, place: impl std::fmt::Display, message: impl Into<String>) -> Error {
-        Error::File { path: self.path.clone(), place: format!("{place}: "), message: message.into() }
+    /// An error about a cell; `place` describes it, given its number in its file.
+    fn error_at(&self, cell: u32, place: impl FnOnce(usize) -> String, message: String) -> Error {
+        let listed = self.files[..self.files.partition_point(|file| file.1 <= cell as usize)].last();
+        let (path, first) = listed.map_or((&self.path, 0), |(path, first)| (path, *first));
+        Error::File { path: path.clone(), place: format!("{}: ", place(cell as usize - first)), message }
     }
 
     /// Number of points of the file.
@@ -105,18 +107,18 @@ impl Assembly {
     pub fn push_within(&mut self, kind: CellType, nodes: &[i64], piece: Range<usize>) -> Result<()> {
         let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
         let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.path.display())))?;
-        let place = |cell: u32| format!("cell {} ({})", cell as usize - self.first_cell, kind.name);
+        let fail = |message| Err(self.error_at(id, |cell| format!("cell {cell} ({})", kind.name), message));
         let corners = kind.shape.corners();
         if kind.nodes.map_or(nodes.len() < corners, |n| n != nodes.len()) {
             let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
-            return Err(self.error_in(place(id), format!("{} points, but this type has {wanted}", nodes.len())));
+            return fail(format!("{} points, but this type has {wanted}", nodes.len()));
         }
         let n_points = piece.len();
         if let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) {
             let shown = bad.saturating_add(self.first_point);
             let last = (n_points as i64 - 1).saturating_add(self.first_point);
             let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
-            return Err(self.error_in(place(id), format!("names point {shown}, but {range}")));
+            return fail(format!("names point {shown}, but {range}"));
         }
         let point = |&v: &i64| {
             let point = piece.start + v as usize;
@@ -258,8 +260,9 @@ impl Assembly {
     fn bad_point(&self, point: usize, cell: u32, why: &str) -> Error {
         let [x, y, z] = self.points[point];
         let number = self.point_tags.get(point).copied().unwrap_or((point as i64).saturating_add(self.first_point));
-        let place = format!("point {number} (of cell {cell})");
-        self.error_in(place, format!("({x:?}, {y:?}, {z:?}): {why}"))
+        // Points of listed files are numbered over all files, which tells the user nothing.
+        let what = if self.files.is_empty() { format!("point {number}") } else { "a point".into() };
+        self.error_at(cell, |cell| format!("{what} (of cell {cell})"), format!("({x:?}, {y:?}, {z:?}): {why}"))
     }
 
     /// The vector to subtract from all points: on each axis the lower bound if the mesh is small compared with its

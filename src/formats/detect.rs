@@ -55,7 +55,7 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     }
     let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
     match ending.as_str() {
-        "vtu" | "pvtu" | "vtm" | "pvd" => Ok(Format::VtkXml),
+        "vtu" | "pvtu" | "vtm" | "vtpd" | "vtpc" | "pvd" => Ok(Format::VtkXml),
         "vtk" => Ok(Format::VtkLegacy),
         "msh" => Ok(Format::Gmsh),
         "mesh" | "meshb" if medit_binary => Ok(Format::MeditBinary),

@@ -84,7 +84,7 @@ impl Default for LoadOptions {
 pub enum Merge {
     /// None of them.
     Nothing,
-    /// A point and the first one of an earlier piece of the file, so that the seams between pieces do not become
+    /// A point and the first one of an earlier piece of the file, or of an earlier file of a list, so that the seams between pieces do not become
     /// boundary.
     #[default]
     Pieces,
@@ -121,7 +121,8 @@ pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
 }
 
 /// Reads a mesh from the content of a file. `name` is the path used in messages, and its extension helps to recognise
-/// the format. The second file of a TetGen pair is searched for next to `name`.
+/// the format. The second file of a TetGen pair and the files that a `.pvtu` or the like lists are searched for next to
+/// `name`.
 ///
 /// # Errors
 /// As [`load`].

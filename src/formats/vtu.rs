@@ -11,7 +11,7 @@ use super::cells::{self, CellType};
 use super::report::Fate;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
-use super::vtu_files::{Files, Grid, grids};
+use super::vtu_files::{Files, Grid, Origin, grids};
 use super::vtu_parser::Piece;
 use crate::error::Result;
 use crate::mesh::On;
@@ -22,7 +22,7 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut assembly = Assembly::new(source, options, format);
     (assembly.bytes, assembly.padding, assembly.warnings) = (bytes as u64, Budget::new(bytes, options), warnings);
     let (mut points, mut starts) = (Vec::new(), Vec::new());
-    for Grid { origin, codec, pieces, .. } in &mut grids {
+    for Grid { origin, codec, pieces } in &mut grids {
         let mut opened = None;
         let source = origin.open(&mut opened)?;
         for (i, piece) in pieces.iter().enumerate() {
@@ -32,17 +32,18 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     }
     assembly.set_points(points, &starts);
     let (mut places, mut starts) = (Places::new(), starts.into_iter());
-    for Grid { origin, codec, pieces, .. } in &mut grids {
+    for Grid { origin, codec, pieces } in &mut grids {
         let mut opened = None;
         let source = origin.open(&mut opened)?;
-        assembly.enter(&source.path);
+        if let Origin::Listed(path) = &*origin {
+            assembly.enter(path);
+        }
         for (i, (piece, start)) in pieces.iter().zip(&mut starts).enumerate() {
             let first_cell = assembly.cells();
             read_cells(source, codec, &mut assembly, piece, i, start)?;
             read_arrays(source, codec, &mut assembly, &mut places, piece, [start, first_cell])?;
         }
     }
-    assembly.leave(source);
     assembly.complete_arrays();
     Ok(assembly)
 }

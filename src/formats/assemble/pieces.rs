@@ -4,21 +4,14 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::super::Merge;
-use super::super::source::{Source, excerpt};
+use super::super::source::excerpt;
 use super::Assembly;
 use crate::mesh::On;
 
 impl Assembly {
-    /// The cells that follow are those of this file, as errors about them say.
+    /// The cells that follow are those of a listed file.
     pub fn enter(&mut self, path: &Path) {
-        self.path = path.into();
-        self.first_cell = self.n_cells;
-    }
-
-    /// Errors that follow concern the mesh as a whole, whose file this is.
-    pub fn leave(&mut self, main: &Source) {
-        self.path.clone_from(&main.path);
-        self.first_cell = 0;
+        self.files.push((path.into(), self.n_cells));
     }
 
     /// Adds a warning, unless an earlier piece has given it. A hostile file has too many to look through all.
