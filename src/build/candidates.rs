@@ -46,19 +46,16 @@ impl Build<'_> {
         self.filter.and_then(|f| f.seeds).map(|seeds| seeds.marks)
     }
 
-    /// Clears all marks there is memory for, where they had none when candidates were counted.
-    pub fn clear_marks(&self, r: &mut Recorder<'_>) -> Result<()> {
-        let Some(marks) = self.marks() else { return Ok(()) };
-        r.stage("build.filter", |r| {
-            r.fill(marks, 0);
-            Ok(())
-        })
-    }
-
-    /// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`.
-    pub fn filter(&self, r: &mut Recorder<'_>) -> Result<()> {
+    /// Stage 2 where not every candidate is an entry: decides which are; their number goes to `filter.entries`. Marks
+    /// that had no memory yet when candidates were counted are not `cleared`.
+    pub fn filter(&self, r: &mut Recorder<'_>, cleared: bool) -> Result<()> {
         let Some(filter) = self.filter else { return Ok(()) };
-        r.stage("build.filter", |r| self.filter_candidates(r, filter, Over::all(self.counts, None)))
+        r.stage("build.filter", |r| {
+            if let (false, Some(marks)) = (cleared, self.marks()) {
+                r.fill(marks, 0);
+            }
+            self.filter_candidates(r, filter, Over::all(self.counts, None))
+        })
     }
 
     /// Stage 2, where entries may exceed the capacity: counts and filters coarser levels until the entries fit.

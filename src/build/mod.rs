@@ -94,7 +94,7 @@ pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, optio
     let most = if filter.is_some() { capacity.candidates } else { capacity.candidates.min(capacity.entries) };
     build.depth(r, most, capacity.level)?;
     build.count(r)?;
-    build.filter(r)?;
+    build.filter(r, true)?;
     build.fit(r, capacity)?;
     build.codes(r, tree.p, capacity, sorted)?;
     build.count_splits(r, capacity, sorted)?;

@@ -91,10 +91,7 @@ impl Tree {
             Arena::reserve(gpu, "olbvh.build.filter", |a| FilterScratch::carve(gpu, a, tets, options, &capacity))?;
         let build = Build { filter: filter.as_ref(), ..build };
         if let Some(filter) = &filter {
-            let ((), time) = gpu.submit("olbvh.build.filter", |r| {
-                build.clear_marks(r)?;
-                build.filter(r)
-            })?;
+            let ((), time) = gpu.submit("olbvh.build.filter", |r| build.filter(r, false))?;
             stages.extend(time.stages);
             capacity.entries = gpu.download_one(&filter_buffer, filter.entries)?;
         }
