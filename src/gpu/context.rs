@@ -239,9 +239,15 @@ impl Gpu {
         &self.inner.foundation.device
     }
 
-    /// Subgroup size that pipelines are compiled for.
+    /// Subgroup size that pipelines are compiled for, except those of queries.
     pub fn subgroup_size(&self) -> u32 {
         self.inner.foundation.report.subgroup
+    }
+
+    /// Subgroup size that the pipeline of a kernel is compiled for.
+    pub(super) fn subgroup_size_of(&self, kernel: &str) -> u32 {
+        let asks = ["olbvh.query.", "olbvh.baseline."].iter().any(|room| kernel.starts_with(room));
+        if asks { self.report().query_subgroup } else { self.subgroup_size() }
     }
 
     /// Messages of validation layers so far; always empty without a layer.

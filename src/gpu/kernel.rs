@@ -162,7 +162,8 @@ fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pi
             .module(module)
             .name(c"main")
             .specialization_info(&specialization);
-        let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default().required_subgroup_size(gpu.subgroup_size());
+        let size = gpu.subgroup_size_of(info.name);
+        let mut required = vk::PipelineShaderStageRequiredSubgroupSizeCreateInfo::default().required_subgroup_size(size);
         if gpu.requires_subgroup_size() {
             // Where the driver may choose the subgroup size, `gl_SubgroupSize` and the lanes that run can differ:
             // require the size and full subgroups.

@@ -62,8 +62,10 @@ pub struct DeviceReport {
     pub api: String,
     /// Versions of API and driver, used to prefer the newer of two drivers for one device.
     pub(crate) version: [u32; 2],
-    /// Subgroup size that kernels are compiled for.
+    /// Subgroup size that kernels are compiled for, except those of queries.
     pub subgroup: u32,
+    /// Subgroup size that the kernels of queries are compiled for.
+    pub query_subgroup: u32,
     /// Limits of a workgroup.
     pub room: WorkgroupLimits,
     /// Vendor id: a PCI id, or one assigned by Khronos.
@@ -143,11 +145,18 @@ fn compute_family(families: &[vk::QueueFamilyProperties]) -> Option<usize> {
 }
 
 /// The subgroup size that kernels are compiled for: the usual one. Intel's usual size is the largest, 32, which leaves
-/// each lane 32 or 64 words of registers, too few for the queries. Where sizes can be required, half that size gives
-/// each lane twice as many.
+/// each lane 32 or 64 words of registers; where sizes can be required, half that size gives each lane twice as many.
 fn subgroup_of(vendor: u32, [least, usual, most]: [u32; 3], control: bool) -> u32 {
     let size = if vendor == INTEL && control { usual.min(16).clamp(least, most) } else { usual };
     size.max(1)
+}
+
+/// The subgroup size that the kernels of queries are compiled for, where the others have size `usual`: the smallest that
+/// can be required, but not below 8. Queries go different ways in neighbouring lanes, which then wait for each other,
+/// and they hold a tetrahedron and more per lane: with 16 lanes on Intel's GPUs before Xe2, a lane has 64 registers, and
+/// Mesa's compiler stores 323 values of the location in memory; with 8 lanes, it stores 2.
+fn query_subgroup_of(usual: u32, least: u32, control: bool) -> u32 {
+    if control { least.max(8).min(usual) } else { usual }
 }
 
 impl Requirements {
@@ -306,7 +315,8 @@ impl DeviceReport {
         let subgroup = subgroup_of(properties.vendor_id, requirements.subgroup_sizes, requirements.subgroup_size_control);
         // The kernels' shared arrays hold the sums of at most 128 subgroups.
         let subgroups = requirements.workgroup_subgroups.min(128);
-        let of_subgroups = subgroup.saturating_mul(subgroups);
+        let query_subgroup = query_subgroup_of(subgroup, requirements.subgroup_sizes[0], requirements.subgroup_size_control);
+        let of_subgroups = query_subgroup.saturating_mul(subgroups);
         let invocations = limits.max_compute_work_group_invocations.min(limits.max_compute_work_group_size[0]).min(of_subgroups);
         let heaps = &memory.memory_heaps[..memory.memory_heap_count as usize];
         Self {
@@ -315,6 +325,7 @@ impl DeviceReport {
             api: format!("{}.{}.{}", vk::api_version_major(version), vk::api_version_minor(version), vk::api_version_patch(version)),
             version: [version, properties.driver_version],
             subgroup,
+            query_subgroup,
             room: WorkgroupLimits {
                 subgroup,
                 invocations: invocations / subgroup * subgroup,
@@ -349,6 +360,17 @@ mod tests {
         assert_eq!(subgroup_of(INTEL, [8, 32, 32], false), 32, "the driver chooses");
         assert_eq!(subgroup_of(0x1002, [32, 64, 64], true), 64);
         assert_eq!(subgroup_of(0, [0, 0, 0], false), 1);
+    }
+
+    #[test]
+    fn queries_run_in_narrow_subgroups() {
+        assert_eq!(query_subgroup_of(16, 8, true), 8, "Intel before Xe2");
+        assert_eq!(query_subgroup_of(16, 16, true), 16, "Xe2");
+        assert_eq!(query_subgroup_of(64, 32, true), 32, "RDNA");
+        assert_eq!(query_subgroup_of(64, 64, true), 64, "GCN");
+        assert_eq!(query_subgroup_of(32, 1, true), 8);
+        assert_eq!(query_subgroup_of(4, 4, true), 4);
+        assert_eq!(query_subgroup_of(64, 32, false), 64, "the driver chooses");
     }
 
     #[test]

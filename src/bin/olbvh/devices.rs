@@ -61,10 +61,11 @@ impl<'a> Listed<'a> {
             RayTracing { .. } => "",
         };
         let [memory, at_once] = [d.memory, d.largest_allocation.min(d.largest_buffer).min(d.memory)].map(text::bytes);
+        let narrow = if d.query_subgroup == d.subgroup { String::new() } else { format!(" ({} for queries)", d.query_subgroup) };
         let mut lines = format!("{:>3}  {}\n", self.index, d.name);
         let _ = writeln!(
             lines,
-            "     {}; Vulkan {}; subgroups of {}; {memory} of memory, {at_once} at once; {}{rays}",
+            "     {}; Vulkan {}; subgroups of {}{narrow}; {memory} of memory, {at_once} at once; {}{rays}",
             d.driver, d.api, d.subgroup, d.kind
         );
         let _ = match &self.fault {
@@ -87,7 +88,8 @@ impl<'a> Listed<'a> {
             json!({ "name": shapes.target.name, "profile": profile })
         });
         json!({
-            "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup, "kind": d.kind,
+            "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup,
+            "query_subgroup": d.query_subgroup, "kind": d.kind,
             "memory_bytes": d.memory, "largest_buffer_bytes": d.largest_buffer, "largest_allocation_bytes": d.largest_allocation,
             "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
             "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines, "target": target,
