@@ -11,7 +11,6 @@ struct Stand {
     // Neighbours across the faces opposite to `cell`, loaded together with it so that their cache misses overlap.
     uvec4 beside;
     vec4 x, y, z;
-    Bounds box;
 };
 
 // How a step changes what is kept per corner.
@@ -24,7 +23,7 @@ struct Exchange {
 // Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
 uint walked_tets = 0u;
 
-Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
 
 vec3 corner_of(Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
 
@@ -41,13 +40,15 @@ Stand stand_in(uint t) {
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
-    s.box = bounds_of(corners_of(s));
     return s;
 }
 
 Tet tet_of(Stand s) { return Tet(corners_of(s), ranks(s.cell)); }
 
-Sides sides_of(Stand s, vec3 x) { return sides_of(corners_of(s), s.box, x); }
+Sides sides_of(Stand s, vec3 x) {
+    vec3 v[4] = corners_of(s);
+    return sides_of(v, bounds_of(v), x); // kept bounds would save a few operations and take seven registers
+}
 
 float of_vertex(Stand s, vec4 ascending, uint id) {
     return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
@@ -97,7 +98,6 @@ bool step_on(inout Stand s, Sides at, out Exchange e) {
     s.x = exchange(s.x, e, v.x);
     s.y = exchange(s.y, e, v.y);
     s.z = exchange(s.z, e, v.z);
-    s.box = bounds_of(corners_of(s));
     return true;
 }
 
