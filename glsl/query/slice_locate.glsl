@@ -43,6 +43,12 @@ uvec2 row;         // of the next voxel: its row in the layer, and the layer
 Stand stand;
 vec4 held;
 
+// Nothing of the last tetrahedron is needed any more; see volume_march.glsl.
+void leave() {
+    stand = stand_nowhere();
+    held = vec4(0.0);
+}
+
 void enter(uint t) {
     stand = stand_in(t);
     if (FIELD != 0u) held = field_in(stand);
@@ -128,7 +134,7 @@ void main() {
         row = voxel_row(plan, lines.x + state.next);
         while (plan.refused != 0u && state.next < count) settle(NONE, uintBitsToFloat(NAN));
         bool stands = state.hint != NONE && state.cursor == 0u;
-        stand = stand_nowhere();
+        leave();
         if (stands) enter(state.hint);
         for (uint work = 0u; state.next < count && work < BUDGET; ++work) {
             // Voxel after voxel, as long as strides succeed: the structure is not searched, and mostly no other
@@ -169,6 +175,7 @@ void main() {
                 for (uint k = 0u; k < leap; ++k) settle(NONE, uintBitsToFloat(NAN));
                 continue;
             }
+            leave();
             vec3 x = normalise(g, at);
             OwnerSearch search = OwnerSearch(state.cursor, best_of(state.best, state.in_box, state.smallest));
             uint owner;
