@@ -9,7 +9,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::kernels::{Row, Target};
 use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{self, LocateOptions, OverlapInput, SILENT};
+use olbvh::query::{self, LocateMethod, LocateOptions, OverlapInput, SILENT};
 use olbvh::render::{Bounds, Prepared, RenderSettings, ValidTets};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
@@ -34,8 +34,9 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let Bounds { lo, hi } = bounds;
     let at = |i: u32, step: u32, c: usize| lo[c] + (hi[c] - lo[c]) * (i * step % 1009) as f32 / 1009.0;
     let points: Vec<[f32; 3]> = (0..3000).map(|i| [at(i, 1, 0), at(i, 313, 1), at(i, 71, 2)]).collect();
-    let locate = |tree| query::locate(&device, tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
-    let (found, walked) = (locate(&all), locate(&boundary));
+    let locate =
+        |tree, method| query::locate(&device, tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
+    let (found, walked) = (locate(&all, LocateMethod::Descent), locate(&boundary, LocateMethod::Sorted));
     let lbvh = Lbvh::build(gpu, &device).unwrap().locate(&device, &points, olbvh::options::TOLERANCE).unwrap();
     assert!(lbvh.owners == found.owners, "{}: the LBVH finds other owners", gpu.target().name);
     let field = &mesh.fields[0];
@@ -92,5 +93,6 @@ fn what_does_not_fit_is_refused() {
     };
     let target = gpu.target().clone();
     wrong(Target { each: gpu.subgroup_size() + 1, ..target.clone() });
-    wrong(Target { query: 1 << 20, ..target });
+    wrong(Target { query: 1 << 20, ..target.clone() });
+    wrong(Target { ahead: 3, ..target });
 }

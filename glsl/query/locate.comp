@@ -12,6 +12,7 @@ layout(constant_id = 2) const uint GUIDE = 0; // what `guides` holds: 0 (nothing
 layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
 layout(constant_id = 5) const uint RUN = 1;
+layout(constant_id = 6) const uint AHEAD = 1; // points of a run in an order that are fetched together; divides RUN
 ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
@@ -47,9 +48,9 @@ struct Point {
     vec3 x;
 };
 
-// The points of a run in an order lie anywhere in memory, so they are fetched together: their cache misses overlap.
-uint run_i[RUN];
-vec3 run_at[RUN];
+// The points of a run in an order lie anywhere in memory, so several are fetched together: their cache misses overlap.
+uint ahead_i[AHEAD];
+vec3 ahead_at[AHEAD];
 
 vec3 coordinates(uint i) { return vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]); }
 
@@ -59,12 +60,12 @@ Point point_at(Grid g, uint place, uint end) {
         vec3 at = coordinates(place);
         return Point(place, at, normalise(g, at));
     }
-    uint k = place % RUN;
+    uint k = place % AHEAD;
     if (k == 0u) {
-        for (uint j = 0u; j < RUN; ++j) run_i[j] = guides.at[min(place + j, end - 1u)];
-        for (uint j = 0u; j < RUN; ++j) run_at[j] = coordinates(run_i[j]);
+        for (uint j = 0u; j < AHEAD; ++j) ahead_i[j] = guides.at[min(place + j, end - 1u)];
+        for (uint j = 0u; j < AHEAD; ++j) ahead_at[j] = coordinates(ahead_i[j]);
     }
-    return Point(run_i[k], run_at[k], normalise(g, run_at[k]));
+    return Point(ahead_i[k], ahead_at[k], normalise(g, ahead_at[k]));
 }
 
 void main() {

@@ -51,6 +51,7 @@ impl TargetKind {
                 spine: 64u32.next_multiple_of(subgroup),
                 each: 2 * subgroup,
                 query: subgroup,
+                ahead: 2,
                 run: TileTarget { workgroup: subgroup, rows: 3 },
             }),
             Self::Row(row) => Some(row.target(room)),

@@ -5,7 +5,7 @@ use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specializati
 mod rows;
 mod target;
 pub use rows::Row;
-pub(crate) use target::LONGEST_LOOP;
+pub(crate) use target::{LONGEST_LOOP, MOST_AHEAD};
 pub use target::{SortTarget, Target, TileTarget, WorkgroupLimits};
 
 fn put(out: &mut [u8], at: usize, bytes: &[u8]) {

@@ -59,6 +59,7 @@ struct Numbers {
     /// Workgroup size, and entries per invocation, of kernels over runs of entries.
     run: (u32, u32),
     query: u32,
+    ahead: u32,
 }
 
 impl Row {
@@ -66,25 +67,26 @@ impl Row {
     fn numbers(self) -> Numbers {
         let (cpu, simt) = (true, false);
         match self {
-            // Few long tiles, and no barriers.
-            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),  query: 64 },
-            Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256 },
-            Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128 },
-            Self::Amd      => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64 },
-            Self::Intel    => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 8, 8),    each: 128, run: (128, 16),  query: 64 },
-            Self::Apple    => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 64 },
-            Self::Arm      => Numbers { scan: (64, 16),   spine: 128, sort: (simt, 64, 9, 8),     each: 64,  run: (64, 16),   query: 64 },
-            Self::Qualcomm => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 16, 8),   each: 128, run: (128, 16),  query: 64 },
+            // Few long tiles, no barriers, and several cache misses at once. A GPU has other invocations for that, and its
+            // registers are better used for them.
+            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),  query: 64,  ahead: 8 },
+            Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256, ahead: 1 },
+            Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128, ahead: 1 },
+            Self::Amd      => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64,  ahead: 1 },
+            Self::Intel    => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 8, 8),    each: 128, run: (128, 16),  query: 64,  ahead: 1 },
+            Self::Apple    => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 64,  ahead: 1 },
+            Self::Arm      => Numbers { scan: (64, 16),   spine: 128, sort: (simt, 64, 9, 8),     each: 64,  run: (64, 16),   query: 64,  ahead: 1 },
+            Self::Qualcomm => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 16, 8),   each: 128, run: (128, 16),  query: 64,  ahead: 1 },
         }
     }
 
     /// The row's target, fitted to a device with these limits.
     pub fn target(self, room: &WorkgroupLimits) -> Target {
-        let Numbers { scan, spine, sort, each, run, query } = self.numbers();
+        let Numbers { scan, spine, sort, each, run, query, ahead } = self.numbers();
         let tiles = |(workgroup, rows)| TileTarget { workgroup, rows };
         let (serial, workgroup, rows, digit_bits) = sort;
         let sort = SortTarget { serial, workgroup, rows, digit_bits };
-        Target { name: Cow::Borrowed(self.name()), scan: tiles(scan), spine, sort, each, run: tiles(run), query }.fit(room)
+        Target { name: Cow::Borrowed(self.name()), scan: tiles(scan), spine, sort, each, run: tiles(run), query, ahead }.fit(room)
     }
 
     /// The row for a device: by its driver where that is more specific than the vendor, otherwise by the vendor.
@@ -160,6 +162,7 @@ mod tests {
         };
         assert!(refused(|t| t.each = 48).contains("each is 48; it must be a multiple of 32, the subgroup size, up to 256"));
         assert!(refused(|t| t.query = 512).contains("query is 512"));
+        assert!(refused(|t| t.ahead = 16).contains("ahead is 16; it must be a power of 2 up to 8"));
         assert!(refused(|t| t.scan.rows = 0).contains("scan.rows is 0"));
         assert!(refused(|t| t.sort.digit_bits = 13).contains("sort.digit_bits is 13"));
         assert!(refused(|t| t.sort.digit_bits = 10).contains("32768 bytes of shared memory of 16384"));

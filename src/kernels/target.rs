@@ -9,6 +9,8 @@ use std::borrow::Cow;
 pub(crate) const LONGEST_LOOP: u32 = 32_768;
 /// Most pairs per invocation of a sort by ballots, which keeps them in registers.
 const MOST_BALLOT_ROWS: u32 = 64;
+/// Most points that location fetches together.
+pub(crate) const MOST_AHEAD: u32 = 8;
 /// Shared memory that every supported device has; rows of the table leave an eighth of it to the driver.
 const SHARED_BYTES: u32 = 16 << 10;
 
@@ -110,6 +112,15 @@ pub struct Target {
     pub run: TileTarget,
     /// Invocations per workgroup of queries: location, ray intervals, march, slices, overlap.
     pub query: u32,
+    /// Points in an order that an invocation of location fetches together.
+    #[cfg_attr(feature = "formats", serde(default = "one_point"))]
+    pub ahead: u32,
+}
+
+/// What profiles say that were saved before there was a choice.
+#[cfg(feature = "formats")]
+fn one_point() -> u32 {
+    1
 }
 
 impl Target {
@@ -147,6 +158,9 @@ impl Target {
             if size == 0 || size % subgroup.max(1) != 0 || size > invocations {
                 return wrong(&format!("{name} is {size}; it must be a multiple of {subgroup}, the subgroup size, up to {invocations}"));
             }
+        }
+        if !self.ahead.is_power_of_two() || self.ahead > MOST_AHEAD {
+            return wrong(&format!("ahead is {}; it must be a power of 2 up to {MOST_AHEAD}", self.ahead));
         }
         for (name, rows) in [("scan.rows", self.scan.rows), ("sort.rows", self.sort.rows), ("run.rows", self.run.rows)] {
             if !(1..LONGEST_LOOP).contains(&rows) {

@@ -6,7 +6,7 @@ use crate::build::{DeviceMesh, Tree, check_field, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
-use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
+use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec, MOST_AHEAD};
 use crate::mesh::On;
 use crate::options::{POINT_RUN, TOLERANCE};
 use crate::primitives::Arena;
@@ -123,6 +123,8 @@ impl LocateOutput {
     }
 }
 
+const _: () = assert!(POINT_RUN.is_multiple_of(MOST_AHEAD), "points that are fetched together are of one run");
+
 /// What the kernel's buffer of guides holds.
 #[derive(Clone, Copy)]
 enum Guide {
@@ -209,7 +211,8 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             // Runs are for the first part only; the points that it leaves undecided are located one by one in later
             // parts.
             let (run, guide) = if part == 0 { (run, guide) } else { (1, 0) };
-            let spec = LocateSpec { workgroup, guide, part_length: length, lists, run, ..Default::default() };
+            let ahead = if guide == Guide::Order as u32 { r.gpu().target().ahead } else { 1 };
+            let spec = LocateSpec { workgroup, guide, part_length: length, lists, run, ahead, ..Default::default() };
             r.dispatch(&arguments, spec, groups(run))?;
         }
         Ok(())

@@ -7,7 +7,7 @@ use crate::gpu::{Gpu, StageTime};
 use crate::kernels::Target;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{BuildOptions, Lists};
-use crate::query::{self, LocateOptions, SILENT};
+use crate::query::{self, LocateMethod, LocateOptions, SILENT};
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
 use crate::reference::locate::Locator;
@@ -131,8 +131,9 @@ impl<'a> Workload<'a> {
     /// Runs every query; stores the answers in `answers` and returns the times of the stages.
     fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<Vec<StageTime>> {
         let mut stages = Vec::new();
-        for tree in [&on.whole, &on.boundary] {
-            let located = query::locate(&on.mesh, tree, &self.points, None, &LocateOptions::default(), SILENT)?;
+        for (tree, method) in [(&on.whole, LocateMethod::Descent), (&on.boundary, LocateMethod::Sorted)] {
+            let options = LocateOptions { method, ..LocateOptions::default() };
+            let located = query::locate(&on.mesh, tree, &self.points, None, &options, SILENT)?;
             stages.extend(located.stages);
             answers.owners.push(located.owners);
             answers.barycentrics.extend(located.barycentrics);
