@@ -804,7 +804,6 @@ struct olbvh_Stand {
     // Neighbours across the faces opposite to `cell`, loaded together with it so that their cache misses overlap.
     uvec4 beside;
     vec4 x, y, z;
-    olbvh_Bounds box;
 };
 
 // How a step changes what is kept per corner.
@@ -817,7 +816,7 @@ struct olbvh_Exchange {
 // Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
 uint olbvh_walked_tets = 0u;
 
-olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0), olbvh_Bounds(vec3(0.0), vec3(0.0), 0.0)); }
+olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
 
 vec3 olbvh_corner_of(olbvh_Stand s, uint k) { return vec3(s.x[k], s.y[k], s.z[k]); }
 
@@ -834,13 +833,15 @@ olbvh_Stand olbvh_stand_in(uint t) {
     s.x = vec4(a.x, b.x, c.x, d.x);
     s.y = vec4(a.y, b.y, c.y, d.y);
     s.z = vec4(a.z, b.z, c.z, d.z);
-    s.box = olbvh_bounds_of(olbvh_corners_of(s));
     return s;
 }
 
 olbvh_Tet olbvh_tet_of(olbvh_Stand s) { return olbvh_Tet(olbvh_corners_of(s), olbvh_ranks(s.cell)); }
 
-olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) { return olbvh_sides_of(olbvh_corners_of(s), s.box, x); }
+olbvh_Sides olbvh_sides_of(olbvh_Stand s, vec3 x) {
+    vec3 v[4] = olbvh_corners_of(s);
+    return olbvh_sides_of(v, olbvh_bounds_of(v), x); // kept bounds would save a few operations and take seven registers
+}
 
 float olbvh_of_vertex(olbvh_Stand s, vec4 ascending, uint id) {
     return s.ids.x == id ? ascending.x : s.ids.y == id ? ascending.y : s.ids.z == id ? ascending.z : ascending.w;
@@ -890,7 +891,6 @@ bool olbvh_step_on(inout olbvh_Stand s, olbvh_Sides at, out olbvh_Exchange e) {
     s.x = olbvh_exchange(s.x, e, v.x);
     s.y = olbvh_exchange(s.y, e, v.y);
     s.z = olbvh_exchange(s.z, e, v.z);
-    s.box = olbvh_bounds_of(olbvh_corners_of(s));
     return true;
 }
 
@@ -956,15 +956,13 @@ bool olbvh_in_star(uint t) {
     return false;
 }
 
-// Adds to the star of x the neighbours of its member `t` that x is near, across faces that x is near.
-void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
+// Adds to the star of x the neighbours of a member across faces that x is near. Whether x is near a neighbour is tested
+// when its turn comes.
+void olbvh_grow_star(olbvh_Tet tet, olbvh_Weights w, uvec4 beside) {
     vec4 own = olbvh_own_weights(w, tet);
-    uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
-    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
         uint u = beside[f];
-        if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
-        ++olbvh_walked_tets;
-        if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
+        if (own[f] <= w.margin && u != olbvh_NONE && olbvh_star_size < olbvh_STAR && !olbvh_in_star(u)) olbvh_star[olbvh_star_size++] = u;
     }
 }
 
@@ -977,8 +975,9 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
         ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
+        if (i > 0u && !olbvh_near(w)) continue;
         olbvh_consider(best, t, tet, w);
-        olbvh_grow_star(t, tet, w, x);
+        olbvh_grow_star(tet, w, olbvh_words(olbvh_neighbours.at[t]));
     }
 }
 
@@ -1013,7 +1012,7 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
         uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
         uint next = olbvh_NONE;
-        for (uint f = 0u; f < 4u; ++f) {
+        [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = olbvh_way_before(before[f], behind[f]);
             if (at < first) {
