@@ -956,13 +956,16 @@ bool olbvh_in_star(uint t) {
     return false;
 }
 
-// Adds to the star of x the neighbours of a member across faces that x is near. Whether x is near a neighbour is tested
-// when its turn comes.
-void olbvh_grow_star(olbvh_Tet tet, olbvh_Weights w, uvec4 beside) {
+// Adds to the star of x the neighbours of its member `t` that x is near, across faces that x is near. Others must not take
+// a place: there are as many as corners.glsl counts on.
+void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
-    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
+    uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
-        if (own[f] <= w.margin && u != olbvh_NONE && olbvh_star_size < olbvh_STAR && !olbvh_in_star(u)) olbvh_star[olbvh_star_size++] = u;
+        if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
+        ++olbvh_walked_tets;
+        if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
     }
 }
 
@@ -975,9 +978,8 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
         ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         olbvh_Weights w = olbvh_weights(tet, x);
-        if (i > 0u && !olbvh_near(w)) continue;
         olbvh_consider(best, t, tet, w);
-        olbvh_grow_star(tet, w, olbvh_words(olbvh_neighbours.at[t]));
+        olbvh_grow_star(t, tet, w, x);
     }
 }
 
@@ -1012,7 +1014,7 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
         uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
         uint next = olbvh_NONE;
-        [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
+        for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = olbvh_way_before(before[f], behind[f]);
             if (at < first) {

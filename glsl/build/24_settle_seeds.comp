@@ -40,9 +40,8 @@ bool owns_centre(uint t, Weights own, vec3 centre) {
         uint u = star[i];
         Tet other = load_tet(words(cells.at[u]));
         Weights w = weights(other, centre);
-        if (i > 0u && !near(w)) continue;
         if (w.inside && u < beaten_below) return false;
-        grow_star(other, w, words(neighbours.at[u]));
+        grow_star(u, other, w, centre);
     }
     return true;
 }

@@ -28,13 +28,16 @@ bool in_star(uint t) {
     return false;
 }
 
-// Adds to the star of x the neighbours of a member across faces that x is near. Whether x is near a neighbour is tested
-// when its turn comes.
-void grow_star(Tet tet, Weights w, uvec4 beside) {
+// Adds to the star of x the neighbours of its member `t` that x is near, across faces that x is near. Others must not take
+// a place: there are as many as corners.glsl counts on.
+void grow_star(uint t, Tet tet, Weights w, vec3 x) {
     vec4 own = own_weights(w, tet);
-    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
+    uvec4 beside = words(neighbours.at[t]);
+    [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
         uint u = beside[f];
-        if (own[f] <= w.margin && u != NONE && star_size < STAR && !in_star(u)) star[star_size++] = u;
+        if (own[f] > w.margin || u == NONE || star_size == STAR || in_star(u)) continue;
+        ++walked_tets;
+        if (near(weights(load_tet(words(cells.at[u])), x))) star[star_size++] = u;
     }
 }
 
@@ -47,9 +50,8 @@ void arrive(uint first, vec3 x, inout Best best) {
         ++walked_tets;
         Tet tet = load_tet(words(cells.at[t]));
         Weights w = weights(tet, x);
-        if (i > 0u && !near(w)) continue;
         consider(best, t, tet, w);
-        grow_star(tet, w, words(neighbours.at[t]));
+        grow_star(t, tet, w, x);
     }
 }
 
@@ -84,7 +86,7 @@ uint walk_leg(uint t, vec3 a, vec3 b) {
         uvec4 beside = words(neighbours.at[t]);
         float first = 3.40282347e38;
         uint next = NONE;
-        [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) {
+        for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = way_before(before[f], behind[f]);
             if (at < first) {

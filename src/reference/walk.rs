@@ -125,23 +125,19 @@ impl Walker<'_> {
         (tet, tet.weights(x))
     }
 
-    /// Visits the star of x, starting with `first`, a tetrahedron near x, until `visit` returns true. Of the others, x is
-    /// near to those that are visited; this is tested when their turn comes.
+    /// Visits the star of x, starting with `first`, a tetrahedron near x, until `visit` returns true.
     pub fn star(&self, first: u32, x: Vec3, mut visit: impl FnMut(u32, &Tet, &Weights) -> bool) {
         let mut star = vec![first];
         let mut next = 0;
         while let Some(&t) = star.get(next) {
             next += 1;
             let (tet, weights) = self.weights(t, x);
-            if next > 1 && !weights.near() {
-                continue;
-            }
             if visit(t, &tet, &weights) {
                 return;
             }
             for (rank, &u) in tet.rank.iter().zip(&self.neighbours[t as usize]) {
                 let beside = weights.w[*rank] <= weights.margin && u != NONE;
-                if beside && star.len() < STAR && !star.contains(&u) {
+                if beside && star.len() < STAR && !star.contains(&u) && self.weights(u, x).1.near() {
                     star.push(u);
                 }
             }
