@@ -1,11 +1,12 @@
 #version 460
-// Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes 32 tetrahedra, few or
-// none of which are on the boundary, and marks the first share of each; with LATER, it takes one other share.
+// Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes a few tetrahedra, of
+// which hardly any are on the boundary, and marks the first share of each; with LATER, it takes one other share.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint ASSIGN = 0;
+layout(constant_id = 4) const uint TETS = 32; // per invocation: 32 where there are few, one where there are thousands
 ARGUMENTS(9)
     uint tets;
     uint capacity; // most shares
@@ -56,7 +57,8 @@ void main() {
         if ((boundary.at[share.t >> 5u] >> (share.t & 31u) & 1u) != 0u) mark(g, share.t, share.first);
         return;
     }
-    uint first = 32u * item_index();
+    uint first = TETS * item_index();
     if (first >= tets) return;
-    for (uint bits = boundary.at[first >> 5u]; bits != 0u; bits &= bits - 1u) mark(g, first + uint(findLSB(bits)), 0u);
+    uint bits = boundary.at[first >> 5u] >> (first & 31u) & low_bits(TETS);
+    for (; bits != 0u; bits &= bits - 1u) mark(g, first + uint(findLSB(bits)), 0u);
 }

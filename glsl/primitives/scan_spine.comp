@@ -13,17 +13,15 @@ BUFFER(2, writeonly, uint, total)
 void main() {
     uint n = min(count, live.at[0]);
     uint tiles = n / tile + uint(n % tile != 0u);
-    uint each = (tiles + WORKGROUP - 1u) / WORKGROUP;
-    uint first = local_index() * each;
-    uint end = min(tiles, first + each);
-    uint sum = 0u;
-    for (uint i = first; i < end; ++i) sum += sums.at[i];
-    uint all;
-    uint running = workgroup_exclusive_add(sum, all);
-    for (uint i = first; i < end; ++i) {
-        uint v = sums.at[i];
-        sums.at[i] = running;
-        running += v;
+    uvec2 items = items_of_share((tiles + WORKGROUP - 1u) / WORKGROUP * WORKGROUP, tiles);
+    uint sum = 0u, all;
+    for (uint i = items.x; i < items.y; i += gl_SubgroupSize) sum += sums.at[i];
+    uint running = subgroups_exclusive_add(sum, all);
+    for (uint i = items.x, row = i - gl_SubgroupInvocationID; row < items.y; row += gl_SubgroupSize, i += gl_SubgroupSize) {
+        uint v = i < items.y ? sums.at[i] : 0u;
+        uint before = running + subgroupExclusiveAdd(v);
+        if (i < items.y) sums.at[i] = before;
+        running += subgroupAdd(v);
     }
     if (local_index() == 0u) total.at[0] = all;
 }

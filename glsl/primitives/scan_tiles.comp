@@ -11,11 +11,10 @@ BUFFER(2, writeonly, uint, sums)
 
 void main() {
     uint n = min(count, live.at[0]);
-    uint first = first_item();
-    uint end = min(n, first + ROWS);
+    uvec2 items = items_of_share(WORKGROUP * ROWS, n);
     uint sum = 0u;
-    for (uint i = first; i < end; ++i) sum += values.at[i];
+    for (uint i = items.x; i < items.y; i += gl_SubgroupSize) sum += values.at[i];
     sum = workgroup_add(sum);
     // Folding into two dimensions may add workgroups after the last tile.
-    if (local_index() == 0u && first < n) sums.at[group_index()] = sum;
+    if (local_index() == 0u && items.x < n) sums.at[group_index()] = sum;
 }

@@ -21,10 +21,15 @@ void main() {
     uint tile = group_index();
     if (tiles == 0u || tile >= stride) return;
     for (uint d = local_index(); d < DIGITS; d += WORKGROUP) digit_counts[d] = 0u;
+    // All loads first: a loop of loads and atomics would wait for one after the other.
+    uint key[ROWS], first = tile * tile_items + local_index();
+    [[unroll]] for (uint row = 0u; row < ROWS; ++row) {
+        uint i = first + row * WORKGROUP;
+        key[row] = i < n ? keys.at[i] : 0u;
+    }
     barrier();
-    for (uint row = 0u; row < ROWS; ++row) {
-        uint i = tile * tile_items + row * WORKGROUP + local_index();
-        if (i < n) atomicAdd(digit_counts[keys.at[i] >> shift & mask], 1u);
+    [[unroll]] for (uint row = 0u; row < ROWS; ++row) {
+        if (first + row * WORKGROUP < n) atomicAdd(digit_counts[key[row] >> shift & mask], 1u);
     }
     barrier();
     for (uint d = local_index(); d < DIGITS; d += WORKGROUP) counts.at[d * stride + tile] = digit_counts[d];

@@ -12,7 +12,6 @@ layout(constant_id = 2) const uint GUIDE = 0; // what `guides` holds: 0 (nothing
 layout(constant_id = 3) const uint PART_LENGTH = 16384;
 layout(constant_id = 4) const uint LISTS = 0;
 layout(constant_id = 5) const uint RUN = 1;
-layout(constant_id = 6) const uint AHEAD = 1; // points of a run in an order that are fetched together; divides RUN
 ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
@@ -48,24 +47,11 @@ struct Point {
     vec3 x;
 };
 
-// The points of a run in an order lie anywhere in memory, so several are fetched together: their cache misses overlap.
-uint ahead_i[AHEAD];
-vec3 ahead_at[AHEAD];
-
-vec3 coordinates(uint i) { return vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]); }
-
-// The point at a place of this invocation's run.
-Point point_at(Grid g, uint place, uint end) {
-    if (GUIDE != ORDER) {
-        vec3 at = coordinates(place);
-        return Point(place, at, normalise(g, at));
-    }
-    uint k = place % AHEAD;
-    if (k == 0u) {
-        for (uint j = 0u; j < AHEAD; ++j) ahead_i[j] = guides.at[min(place + j, end - 1u)];
-        for (uint j = 0u; j < AHEAD; ++j) ahead_at[j] = coordinates(ahead_i[j]);
-    }
-    return Point(ahead_i[k], ahead_at[k], normalise(g, ahead_at[k]));
+// The point at a place.
+Point point_at(Grid g, uint place) {
+    uint i = GUIDE == ORDER ? guides.at[place] : place;
+    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    return Point(i, at, normalise(g, at));
 }
 
 void main() {
@@ -73,7 +59,7 @@ void main() {
     if (place >= count) return;
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
-    Point a = point_at(g, place, end);
+    Point a = point_at(g, place);
     uint from = NONE; // where the next stride starts
     uint left = 0u;   // steps that this stride may still take; 0: it has ended
     bool in_leaf = part > 0u; // whether this stride started in the point's leaf
@@ -92,7 +78,7 @@ void main() {
             if (sides.clear) {
                 owners.at[a.i] = stand.t;
                 barycentrics.at[a.i] = record(last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(stand, sides));
-                if (++place < end) a = point_at(g, place, end);
+                if (++place < end) a = point_at(g, place);
                 left = HINTED;
                 in_leaf = false;
             } else {
@@ -128,7 +114,7 @@ void main() {
         owners.at[a.i] = last == 0u ? best.owner : owner;
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
-            a = point_at(g, place, end);
+            a = point_at(g, place);
             // If the list continues in the next part, the owner is not known yet.
             bool known = owner != NONE && (walks || range.y - range.x <= LEAST_PART);
             from = owner;

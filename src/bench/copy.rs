@@ -1,5 +1,6 @@
 //! Measurement of how fast the device copies, which limits the stages of a construction.
 
+use super::load::Load;
 use super::measure::Spread;
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
@@ -8,7 +9,7 @@ use serde::Serialize;
 use std::time::Instant;
 
 /// Number of words of a copy: far more than caches hold.
-const WORDS: u32 = 1 << 24;
+const WORDS: u32 = 1 << 26;
 /// Number of repetitions of each way of copying.
 const REPETITIONS: u32 = 9;
 
@@ -33,6 +34,7 @@ impl CopyRate {
     /// # Errors
     /// [`Error::Memory`] if there is not enough memory, or [`Error::Mismatch`] if a copy differs from the original.
     pub fn measure(gpu: &Gpu) -> Result<Self> {
+        let load = Load::new(gpu)?;
         let data: Vec<u32> = (0..WORDS).map(|i| i.wrapping_mul(2_654_435_761)).collect();
         let from = gpu.upload("olbvh.bench.original", &data)?;
         let to = gpu.buffer("olbvh.bench.copy", 4 * u64::from(WORDS))?;
@@ -59,7 +61,7 @@ impl CopyRate {
             if gpu.download::<u32>(&to, to.all())? != data {
                 return Err(Error::Mismatch("a copy in device memory differs from the original".into()));
             }
-            let times = (0..REPETITIONS).map(|_| run(by_kernel)).collect::<Result<Vec<f64>>>()?;
+            let times = (0..REPETITIONS).map(|_| load.run().and_then(|()| run(by_kernel))).collect::<Result<Vec<f64>>>()?;
             Spread::of(times).ok_or_else(|| Error::Invalid("no copy was timed".into()))
         };
         let (command_ms, kernel_ms) = (times(false)?, times(true)?);

@@ -1,5 +1,6 @@
 //! Repetitions of a measurement and their times.
 
+use super::load::Load;
 use crate::error::Result;
 use crate::gpu::StageTime;
 use serde::{Deserialize, Serialize};
@@ -92,10 +93,11 @@ impl Runs {
 }
 
 /// Repeats `once`, which returns the times of its stages, within a budget. The caller has run the same work before, so
-/// that no repetition includes the costs of a first run.
-pub(super) fn repeat(budget: &Budget, mut once: impl FnMut() -> Result<Vec<StageTime>>) -> Result<Runs> {
+/// that no repetition includes the costs of a first run. `load` keeps the device at its clock before each repetition.
+pub(super) fn repeat(load: &Load, budget: &Budget, mut once: impl FnMut() -> Result<Vec<StageTime>>) -> Result<Runs> {
     let (start, mut runs) = (Instant::now(), Runs::default());
     while runs.is_empty() || (runs.walls.len() < budget.repetitions as usize && start.elapsed().as_secs_f64() < budget.seconds) {
+        load.run()?;
         let begin = Instant::now();
         let stages = once()?;
         runs.walls.push(begin.elapsed().as_secs_f64() * 1e3);
@@ -116,11 +118,11 @@ mod tests {
         let mut next = times.iter();
         let stage = |name: &str, milliseconds| StageTime { name: name.into(), milliseconds };
         let once = || Ok(vec![stage("a", *next.next().unwrap()), stage("b", 1.0), stage("b", 1.0)]);
-        let runs = repeat(&Budget { repetitions: 3, seconds: 10.0 }, once).unwrap();
+        let runs = repeat(&Load::none(), &Budget { repetitions: 3, seconds: 10.0 }, once).unwrap();
         let all = runs.timing(None);
         assert_eq!((all.repetitions, all.device_ms.unwrap().median, all.stages_ms["b"]), (3, 5.0, 2.0));
         assert_eq!(runs.timing(Some("a")).milliseconds(), 3.0);
-        let none = repeat(&Budget { repetitions: 9, seconds: 0.0 }, || Ok(Vec::new())).unwrap().timing(None);
+        let none = repeat(&Load::none(), &Budget { repetitions: 9, seconds: 0.0 }, || Ok(Vec::new())).unwrap().timing(None);
         assert!(none.repetitions == 1 && none.device_ms.is_none());
     }
 }

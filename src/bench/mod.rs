@@ -5,7 +5,7 @@
 //! subject           a mesh on the device, and the queries that all structures answer
 //! structure         one structure: built and queried
 //! verify            comparison of its answers with those of the first structure and of the reference implementation
-//! measure           repetitions within a budget
+//! measure           repetitions within a budget     load      keeps the device at its clock between them
 //! structure_report  the figures of one structure, by quantity
 //! mesh_report       the figures of all structures over a mesh, and their ratios to the LBVH
 //! report            all figures of a run     → report_tables (text, Markdown), report_plots (SVG)
@@ -18,6 +18,7 @@
 
 mod compare;
 mod copy;
+mod load;
 mod measure;
 mod mesh_report;
 mod plot;
@@ -38,6 +39,7 @@ mod verify;
 
 pub use compare::{Compared, Comparison, Verdict, compare};
 pub use copy::CopyRate;
+pub(crate) use load::Load;
 pub use measure::{Budget, Spread, Timing};
 pub use mesh_report::{MeshReport, Quality};
 pub use quantity::Quantity;
@@ -70,8 +72,9 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn
     let mut report = MeshReport::new(&subject);
     let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
     let mut expected: Option<Answers> = None;
+    let load = Load::new(gpu)?;
     for kind in whole.suite.kinds() {
-        match measure_structure(&subject, kind, expected.as_ref(), topology.as_ref(), whole, progress) {
+        match measure_structure(&subject, kind, expected.as_ref(), topology.as_ref(), whole, &load, progress) {
             Ok(Some((measured, answers))) => {
                 report.structures.push(measured);
                 expected.get_or_insert(answers);
@@ -94,6 +97,7 @@ fn measure_structure(
     expected: Option<&Answers>,
     topology: Option<&Topology>,
     whole: &Report,
+    load: &Load,
     progress: &dyn Fn(&str),
 ) -> Result<Option<(StructureReport, Answers)>> {
     let Some(structure) = Structure::build(subject.gpu, &subject.device, kind)? else { return Ok(None) };
@@ -105,7 +109,7 @@ fn measure_structure(
         check_tree(subject, topology, tree, &answers)?;
     }
     let lost = expected.map(|first| check(subject, kind, first, &answers)).transpose()?.flatten();
-    let mut measured = measure(subject, kind, (&structure, moved.as_ref()), &answers, lost, &whole.settings)?;
+    let mut measured = measure(subject, kind, (&structure, moved.as_ref()), &answers, lost, load, &whole.settings.budget)?;
     measured.set_stages(subject, &structure, &whole.copy);
     Ok(Some((measured, answers)))
 }
@@ -117,9 +121,9 @@ fn measure(
     (structure, moved): (&Structure, Option<&Structure>),
     answers: &Answers,
     lost: Option<Lost>,
-    settings: &Settings,
+    load: &Load,
+    budget: &Budget,
 ) -> Result<StructureReport> {
-    let budget = &settings.budget;
     let mut report = StructureReport::new(kind, structure, lost);
     let mut add = |quantity, runs: Option<Runs>, stage: Option<&str>, work: Option<u64>| {
         if let Some(runs) = runs.as_ref().filter(|runs| !runs.is_empty()) {
@@ -129,7 +133,7 @@ fn measure(
     let gpu = subject.gpu;
     let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
     rebuilt()?; // `structure` still holds its memory, so the first one gets memory that the system has yet to give
-    add(Quantity::Build, Some(repeat(budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
+    add(Quantity::Build, Some(repeat(load, budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
     for ((quantity, points), owners) in subject.points.iter().zip(&answers.owners) {
         let found = owners.iter().filter(|&&owner| owner != u32::MAX).count();
         let traversed = quantity.traversed().filter(|_| structure.traverses(kind));
@@ -138,7 +142,7 @@ fn measure(
             if traversed == Some(quantity) && locate()?.owners != *owners {
                 return Err(Error::Mismatch(format!("{kind}: the traversal finds other owners than the descent")));
             }
-            let runs = repeat(budget, || Ok(locate()?.stages))?;
+            let runs = repeat(load, budget, || Ok(locate()?.stages))?;
             add(quantity, Some(runs), None, Some(found as u64));
         }
     }
@@ -148,7 +152,7 @@ fn measure(
                 .render(structure)?
                 .map_or(Vec::new(), |d| vec![time("intervals", d.stats.interval_ms), time("march", d.stats.march_ms)]))
         };
-        let runs = repeat(budget, drawn)?;
+        let runs = repeat(load, budget, drawn)?;
         add(Quantity::Intervals, Some(runs.clone()), Some("intervals"), None);
         add(Quantity::March, Some(runs), Some("march"), Some(*found));
     }
@@ -157,11 +161,11 @@ fn measure(
             let sliced = subject.slice(structure, &mut |_| Ok(()))?.unwrap_or_default();
             Ok(vec![time("locate", sliced.locate_ms), time("touch", sliced.touch_ms), time("values", sliced.values_ms)])
         };
-        add(Quantity::Slice, Some(repeat(budget, sliced)?), None, Some(kinds.len() as u64));
+        add(Quantity::Slice, Some(repeat(load, budget, sliced)?), None, Some(kinds.len() as u64));
     }
     if let (Some(moved), Some(mesh)) = (moved, &subject.moved) {
         let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh, structure: moved }];
-        let runs = repeat(budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
+        let runs = repeat(load, budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
         add(Quantity::Overlap, Some(runs), None, None);
     }
     Ok(report)

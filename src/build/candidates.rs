@@ -112,8 +112,10 @@ impl Build<'_> {
         let (hits, counts) = (filter.hits, filter.counts);
         if filter.seeds.is_some() {
             let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
-            let spec = MarkSpec { workgroup, assign: options.assign as u32, ..Default::default() };
-            r.dispatch(&mark, spec, over.groups(1, tets.div_ceil(32), workgroup))?;
+            // A word of bits per invocation, or a single bit where invocations are plenty and should not wait for others.
+            let (each, slot) = if r.gpu().target().sort.serial { (32, 1) } else { (1, 2) };
+            let spec = MarkSpec { workgroup, assign: options.assign as u32, tets: each, ..Default::default() };
+            r.dispatch(&mark, spec, over.groups(slot, tets.div_ceil(each), workgroup))?;
             r.barrier("codes.mark → codes.mark_later");
             r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
             r.barrier("codes.mark → codes.filter");

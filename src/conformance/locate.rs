@@ -12,7 +12,7 @@ use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::query::{LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all};
 use crate::reference::boundary::NONE;
-use crate::reference::locate::{Location, Locator, order_of};
+use crate::reference::locate::{Location, Locator};
 
 /// How the points of a case are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,9 +21,9 @@ pub(crate) enum How {
     Descent,
     /// By the paper's traversal with a short stack of this many nodes.
     Traversal(u32),
-    /// By runs in the given order, with the owning call.
+    /// By runs, with the owning call.
     Runs,
-    /// By runs in sorted order, with the owning call.
+    /// In sorted order, with the owning call.
     Sorted,
     /// Recorded, with the right owner, a wrong one, or none as a hint.
     Hints,
@@ -67,17 +67,17 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
     let (points, _) = twin.points();
     let (mesh, locator) = (&twin.mesh, twin.locator(&built));
     match case.how {
-        How::Descent | How::Traversal(_) => {
-            let method = if let How::Traversal(stack) = case.how { LocateMethod::Traversal(stack) } else { LocateMethod::Descent };
+        How::Descent | How::Traversal(_) | How::Runs | How::Sorted => {
+            let method = match case.how {
+                How::Traversal(stack) => LocateMethod::Traversal(stack),
+                How::Runs => LocateMethod::Runs,
+                How::Sorted => LocateMethod::Sorted,
+                _ => LocateMethod::Descent,
+            };
             let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
-            compare_locations(twin.locations(&built), &found.owners, &found.barycentrics, points)
-        }
-        How::Runs | How::Sorted => {
-            let sorted = case.how == How::Sorted;
-            let method = if sorted { LocateMethod::Sorted } else { LocateMethod::Runs };
-            let order = if sorted { order_of(&built.tree().grid, points) } else { (0..points.len() as u32).collect() };
-            let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
-            compare_locations(&locator.locate_in_runs(points, &order), &found.owners, &found.barycentrics, points)
+            let runs = (case.how == How::Runs).then(|| locator.locate_in_runs(points));
+            let expected = runs.as_deref().unwrap_or_else(|| twin.locations(&built));
+            compare_locations(expected, &found.owners, &found.barycentrics, points)
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {

@@ -4,7 +4,7 @@ use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::Gpu;
-use crate::kernels::{Row, SortTarget, Target, TileTarget, WorkgroupLimits};
+use crate::kernels::{Row, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
@@ -46,12 +46,11 @@ impl TargetKind {
             Self::Ballot => Some(Row::Portable.target(room)),
             Self::Narrow => Some(Target {
                 name: "narrow".into(),
-                scan: TileTarget { workgroup: 2 * subgroup, rows: 3 },
+                scan: ScanTarget { serial: false, workgroup: 2 * subgroup, rows: 3 },
                 sort: SortTarget { serial: false, workgroup: 2 * subgroup, rows: 5, digit_bits: 3 },
                 spine: 64u32.next_multiple_of(subgroup),
                 each: 2 * subgroup,
                 query: subgroup,
-                ahead: 2,
                 run: TileTarget { workgroup: subgroup, rows: 3 },
             }),
             Self::Row(row) => Some(row.target(room)),

@@ -5,6 +5,7 @@ use super::buffer_ref::BufferRef;
 use super::constants::Constants;
 use super::foundation::Foundation;
 use super::heap::Heap;
+use super::kept::Kept;
 use super::ledger::Ledger;
 use super::pipelines::{Pipelines, cache_file};
 use super::pool::Pool;
@@ -65,6 +66,7 @@ enum Keep {
 
 struct Inner {
     // Memory and allocator are declared before `foundation`, so that they are freed before the device is destroyed.
+    kept: Kept,
     constants: Constants,
     heap: Arc<Heap>,
     foundation: Foundation,
@@ -120,7 +122,8 @@ impl Gpu {
         let pipelines = Pipelines::new(&foundation, file)?;
         let traced = requirements.ray_tracing;
         let acceleration = traced.any().then(|| Acceleration::new(instance, *physical, device, traced.pipelines));
-        let inner = Inner { constants, heap, foundation, pipelines, binding, limits, debug_device, acceleration };
+        let kept = Kept::default();
+        let inner = Inner { kept, constants, heap, foundation, pipelines, binding, limits, debug_device, acceleration };
         let gpu = Self { inner: Arc::new(inner), target: Arc::new(target), memory: Keep::Freely };
         if !options.trust && gpu.inner.foundation.queue.is_some() {
             crate::primitives::self_test(&gpu)?;
@@ -220,6 +223,10 @@ impl Gpu {
     /// The device's Vulkan limits.
     pub fn limits(&self) -> &vk::PhysicalDeviceLimits {
         &self.inner.limits
+    }
+
+    pub(super) fn kept(&self) -> &Kept {
+        &self.inner.kept
     }
 
     pub(super) fn heap(&self) -> &Arc<Heap> {
@@ -326,6 +333,7 @@ impl Drop for Inner {
             if ours.is_some() {
                 let _ = device.device_wait_idle();
             }
+            self.kept.destroy(device);
             self.pipelines.destroy(&self.foundation);
         }
     }

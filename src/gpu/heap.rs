@@ -101,6 +101,31 @@ impl Memory {
     }
 }
 
+impl Memory {
+    /// The allocation, if its memory is host-coherent and has these properties.
+    fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
+        let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;
+        self.allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
+    }
+
+    /// The bytes, if the memory is mapped and coherent: nothing here flushes a cache.
+    pub fn mapped(&self) -> Option<&[u8]> {
+        self.coherent(vk::MemoryPropertyFlags::empty())?.mapped_slice()
+    }
+
+    /// The bytes as [`Memory::mapped`], if the host reads the memory through its caches. Otherwise a copy to such memory
+    /// is faster.
+    pub fn cached(&self) -> Option<&[u8]> {
+        self.coherent(vk::MemoryPropertyFlags::HOST_CACHED)?.mapped_slice()
+    }
+
+    /// The bytes as [`Memory::mapped`], for writing.
+    pub fn mapped_mut(&mut self) -> Option<&mut [u8]> {
+        self.coherent(vk::MemoryPropertyFlags::empty())?;
+        self.allocation.as_mut()?.mapped_slice_mut()
+    }
+}
+
 impl Drop for Memory {
     fn drop(&mut self) {
         // SAFETY: work on the buffer has ended, since owning calls wait for their submissions before anything is

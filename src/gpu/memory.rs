@@ -8,7 +8,6 @@ use super::pool::Pool;
 use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
-use gpu_allocator::vulkan::Allocation;
 
 /// Offsets of arrays within a buffer are multiples of this, which is enough for every device's storage-buffer offsets
 /// and for 16-byte loads.
@@ -86,27 +85,19 @@ impl Buffer {
         &self.name
     }
 
-    /// The allocation, if its memory is host-coherent and has these properties.
-    fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
-        let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;
-        self.memory().allocation.as_ref().filter(|a| a.memory_properties().contains(wanted))
-    }
-
-    /// The bytes, if the memory is mapped and coherent: nothing here flushes a cache.
+    /// The bytes, see [`Memory::mapped`].
     pub(crate) fn mapped(&self) -> Option<&[u8]> {
-        self.coherent(vk::MemoryPropertyFlags::empty())?.mapped_slice()?.get(..self.size as usize)
+        self.memory().mapped()?.get(..self.size as usize)
     }
 
-    /// The bytes as [`Buffer::mapped`], if the host reads the memory through its caches. Otherwise a copy to such
-    /// memory is faster.
+    /// The bytes, see [`Memory::cached`].
     pub(crate) fn cached(&self) -> Option<&[u8]> {
-        self.coherent(vk::MemoryPropertyFlags::HOST_CACHED)?.mapped_slice()?.get(..self.size as usize)
+        self.memory().cached()?.get(..self.size as usize)
     }
 
-    /// The bytes as [`Buffer::mapped`], for writing.
+    /// The bytes, see [`Memory::mapped_mut`].
     pub(crate) fn mapped_mut(&mut self) -> Option<&mut [u8]> {
-        self.coherent(vk::MemoryPropertyFlags::empty())?;
-        self.memory.as_mut()?.allocation.as_mut()?.mapped_slice_mut()?.get_mut(..self.size as usize)
+        self.memory.as_mut()?.mapped_mut()?.get_mut(..self.size as usize)
     }
 }
 

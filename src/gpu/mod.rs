@@ -11,6 +11,7 @@ mod descriptors;
 mod foundation;
 mod heap;
 mod host;
+mod kept;
 mod kernel;
 mod ledger;
 mod memory;

@@ -296,9 +296,10 @@ impl<'a> Recorder<'a> {
             // SAFETY: the label is ended below.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }
-        let begin = self.timestamp(vk::PipelineStageFlags::TOP_OF_PIPE);
+        // Both at the bottom: a stage begins when all before it has ended, so that no time counts twice.
+        let begin = self.timestamp();
         let result = work(self);
-        let end = self.timestamp(vk::PipelineStageFlags::BOTTOM_OF_PIPE);
+        let end = self.timestamp();
         if let (Some(begin), Some(end)) = (begin, end) {
             self.stages.push((name.to_string(), begin, end));
         }
@@ -318,7 +319,7 @@ impl<'a> Recorder<'a> {
         self.fault.take().map_or(Ok(()), |fault| Err(Error::Invalid(fault)))
     }
 
-    fn timestamp(&mut self, stage: vk::PipelineStageFlags) -> Option<u32> {
+    fn timestamp(&mut self) -> Option<u32> {
         let (pool, size) = self.timestamps?;
         if self.next_slot >= size {
             return None;
@@ -326,7 +327,7 @@ impl<'a> Recorder<'a> {
         let slot = self.next_slot;
         self.next_slot += 1;
         // SAFETY: the slot lies in the pool, which the caller has reset.
-        unsafe { self.gpu.device().cmd_write_timestamp(self.commands, stage, pool, slot) };
+        unsafe { self.gpu.device().cmd_write_timestamp(self.commands, vk::PipelineStageFlags::BOTTOM_OF_PIPE, pool, slot) };
         Some(slot)
     }
 

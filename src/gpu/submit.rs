@@ -3,6 +3,7 @@
 use super::buffer_ref::BufferRef;
 use super::context::Gpu;
 use super::failed;
+use super::kept::{READ_BACK, Submission, TIMESTAMPS};
 use super::memory::Buffer;
 use super::recorder::Recorder;
 use crate::error::{Error, Result};
@@ -17,8 +18,6 @@ const STAGING: u64 = 32 << 20;
 const STAGING_SHARE: u64 = 16;
 /// How often a failed wait is retried, 10 ms apart.
 const WAITS: u32 = 1000;
-/// Most timestamps of one submission.
-const TIMESTAMPS: u32 = 256;
 
 /// Device time of a recorded stage.
 #[derive(Clone, Debug)]
@@ -50,26 +49,6 @@ impl StageTimes {
     }
 }
 
-/// Vulkan objects of one submission, destroyed together.
-struct Submission<'a> {
-    gpu: &'a Gpu,
-    pool: vk::CommandPool,
-    fence: vk::Fence,
-    queries: vk::QueryPool,
-}
-
-impl Drop for Submission<'_> {
-    fn drop(&mut self) {
-        let device = self.gpu.device();
-        // SAFETY: the submission was never submitted, or has been waited for.
-        unsafe {
-            device.destroy_query_pool(self.queries, None);
-            device.destroy_fence(self.fence, None);
-            device.destroy_command_pool(self.pool, None);
-        }
-    }
-}
-
 impl Gpu {
     /// Records work, submits it, and waits until it has been executed.
     ///
@@ -85,25 +64,18 @@ impl Gpu {
     /// Runs work of this crate as [`Gpu::run`] does. It is safe because this crate makes the recorded buffers to fit,
     /// and keeps them alive for the duration of the call.
     pub(crate) fn submit<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
-        let device = self.device();
-        let timed = self.timestamp_bits() > 0;
-        let mut submission =
-            Submission { gpu: self, pool: vk::CommandPool::null(), fence: vk::Fence::null(), queries: vk::QueryPool::null() };
-        // SAFETY: objects are made, used and destroyed here, in order; the queue is locked during the submission.
+        let (device, timed) = (self.device(), self.timestamp_bits() > 0);
+        let mut submission = Submission::new(self)?;
+        let (commands, fence, queries) = submission.handles();
+        super::debug::name(self.debug_device(), commands, label);
+        // SAFETY: objects of this device, which no other submission uses; the queue is locked during the submission.
         unsafe {
-            let info = vk::CommandPoolCreateInfo::default().queue_family_index(self.family()).flags(vk::CommandPoolCreateFlags::TRANSIENT);
-            submission.pool = device.create_command_pool(&info, None).map_err(failed("vkCreateCommandPool"))?;
-            let info = vk::CommandBufferAllocateInfo::default().command_pool(submission.pool).command_buffer_count(1);
-            let commands = device.allocate_command_buffers(&info).map_err(failed("vkAllocateCommandBuffers"))?[0];
-            super::debug::name(self.debug_device(), commands, label);
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             device.begin_command_buffer(commands, &begin).map_err(failed("vkBeginCommandBuffer"))?;
             if timed {
-                let info = vk::QueryPoolCreateInfo::default().query_type(vk::QueryType::TIMESTAMP).query_count(TIMESTAMPS);
-                submission.queries = device.create_query_pool(&info, None).map_err(failed("vkCreateQueryPool"))?;
-                device.cmd_reset_query_pool(commands, submission.queries, 0, TIMESTAMPS);
+                device.cmd_reset_query_pool(commands, queries, 0, TIMESTAMPS);
             }
-            let mut recorder = Recorder::new(self, commands, timed.then_some((submission.queries, TIMESTAMPS)));
+            let mut recorder = Recorder::new(self, commands, timed.then_some((queries, TIMESTAMPS)));
             let value = record(&mut recorder)?;
             recorder.finish()?;
             // Makes the results visible to the host, and to the submissions that follow.
@@ -114,12 +86,12 @@ impl Gpu {
             let target = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
             device.cmd_pipeline_barrier(commands, source, target, vk::DependencyFlags::empty(), &barrier, &[], &[]);
             device.end_command_buffer(commands).map_err(failed("vkEndCommandBuffer"))?;
-            submission.fence = device.create_fence(&vk::FenceCreateInfo::default(), None).map_err(failed("vkCreateFence"))?;
             let buffers = [commands];
             let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
-            self.submit_to_queue(&submit, submission.fence)?;
-            self.wait(submission.fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
-            let stages = if timed { self.read_timestamps(submission.queries, recorder.timed_stages())? } else { Vec::new() };
+            self.submit_to_queue(&submit, fence)?;
+            self.wait(fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
+            submission.end();
+            let stages = if timed { self.read_timestamps(queries, recorder.timed_stages())? } else { Vec::new() };
             Ok((value, StageTimes { stages }))
         }
     }
@@ -246,6 +218,10 @@ impl Gpu {
 
     /// Reads back a range of any buffer through staging memory.
     pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
+        // A memory limit counts every byte, so nothing is kept then.
+        if bytes.len() as u64 <= READ_BACK && self.ledger().is_none() {
+            return self.read_back(part, bytes);
+        }
         let most = self.staging_bytes();
         let staging = Buffer::staging(self, "olbvh.download.staging", most.min(bytes.len() as u64), MemoryLocation::GpuToCpu)?;
         for (i, chunk) in bytes.chunks_mut(most as usize).enumerate() {

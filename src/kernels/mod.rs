@@ -5,8 +5,8 @@ use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specializati
 mod rows;
 mod target;
 pub use rows::Row;
-pub(crate) use target::{LONGEST_LOOP, MOST_AHEAD};
-pub use target::{SortTarget, Target, TileTarget, WorkgroupLimits};
+pub(crate) use target::LONGEST_LOOP;
+pub use target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 
 fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
     out[at..at + bytes.len()].copy_from_slice(bytes);

@@ -6,7 +6,7 @@
 //! good on Apple as well. Workgroup sizes of the other kernels follow from the resources of a core: small where
 //! registers are few or subgroups narrow. `olbvh tune` finds better parameters for the device at hand.
 
-use super::target::{SortTarget, Target, TileTarget, WorkgroupLimits};
+use super::target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::gpu::DeviceReport;
 use crate::named::named;
 use ash::vk::DriverId;
@@ -50,8 +50,8 @@ named!(
 
 /// The parameters of a row; workgroup sizes are rounded up to whole subgroups.
 struct Numbers {
-    /// Workgroup size, and items per invocation, of scans.
-    scan: (u32, u32),
+    /// Whether the scan is serial, workgroup size, values per invocation.
+    scan: (bool, u32, u32),
     spine: u32,
     /// Whether the sort is serial, workgroup size, pairs per invocation, bits per digit.
     sort: (bool, u32, u32, u32),
@@ -59,7 +59,6 @@ struct Numbers {
     /// Workgroup size, and entries per invocation, of kernels over runs of entries.
     run: (u32, u32),
     query: u32,
-    ahead: u32,
 }
 
 impl Row {
@@ -67,26 +66,28 @@ impl Row {
     fn numbers(self) -> Numbers {
         let (cpu, simt) = (true, false);
         match self {
-            // Few long tiles, no barriers, and several cache misses at once. A GPU has other invocations for that, and its
-            // registers are better used for them.
-            Self::Cpu      => Numbers { scan: (1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),  query: 64,  ahead: 8 },
-            Self::Portable => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256, ahead: 1 },
-            Self::Nvidia   => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 128, ahead: 1 },
-            Self::Amd      => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64,  ahead: 1 },
-            Self::Intel    => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 8, 8),    each: 128, run: (128, 16),  query: 64,  ahead: 1 },
-            Self::Apple    => Numbers { scan: (256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 64,  ahead: 1 },
-            Self::Arm      => Numbers { scan: (64, 16),   spine: 128, sort: (simt, 64, 9, 8),     each: 64,  run: (64, 16),   query: 64,  ahead: 1 },
-            Self::Qualcomm => Numbers { scan: (128, 16),  spine: 256, sort: (simt, 128, 16, 8),   each: 128, run: (128, 16),  query: 64,  ahead: 1 },
+            // Few long tiles, and no barriers.
+            Self::Cpu      => Numbers { scan: (cpu, 1, 512),   spine: 256, sort: (cpu, 1, 8192, 11),   each: 64,  run: (1, 1024),  query: 64 },
+            Self::Portable => Numbers { scan: (simt, 256, 16),  spine: 256, sort: (simt, 256, 16, 8),   each: 256, run: (256, 16),  query: 256 },
+            Self::Nvidia   => Numbers { scan: (simt, 256, 16),  spine: 1024, sort: (simt, 512, 6, 8),    each: 256, run: (256, 16),  query: 128 },
+            Self::Amd      => Numbers { scan: (simt, 256, 16),  spine: 256, sort: (simt, 256, 14, 8),   each: 256, run: (256, 16),  query: 64 },
+            Self::Intel    => Numbers { scan: (simt, 128, 16),  spine: 256, sort: (simt, 128, 8, 8),    each: 128, run: (128, 16),  query: 64 },
+            Self::Apple    => Numbers { scan: (simt, 256, 16),  spine: 256, sort: (simt, 256, 15, 8),   each: 256, run: (256, 16),  query: 64 },
+            Self::Arm      => Numbers { scan: (simt, 64, 16),   spine: 128, sort: (simt, 64, 9, 8),     each: 64,  run: (64, 16),   query: 64 },
+            Self::Qualcomm => Numbers { scan: (simt, 128, 16),  spine: 256, sort: (simt, 128, 16, 8),   each: 128, run: (128, 16),  query: 64 },
         }
     }
 
     /// The row's target, fitted to a device with these limits.
     pub fn target(self, room: &WorkgroupLimits) -> Target {
-        let Numbers { scan, spine, sort, each, run, query, ahead } = self.numbers();
-        let tiles = |(workgroup, rows)| TileTarget { workgroup, rows };
+        let Numbers { scan, spine, sort, each, run, query } = self.numbers();
+        let (serial, workgroup, rows) = scan;
+        let scan = ScanTarget { serial, workgroup, rows };
         let (serial, workgroup, rows, digit_bits) = sort;
         let sort = SortTarget { serial, workgroup, rows, digit_bits };
-        Target { name: Cow::Borrowed(self.name()), scan: tiles(scan), spine, sort, each, run: tiles(run), query, ahead }.fit(room)
+        let (workgroup, rows) = run;
+        let run = TileTarget { workgroup, rows };
+        Target { name: Cow::Borrowed(self.name()), scan, spine, sort, each, run, query }.fit(room)
     }
 
     /// The row for a device: by its driver where that is more specific than the vendor, otherwise by the vendor.
@@ -162,7 +163,6 @@ mod tests {
         };
         assert!(refused(|t| t.each = 48).contains("each is 48; it must be a multiple of 32, the subgroup size, up to 256"));
         assert!(refused(|t| t.query = 512).contains("query is 512"));
-        assert!(refused(|t| t.ahead = 16).contains("ahead is 16; it must be a power of 2 up to 8"));
         assert!(refused(|t| t.scan.rows = 0).contains("scan.rows is 0"));
         assert!(refused(|t| t.sort.digit_bits = 13).contains("sort.digit_bits is 13"));
         assert!(refused(|t| t.sort.digit_bits = 10).contains("32768 bytes of shared memory of 16384"));

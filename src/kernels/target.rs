@@ -9,9 +9,7 @@ use std::borrow::Cow;
 pub(crate) const LONGEST_LOOP: u32 = 32_768;
 /// Most pairs per invocation of a sort by ballots, which keeps them in registers.
 const MOST_BALLOT_ROWS: u32 = 64;
-/// Most points that location fetches together.
-pub(crate) const MOST_AHEAD: u32 = 8;
-/// Shared memory that every supported device has; rows of the table leave an eighth of it to the driver.
+/// Shared memory that every supported device has.
 const SHARED_BYTES: u32 = 16 << 10;
 
 /// Limits of a workgroup on a device.
@@ -32,7 +30,7 @@ impl WorkgroupLimits {
     }
 }
 
-/// Workgroup size and items per invocation of a kernel that works on tiles.
+/// Workgroup size and items per invocation of kernels in which each takes consecutive items.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
 pub struct TileTarget {
@@ -44,6 +42,26 @@ pub struct TileTarget {
 
 impl TileTarget {
     /// Items per workgroup.
+    pub fn tile(self) -> u32 {
+        self.workgroup * self.rows
+    }
+}
+
+/// The variant of the scan, and its tile size.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "formats", derive(serde::Serialize, serde::Deserialize), serde(deny_unknown_fields))]
+pub struct ScanTarget {
+    /// `true`: every invocation scans its own `rows` values serially. `false`: a subgroup scans row by row.
+    #[cfg_attr(feature = "formats", serde(default))]
+    pub serial: bool,
+    /// Invocations per workgroup.
+    pub workgroup: u32,
+    /// Values per invocation.
+    pub rows: u32,
+}
+
+impl ScanTarget {
+    /// Values per workgroup.
     pub fn tile(self) -> u32 {
         self.workgroup * self.rows
     }
@@ -81,10 +99,12 @@ impl SortTarget {
         (passes, bits.div_ceil(passes).max(1))
     }
 
-    /// Bytes of shared memory: a table of digits per subgroup.
+    /// Bytes of shared memory: a table of digits per subgroup or, in the same place, the keys of the tile; its values;
+    /// and two more tables.
     fn shared_bytes(self, subgroup: u32) -> u32 {
-        let tables = if self.serial { 0 } else { self.workgroup / subgroup.max(1) };
-        (4 * tables) << self.digit_bits
+        const TOTALS: u32 = 512; // of subgroups, see workgroup.glsl
+        let (tables, digits) = (self.workgroup / subgroup.max(1), 1 << self.digit_bits);
+        if self.serial { 0 } else { 4 * ((tables * digits).max(self.tile()) + self.tile() + 2 * digits) + TOTALS }
     }
 
     /// Loop iterations of an invocation that clears its digits and counts its pairs, if it does so serially.
@@ -100,8 +120,8 @@ impl SortTarget {
 pub struct Target {
     /// Name in reports.
     pub name: Cow<'static, str>,
-    /// Tiles of scans.
-    pub scan: TileTarget,
+    /// Scan.
+    pub scan: ScanTarget,
     /// Invocations of the single workgroup that scans the sums of the tiles.
     pub spine: u32,
     /// Radix sort.
@@ -112,15 +132,6 @@ pub struct Target {
     pub run: TileTarget,
     /// Invocations per workgroup of queries: location, ray intervals, march, slices, overlap.
     pub query: u32,
-    /// Points in an order that an invocation of location fetches together.
-    #[cfg_attr(feature = "formats", serde(default = "one_point"))]
-    pub ahead: u32,
-}
-
-/// What profiles say that were saved before there was a choice.
-#[cfg(feature = "formats")]
-fn one_point() -> u32 {
-    1
 }
 
 impl Target {
@@ -133,7 +144,12 @@ impl Target {
         {
             *size = size.next_multiple_of(subgroup).min(most);
         }
-        while self.sort.digit_bits > 1 && self.sort.shared_bytes(subgroup) > SHARED_BYTES / 8 * 7 {
+        // An eighth of the shared memory is left to the driver.
+        let shared = room.shared_bytes / 8 * 7;
+        while self.sort.rows > 2 && !self.sort.serial && 8 * self.sort.tile() > shared / 8 * 7 {
+            self.sort.rows -= 1;
+        }
+        while self.sort.digit_bits > 1 && self.sort.shared_bytes(subgroup) > shared {
             self.sort.digit_bits -= 1;
         }
         self
@@ -158,9 +174,6 @@ impl Target {
             if size == 0 || size % subgroup.max(1) != 0 || size > invocations {
                 return wrong(&format!("{name} is {size}; it must be a multiple of {subgroup}, the subgroup size, up to {invocations}"));
             }
-        }
-        if !self.ahead.is_power_of_two() || self.ahead > MOST_AHEAD {
-            return wrong(&format!("ahead is {}; it must be a power of 2 up to {MOST_AHEAD}", self.ahead));
         }
         for (name, rows) in [("scan.rows", self.scan.rows), ("sort.rows", self.sort.rows), ("run.rows", self.run.rows)] {
             if !(1..LONGEST_LOOP).contains(&rows) {

@@ -51,7 +51,7 @@ pub fn cmd_exclusive_scan(
     r.barrier("scan.spine → scan.apply");
     r.dispatch(
         &ScanApply { live, sums, values, scanned, count: count.max },
-        ScanApplySpec { workgroup, rows, in_place: u32::from(values == scanned) },
+        ScanApplySpec { workgroup, rows, in_place: u32::from(values == scanned), serial: u32::from(target.serial) },
         groups,
     )
 }

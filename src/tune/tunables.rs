@@ -24,7 +24,7 @@ const RUNS: &[&str] = &["build.emit", "build.count_splits", "build.splits", "bui
 const EACH: &[&str] = &["mesh.", "build.depth", "build.count", "build.filter", "build.emit", "build.leaves", "build.levels"];
 
 /// Every tunable except the kind of sort, the most important ones first.
-pub static TUNABLES: [Tunable; 11] = [
+pub static TUNABLES: [Tunable; 10] = [
     Tunable {
         name: "sort.rows",
         about: "sort: pairs per invocation",
@@ -56,14 +56,6 @@ pub static TUNABLES: [Tunable; 11] = [
         values: GROUPS,
         get: |t| t.query,
         set: |t, v| t.query = v,
-    },
-    Tunable {
-        name: "ahead",
-        about: "location: points fetched together",
-        stages: &["query.locate"],
-        values: &[1, 2, 4, 8],
-        get: |t| t.ahead,
-        set: |t, v| t.ahead = v,
     },
     Tunable {
         name: "run.rows",

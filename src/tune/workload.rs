@@ -1,6 +1,7 @@
 //! The work that is timed, and the answers that it must give.
 
 use super::search::Work;
+use crate::bench::Load;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::gpu::{Gpu, StageTime};
@@ -18,10 +19,10 @@ use std::cell::RefCell;
 use std::rc::Rc;
 use std::time::Instant;
 
-/// Number of points to locate.
-const POINTS: u32 = 1 << 16;
-/// Width and height of the picture, and voxels per row of the slice.
-const PIXELS: u32 = 192;
+/// Number of points to locate on a processor, and on a GPU, which has as many invocations at once.
+const POINTS: [u32; 2] = [1 << 16, 1 << 20];
+/// Width and height of the picture, and voxels per row of the slice, on the two.
+const PIXELS: [u32; 2] = [192, 768];
 /// Meshes of up to this many tetrahedra are also compared with the reference implementation.
 const REFERENCE_TETS: usize = 300_000;
 
@@ -34,6 +35,7 @@ pub struct Workload<'a> {
     plan: Plan,
     voxels: VoxelGrid,
     expected: Answers,
+    load: Load,
     /// Mesh and trees for the two targets used last.
     prepared: RefCell<Vec<Rc<Prepared>>>,
 }
@@ -69,17 +71,18 @@ impl<'a> Workload<'a> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let bounds = Bounds::from(device.grid());
         let Bounds { lo, hi } = bounds;
+        let of = usize::from(gpu.report().kind != "cpu");
         // Fractional parts of multiples of a generalised golden ratio: in no order, and spread evenly.
         let at = |i: u32, share: f64, c: usize| lo[c] + (hi[c] - lo[c]) * (f64::from(i) * share).fract() as f32;
-        let points = (0..POINTS).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();
+        let points = (0..POINTS[of]).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();
         let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
         let field = mesh.fields.iter().find(|f| f.on == On::Points).cloned().unwrap_or_else(along_x);
-        let picture = RenderSettings { size: [PIXELS; 2], shading: false, ..RenderSettings::default() };
+        let picture = RenderSettings { size: [PIXELS[of]; 2], shading: false, ..RenderSettings::default() };
         let plan = Plan::new(&picture, &bounds, mesh.origin, field.range())?;
-        let voxels = SliceSettings { size: [PIXELS, 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3])?;
+        let voxels = SliceSettings { size: [PIXELS[of], 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3])?;
         let gpu = gpu.clone();
-        let (expected, prepared) = (Answers::default(), RefCell::default());
-        let mut workload = Self { gpu, mesh, points, field, plan, voxels, expected, prepared };
+        let (expected, load, prepared) = (Answers::default(), Load::new(&gpu)?, RefCell::default());
+        let mut workload = Self { gpu, mesh, points, field, plan, voxels, expected, load, prepared };
         let target = workload.gpu.target().clone();
         workload.expected = workload.answers(&target)?;
         if mesh.tets.len() <= REFERENCE_TETS {
@@ -185,9 +188,11 @@ impl Work for Workload<'_> {
         let begin;
         if any(&["query."]) {
             let on = self.prepared(target)?;
+            self.load.run()?;
             begin = Instant::now();
             times = self.ask(&on, &mut Answers::default())?;
         } else {
+            self.load.run()?;
             begin = Instant::now();
         }
         if any(&["mesh.", "build."]) {

@@ -21,9 +21,9 @@ pub struct OlbvhLocation {
     pub count: u32,
     /// Tolerance, as for `olbvh_locate`.
     pub tolerance: f32,
-    /// How points are located. 0: each one independently. 1: each one starting at the owner of the point before it;
-    /// this pays from one point per four tetrahedra on, if each point lies near the one before. 2: like 1,
-    /// for points in no order, which are sorted first.
+    /// How points are located. 0: each one independently. 1: each one starting at the owner of the point before it, if
+    /// each point lies near the one before; this pays on processors, from one point per four tetrahedra on. 2: like 0,
+    /// for many points in no order, which are sorted first.
     pub path: u32,
     /// For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
     /// owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh. The hints may be where

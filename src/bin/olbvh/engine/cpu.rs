@@ -8,7 +8,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query::{LocateMethod, LocateOptions, Located, Rendered};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
-use olbvh::reference::locate::{self, Locator, order_of};
+use olbvh::reference::locate::{self, Locator};
 use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
@@ -150,9 +150,8 @@ impl<'a> CpuTree<'a> {
         // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
         for chunk in points.chunks(locate::CHUNK) {
             let found = match options.method {
-                LocateMethod::Sorted => locator.locate_in_runs(chunk, &order_of(&self.tree.grid, chunk)),
-                LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
-                LocateMethod::Descent | LocateMethod::Traversal(_) => locator.locate_each(chunk),
+                LocateMethod::Runs => locator.locate_in_runs(chunk),
+                LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => locator.locate_each(chunk),
             };
             all.owners.extend(found.iter().map(|l| l.owner));
             all.barycentrics.extend(found.iter().map(|l| l.barycentric));
