@@ -534,9 +534,9 @@ typedef struct olbvh_location {
    */
   float tolerance;
   /*
-   How points are located. 0: each one independently. 1: each one starting at the owner of the point before it;
-   this pays from one point per four tetrahedra on, if each point lies near the one before. 2: like 1,
-   for points in no order, which are sorted first.
+   How points are located. 0: each one independently. 1: each one starting at the owner of the point before it, if
+   each point lies near the one before; this pays on processors, from one point per four tetrahedra on. 2: like 0,
+   for many points in no order, which are sorted first.
    */
   uint32_t path;
   /*

@@ -158,8 +158,7 @@ fn heading(report: &Report) -> String {
     format!(
         "olbvh {version}{}, suite {}, on {} ({}; subgroups of {}, kernels `{}`, buffers by {})\n{} points, {}² pixels, slices of {} voxels a row; \
          medians of up to {} repetitions or {} s, device time, everything verified before it is timed\n\
-         trees with lists `boundary` search for each point near the owner of the one before if there is at least one point for every four tetrahedra \
-         (random points are sorted first, which is timed); samples of rays, and all points in the other structures, are searched for independently\n\
+         random points in trees with lists `boundary` are sorted first if there is at least one for every four tetrahedra, which is timed\n\
          copy rate {} GB/s, read and written\n",
         commit.as_ref().map_or(String::new(), |c| format!(" ({c})")),
         suite.name(),

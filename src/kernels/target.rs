@@ -144,13 +144,13 @@ impl Target {
         {
             *size = size.next_multiple_of(subgroup).min(most);
         }
-        // An eighth of the shared memory is left to the driver.
-        let shared = room.shared_bytes / 8 * 7;
-        while self.sort.rows > 2 && !self.sort.serial && 8 * self.sort.tile() > shared / 8 * 7 {
-            self.sort.rows -= 1;
-        }
-        while self.sort.digit_bits > 1 && self.sort.shared_bytes(subgroup) > shared {
+        // An eighth of the shared memory is left to the driver. Digits matter more than rows.
+        let (shared, least) = (room.shared_bytes / 8 * 7, self.sort.rows.min(2));
+        while self.sort.digit_bits > 1 && (SortTarget { rows: least, ..self.sort }).shared_bytes(subgroup) > shared {
             self.sort.digit_bits -= 1;
+        }
+        while self.sort.rows > least && self.sort.shared_bytes(subgroup) > shared {
+            self.sort.rows -= 1;
         }
         self
     }
