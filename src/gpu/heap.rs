@@ -99,9 +99,7 @@ impl Memory {
         }
         Ok(memory)
     }
-}
 
-impl Memory {
     /// The allocation, if its memory is host-coherent and has these properties.
     fn coherent(&self, and: vk::MemoryPropertyFlags) -> Option<&Allocation> {
         let wanted = vk::MemoryPropertyFlags::HOST_COHERENT | and;

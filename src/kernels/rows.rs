@@ -1,8 +1,8 @@
 //! The table of targets: one row per kind of device.
 //!
 //! Measured: `cpu` (lavapipe), and the sort and the scan of `nvidia` (H100). There, a sort of 512 × 6 pairs per tile is
-//! the fastest and one of 256 × 8 the next; more rows take registers, and leave too few subgroups to hide latency. The
-//! other rows have the latter, which needs less shared memory. 256 × 16 of the scan is within 2% of the best.
+//! the fastest, and one of 256 × 8 takes a sixth longer; more rows take registers, and leave too few subgroups to hide
+//! latency. The other rows have the latter, which needs less shared memory. 256 × 16 of the scan is within 2% of the best.
 //! Workgroup sizes of the other kernels follow from the resources of a core: small where registers are few or subgroups
 //! narrow. `olbvh tune` finds better parameters for the device at hand.
 
