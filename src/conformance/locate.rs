@@ -10,9 +10,12 @@ use crate::error::Error;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all};
+use crate::primitives::Arena;
+use crate::query::{
+    LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, SILENT, Scene, cmd_locate, cmd_sort_points, locate, locate_all,
+};
 use crate::reference::boundary::NONE;
-use crate::reference::locate::{Location, Locator};
+use crate::reference::locate::{Location, Locator, order_of};
 
 /// How the points of a case are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -77,7 +80,13 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
             let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
             let runs = (case.how == How::Runs).then(|| locator.locate_in_runs(points));
             let expected = runs.as_deref().unwrap_or_else(|| twin.locations(&built));
-            compare_locations(expected, &found.owners, &found.barycentrics, points)
+            compare_locations(expected, &found.owners, &found.barycentrics, points)?;
+            // The owners do not show whether points were sorted.
+            if case.how == How::Sorted {
+                order(gpu, &Scene::new(device, &tree)?, points, &order_of(&built.tree().grid, points))
+            } else {
+                Ok(())
+            }
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
@@ -139,6 +148,16 @@ fn compare_locations(expected: &[Location], owners: &[u32], barycentrics: &[[f32
     let bits = |b: &[f32; 4]| b.map(f32::to_bits);
     let wanted: Vec<_> = expected.iter().map(|e| bits(&e.barycentric)).collect();
     compare("query.locate", "barycentrics (bits)", &wanted, &barycentrics.iter().map(bits).collect::<Vec<_>>())
+}
+
+/// Compares the order that points are sorted into.
+fn order(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], expected: &[u32]) -> Verdict {
+    let count = points.len() as u32;
+    let input = gpu.upload("olbvh.conformance.points", points)?;
+    let (memory, order) = Arena::reserve(gpu, "olbvh.conformance.order", |a| PointOrder::carve(gpu, a, count))?;
+    let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: None };
+    gpu.submit("olbvh.conformance.sort_points", |r| cmd_sort_points(r, scene.tree.grid, &input, &order))?;
+    compare("query.sort_points", "order", expected, &gpu.download::<u32>(&memory, order.order)?)
 }
 
 /// Locates points with hints: the owner, another valid tetrahedron, or none. The reference implementation gets the same
