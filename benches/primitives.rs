@@ -5,7 +5,7 @@
 mod submit;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use olbvh::gpu::{Buffer, Gpu, GpuOptions, Recorder};
+use olbvh::gpu::{Buffer, DeviceKind, Gpu, GpuOptions, Recorder};
 use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
@@ -17,7 +17,7 @@ const SIZES: [u32; 3] = [1 << 16, 1 << 22, 1 << 25];
 const SORT_BITS: u32 = 21;
 
 fn sizes(gpu: &Gpu) -> &'static [u32] {
-    if gpu.report().kind == "cpu" { &SIZES[..2] } else { &SIZES }
+    if gpu.report().kind == DeviceKind::Cpu { &SIZES[..2] } else { &SIZES }
 }
 
 fn keys(n: u32) -> Vec<u32> {

@@ -386,12 +386,11 @@ float olbvh_dot_product(vec3 a, vec3 b) {
     return r;
 }
 
-// Six times the signed volume of (a, b, c, p).
+// Six times the signed volume of (a, b, c, p). It is computed relative to p, so that it is exactly 0 where p is one of
+// the others.
 float olbvh_orient(vec3 a, vec3 b, vec3 c, vec3 olbvh_p) {
-    precise vec3 ab = b - a;
-    precise vec3 ac = c - a;
-    precise vec3 ap = olbvh_p - a;
-    return olbvh_dot_product(olbvh_cross_product(ab, ac), ap);
+    precise vec3 pa = a - olbvh_p, pb = b - olbvh_p, pc = c - olbvh_p;
+    return -olbvh_dot_product(olbvh_cross_product(pa, pb), pc);
 }
 
 // A tetrahedron with its vertices in ascending global index.
@@ -459,9 +458,11 @@ bool olbvh_holds(olbvh_Bounds box, vec3 olbvh_p) { return all(lessThanEqual(box.
 olbvh_Weights olbvh_weights(olbvh_Tet t, vec3 olbvh_p) {
     float vol = olbvh_volume(t);
     float s = vol < 0.0 ? -1.0 : 1.0;
+    // `orient` of the four faces and p; its sign alternates with the opposite vertex.
+    precise vec3 a = t.v[0] - olbvh_p, b = t.v[1] - olbvh_p, c = t.v[2] - olbvh_p, d = t.v[3] - olbvh_p;
+    vec3 ab = olbvh_cross_product(a, b);
     olbvh_Weights r;
-    r.w = vec4(-s * olbvh_orient(t.v[1], t.v[2], t.v[3], olbvh_p), s * olbvh_orient(t.v[0], t.v[2], t.v[3], olbvh_p), -s * olbvh_orient(t.v[0], t.v[1], t.v[3], olbvh_p),
-               s * olbvh_orient(t.v[0], t.v[1], t.v[2], olbvh_p));
+    r.w = vec4(s * olbvh_dot_product(olbvh_cross_product(b, c), d), -s * olbvh_dot_product(olbvh_cross_product(a, c), d), s * olbvh_dot_product(ab, d), -s * olbvh_dot_product(ab, c));
     precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
     r.sum = sum;
     olbvh_Bounds box = olbvh_bounds_of(t.v);
@@ -611,6 +612,8 @@ bool olbvh_is_empty_tree(uint level) { return level == 0u ? olbvh_entry_range(0u
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl,
 // and flags, cells, vertices.
 
+// Whether the surface of the mesh may pass through a node's cell. The including kernel declares flags.
+bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 // Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl and vertices.
 // Vertices and tetrahedra as 02_normalise_vertices leaves them. The including kernel declares `vertices`: normalised
 // coordinates, and the cell of the finest grid.
@@ -755,8 +758,6 @@ void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
         }
     }
 }
-
-bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
 // The owner, once the whole list has been searched; NONE if there is none.
 uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
@@ -949,9 +950,11 @@ struct olbvh_LeafCell {
 uint olbvh_star[olbvh_STAR];
 uint olbvh_star_size;
 
+// Looks at four at a time: some drivers end the loops of an invocation after 65,535 passes in all.
 bool olbvh_in_star(uint t) {
-    for (uint i = 0u; i < olbvh_star_size; ++i) {
-        if (olbvh_star[i] == t) return true;
+    for (uint i = 0u; i < olbvh_star_size; i += 4u) {
+        uint left = olbvh_star_size - i;
+        if (olbvh_star[i] == t || (left > 1u && olbvh_star[i + 1u] == t) || (left > 2u && olbvh_star[i + 2u] == t) || (left > 3u && olbvh_star[i + 3u] == t)) return true;
     }
     return false;
 }
@@ -1204,7 +1207,8 @@ bool olbvh_visit_leaf(olbvh_Node node);
 //     ENTER_NODE(node, mask, first)  // done before F_N is asked about the children of the node; `first` is the first
 //     KEEPS(node)                    // whether a node that F_N accepted earlier is still to be visited
 //     FLIP                           // the children of a node are visited in the order of their digits XOR this
-// STACK is the number of nodes on the short stack. Any size gives the same leaves; a small one asks F_N more often.
+// STACK is the number of nodes on the short stack. Any size, from 0 on, gives the same leaves; a small one asks F_N more
+// often.
 #ifndef olbvh_ENTER_NODE
 #define olbvh_ENTER_NODE(node, mask, first)
 #endif
@@ -1224,7 +1228,7 @@ bool olbvh_traverse(uint level) {
         olbvh_visit_leaf(node);
         return true;
     }
-    olbvh_Node stack[olbvh_STACK];
+    olbvh_Node stack[olbvh_STACK + uint(olbvh_STACK == 0u)]; // no array is empty
     uint top = 0u, held = 0u; // ring buffer: if it is full, the oldest node is dropped
     uint trail = 0u, resume = 0u;
     for (uint visits = 0u; visits < olbvh_MAX_VISITS; ++visits) {
@@ -1256,7 +1260,7 @@ bool olbvh_traverse(uint level) {
                 uint highest = uint(findMSB(accepted)), digit = highest ^ olbvh_FLIP;
                 accepted ^= 1u << highest;
                 node = olbvh_Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
-                if (k < left) {
+                if (olbvh_STACK > 0u && k < left) {
                     stack[top] = node;
                     top = top + 1u == olbvh_STACK ? 0u : top + 1u;
                     held = min(held + 1u, olbvh_STACK);

@@ -536,7 +536,7 @@ typedef struct olbvh_location {
   /*
    How points are located. 0: each one independently. 1: each one starting at the owner of the point before it, if
    each point lies near the one before; this pays on processors, from one point per four tetrahedra on. 2: like 0,
-   for many points in no order, which are sorted first.
+   for many points in no order, which are sorted first. 3: sorted first, then like 1, for processors.
    */
   uint32_t path;
   /*
@@ -546,7 +546,7 @@ typedef struct olbvh_location {
    */
   struct olbvh_buffer hints;
   /*
-   For path 2: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
+   For paths 2 and 3: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
    */
   struct olbvh_buffer memory;
   /*
@@ -641,7 +641,8 @@ typedef struct olbvh_view {
  */
 typedef struct olbvh_rounds {
   /*
-   Number of dispatches, one after the other; they skip what is finished.
+   Number of dispatches, one after the other; they skip what is finished. At least one, unless they continue work or
+   draw a picture.
    */
   uint32_t count;
   /*

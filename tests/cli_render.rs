@@ -41,6 +41,43 @@ fn render_writes_a_picture_and_its_figures() {
     assert_eq!(names, ["a.png"], "nothing else is left");
 }
 
+/// Width of a picture, and the four bytes of each of its pixels.
+fn pixels(file: &Path) -> (usize, Vec<[u8; 4]>) {
+    let mut reader = png::Decoder::new(std::io::BufReader::new(std::fs::File::open(file).unwrap())).read_info().unwrap();
+    let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+    let info = reader.next_frame(&mut bytes).unwrap();
+    assert_eq!(info.color_type, png::ColorType::Rgba);
+    (info.width as usize, bytes.chunks_exact(4).map(|pixel| pixel.try_into().unwrap()).collect())
+}
+
+/// A legend takes a strip at the right, with the colours from the largest value down to the smallest; what is left of
+/// the picture is as large as without it.
+#[test]
+fn a_legend_stands_beside_the_mesh() {
+    let folder = TempDir::new().unwrap();
+    let picture = |name: &str, more: &[&str]| {
+        let grey = ["--tf", "grey", "--no-shading", "--background", "#ff0000"];
+        json(folder.path(), &[&["render", "kuhn:5,4,3", "-o", name, "--device", "cpu"], &grey[..], more].concat());
+        pixels(&folder.path().join(name))
+    };
+    let (width, all) = picture("legend.png", &["--size", "230x150", "--legend"]);
+    assert_eq!((width, all.len()), (230, 230 * 150));
+    let strip = 102;
+    let (left, drawn) = picture("drawn.png", &["--size", "128x150"]);
+    assert_eq!(left + strip, width);
+    for (row, drawn) in all.chunks(width).zip(drawn.chunks(left)) {
+        assert!(row[..left] == *drawn);
+    }
+    let bar: Vec<u8> = all.chunks(width).map(|row| row[left + 10]).filter(|p| p[0] == p[1] && p[1] == p[2]).map(|p| p[0]).collect();
+    let end = bar.iter().rposition(|&grey| grey == 0).unwrap();
+    let bar = &bar[end + 1 - 90..=end]; // below the name, whose letters are black
+    assert!(bar.first() == Some(&255) && bar.is_sorted_by(|a, b| a >= b), "{bar:?}");
+    let labels = all.chunks(width).flat_map(|row| &row[left + 40..]).filter(|pixel| pixel[..3] != [255, 0, 0]).count();
+    assert!(labels > 50, "{labels} pixels of labels");
+    let message = fails(folder.path(), 2, &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "100x100", "--legend"]);
+    assert!(message.contains("too small for --legend"), "{message}");
+}
+
 /// A pixel is the mean of its rays: of black and white ones, as the mesh is seen or the background.
 #[test]
 fn rays_of_a_pixel_are_averaged() {
@@ -48,11 +85,7 @@ fn rays_of_a_pixel_are_averaged() {
     let picture = |name: &str, more: &[&str]| {
         let white = ["--tf", "grey", "--range=-9:-8", "--opacity", "1", "--opacity-scale", "1000", "--no-shading", "--background", "black"];
         let result = json(folder.path(), &[&["render", "kuhn:5,4,3", "-o", name, "--device", "cpu"], &white[..], more].concat());
-        let file = std::io::BufReader::new(std::fs::File::open(folder.path().join(name)).unwrap());
-        let mut reader = png::Decoder::new(file).read_info().unwrap();
-        let mut pixels = vec![0; reader.output_buffer_size().unwrap()];
-        let channels = reader.next_frame(&mut pixels).unwrap().color_type.samples();
-        (result, pixels.chunks(channels).map(|pixel| u32::from(pixel[0])).collect::<Vec<_>>())
+        (result, pixels(&folder.path().join(name)).1.into_iter().map(|pixel| u32::from(pixel[0])).collect::<Vec<_>>())
     };
     let (rays, of_rays) = picture("rays.png", &["--size", "80x60"]);
     let (result, of_pixels) = picture("pixels.png", &["--size", "40x30", "--supersample", "2"]);

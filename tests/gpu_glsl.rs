@@ -70,7 +70,6 @@ void main() {
 /// A kernel that writes the distance to the nearest leaf of a random selection, found among all leaves and among nearer
 /// ones only.
 const NEAREST: &str = r#"
-#define OLBVH_STACK 1
 #include "olbvh.glsl"
 vec3 at;
 uint seed;
@@ -218,9 +217,11 @@ fn check(binding: Binding) {
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
         let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
-        for (i, [all, nearer]) in run(&gpu, NEAREST, &scene, level, &points).into_iter().enumerate() {
-            assert_eq!(nearer, all, "{binding:?} {lists:?}: the leaf nearest to point {i} is {} away", f32::from_bits(all));
+        let nearest = [0, 1, 3].map(|stack| run::<2>(&gpu, &format!("#define OLBVH_STACK {stack}\n{NEAREST}"), &scene, level, &points));
+        for (i, [all, nearer]) in nearest[0].iter().enumerate() {
+            assert_eq!(nearer, all, "{binding:?} {lists:?}: the leaf nearest to point {i} is {} away", f32::from_bits(*all));
         }
+        assert!(nearest[1] == nearest[0] && nearest[2] == nearest[0], "{binding:?} {lists:?}: other leaves with another stack");
     }
     assert!(gpu.validation_messages().is_empty(), "{:#?}", gpu.validation_messages());
 }

@@ -15,7 +15,7 @@ use host::queries::Queries;
 use host::{Frame, Host};
 use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, Recorder, Requirements};
+use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, HostQueue, Recorder, Requirements};
 use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
@@ -60,6 +60,27 @@ fn a_hosts_device_allocator_and_cache_are_used_and_left() {
     // SAFETY: no pipeline is being made with the cache; the allocator frees its blocks while the device still exists.
     unsafe { host.device.destroy_pipeline_cache(cache, None) };
     drop(allocator);
+}
+
+/// A queue of a host that does what it should not: it passes the queue on twice.
+struct Twice(Arc<Mutex<vk::Queue>>);
+
+impl HostQueue for Twice {
+    fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
+        let queue = self.0.lock().unwrap();
+        submit(*queue);
+        submit(*queue);
+    }
+}
+
+#[test]
+fn commands_are_submitted_once() {
+    let host = Host::new();
+    let queue: Arc<dyn HostQueue> = Arc::new(Twice(host.queue()));
+    // SAFETY: as above.
+    let gpu = unsafe { Gpu::from_raw(HostDevice { queue: Some(queue), ..host.lend() }, &GpuOptions::default()) }.unwrap();
+    let mesh = kuhn_jittered([3; 3], 0.3, 1).unwrap();
+    assert!(owners(&gpu, &mesh).iter().all(|&o| o != u32::MAX));
 }
 
 #[test]

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use olbvh::build::{BadCells, Capacity, CountScratch, DeviceMesh, FilterScratch, SortedScratch, Tree};
+use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree};
 use olbvh::gpu::{Buffer, Gpu, GpuOptions};
 use olbvh::mesh::kuhn;
 use olbvh::options::{Assign, BuildOptions, Lists};
@@ -18,11 +18,11 @@ fn jets_fits_in_two_gibibytes() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
     let (tets, entries, level, nodes) = (12_290_298, 98_322_384, 7, 2_396_745u64);
     let capacity = Capacity { candidates: entries, entries, nodes: nodes as u32, level };
-    let counts = Arena::measure(|a| CountScratch::carve(&gpu, a, tets)).unwrap();
-    let sorted = Arena::measure(|a| SortedScratch::carve(&gpu, a, &capacity)).unwrap();
+    let paper = BuildOptions { assign: Assign::Aabb, lists: Lists::All, ..BuildOptions::default() };
+    let scratch = Arena::measure(|a| BuildScratch::carve(&gpu, a, tets, &capacity, &paper)).unwrap();
     let tree = 4 * u64::from(entries) + nodes * (4 + 4 + 1 + 1 + 24);
-    let total = counts + sorted + tree;
-    println!("counts {counts}, sort and splits {sorted}, tree {tree}, together {total} bytes");
+    let total = scratch + tree;
+    println!("scratch {scratch}, tree {tree}, together {total} bytes");
     assert!(total < 2 << 30, "{total} bytes");
 }
 
@@ -66,11 +66,7 @@ fn a_build_allocates_what_it_needs() {
         let tree = Tree::build(&gpu, &on_device, &options).unwrap();
         let status = *tree.status();
         let capacity = Capacity { candidates: status.candidates, entries: status.entries, nodes: status.nodes, level: status.level };
-        let planned = Arena::measure(|a| {
-            CountScratch::carve(&gpu, a, on_device.input().tets)?;
-            FilterScratch::carve(&gpu, a, on_device.input().tets, &options, &capacity)?;
-            SortedScratch::carve(&gpu, a, &capacity)
-        });
+        let planned = Arena::measure(|a| BuildScratch::carve(&gpu, a, on_device.input().tets, &capacity, &options));
         // Allows for the head of 512 bytes and the rounding of each buffer.
         let slack = 8192;
         assert!(tree.scratch_bytes() <= planned.unwrap() + slack, "{assign}: {} scratch bytes", tree.scratch_bytes());

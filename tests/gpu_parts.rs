@@ -2,24 +2,32 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod submit;
+
 use olbvh::build::{BadCells, DeviceMesh, Tree, cmd_ranges, range_bytes};
 use olbvh::error::{Error, Result};
 use olbvh::gpu::{BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::kernels::Row;
 use olbvh::layout::RenderView;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
-use olbvh::primitives::Arena;
+use olbvh::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
-    LocateMethod, LocateOptions, LocateOutput, OwnersMemory, PointInput, PointOrder, RenderInput, RenderMemory, Rounds, Scene, SliceInput,
-    SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_locate, cmd_render, cmd_slice, cmd_sort_points,
-    cmd_visible, visible_bytes,
+    LocateMethod, LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput, RenderMemory,
+    Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_list_pairs, cmd_locate,
+    cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
 };
 use olbvh::render::TABLE_SIZE;
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
+use submit::submit;
 
 fn refused(result: Result<()>, what: &str) {
     let Err(Error::Invalid(text)) = result else { panic!("{what}: {result:?}") };
     assert!(text.contains(&format!("{what} in a part of")), "{what}: {text}");
+}
+
+fn too_few_rounds(result: &Result<()>) {
+    assert!(matches!(result, Err(Error::Invalid(text)) if text.contains("begins with no rounds")), "{result:?}");
 }
 
 fn less(part: BufferRef) -> BufferRef {
@@ -65,12 +73,13 @@ fn points_and_their_answers() {
         PointInput { points: lab.part(4 * (5 * 99 + 3)), stride, count, hints: Some(lab.part(4 * n)), order: Some(lab.part(4 * n)) };
     let output = LocateOutput { owners: lab.part(4 * n), barycentrics: lab.part(16 * n) };
     let locate = |input: PointInput, output: LocateOutput| {
-        [LocateMethod::Descent, LocateMethod::Runs, LocateMethod::Sorted, LocateMethod::Traversal(8)].map(|method| {
+        use LocateMethod::{Descent, Runs, Sorted, SortedRuns, Traversal};
+        [Descent, Runs, Sorted, SortedRuns, Traversal(8)].map(|method| {
             let options = LocateOptions { method, ..LocateOptions::default() };
             lab.rehearse(|r| cmd_locate(r, &scene, &input, &output, &options))
         })
     };
-    let each = |results: [Result<()>; 4], what: &str| results.into_iter().for_each(|result| refused(result, what));
+    let each = |results: [Result<()>; 5], what: &str| results.into_iter().for_each(|result| refused(result, what));
     locate(input, output).into_iter().for_each(Result::unwrap);
     each(locate(PointInput { points: less(input.points), ..input }, output), "points");
     each(locate(PointInput { hints: input.hints.map(less), ..input }, output), "hints");
@@ -147,11 +156,45 @@ fn pictures_and_slices() {
     let half = [axis(0), axis(1), axis(2)];
     let voxels = VoxelGrid { origin: [0.0; 3], next_voxel: axis(0), next_row: axis(1), next_layer: axis(2), half, size: [5, 5], layers: 1 };
     let memory = SliceMemory::carve(&mut Arena::new(lab.memory.all()), [5, 5], 5).unwrap();
-    let slice = |field| {
+    let slice = |field, rounds| {
         let rows = Rows { layer: 0, first: 0, count: 5 };
         let input = SliceInput { voxels: &voxels, rows, field: Some(field), extrapolate: Extrapolate::Nearest, part: None };
-        lab.rehearse(|r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(1)))
+        lab.rehearse(|r| cmd_slice(r, &searched, &input, &memory, rounds))
     };
-    slice(field).unwrap();
-    refused(slice(short), "a field");
+    slice(field, Rounds::begin(1)).unwrap();
+    refused(slice(short, Rounds::begin(1)), "a field");
+    too_few_rounds(&slice(field, Rounds::begin(0)));
+    slice(field, Rounds::resume(0)).unwrap();
+}
+
+/// What a beginning without rounds would leave to a resumed search, nothing has written.
+#[test]
+fn searches_begin_with_a_round() {
+    let lab = Lab::new();
+    let scene = Scene::new(&lab.device, &lab.tree).unwrap();
+    let memory = OverlapMemory::carve(&mut Arena::new(lab.memory.all()), &scene, &scene).unwrap();
+    too_few_rounds(&lab.rehearse(|r| cmd_overlap(r, &scene, &scene, &memory, Rounds::begin(0))));
+    lab.rehearse(|r| cmd_overlap(r, &scene, &scene, &memory, Rounds::begin(1))).unwrap();
+    let memory = PairMemory::carve(&lab.gpu, &mut Arena::new(lab.memory.all()), lab.device.input().tets).unwrap();
+    too_few_rounds(&lab.rehearse(|r| cmd_list_pairs(r, &scene, &scene, &memory, lab.part(64), Rounds::begin(0))));
+}
+
+/// Keys have 32 bits, so that a sort by more of them sorts by all, in the place that it says.
+#[test]
+fn a_sort_takes_no_more_bits_than_there_are() {
+    for row in [Row::Portable, Row::Cpu] {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        let gpu = gpu.with_target(row.target(&gpu.report().room)).unwrap();
+        let n = 5000;
+        let keys: Vec<u32> = (0..n).map(|i: u32| i.wrapping_mul(2_654_435_761)).collect();
+        let (key_buffer, id_buffer) = (gpu.upload("olbvh.test.keys", &keys).unwrap(), gpu.upload("olbvh.test.ids", &keys).unwrap());
+        let (_memory, scratch) = Arena::reserve(&gpu, "olbvh.test.sort", |a| SortScratch::carve(&gpu, a, n, 40)).unwrap();
+        let record = |r: &mut Recorder<'_>| cmd_sort_pairs(r, key_buffer.all(), id_buffer.all(), 40, Count::host(n), &scratch);
+        submit(&gpu, "olbvh.test.sort", record).unwrap();
+        let mut sorted = keys;
+        sorted.sort_unstable();
+        for buffer in [&key_buffer, &id_buffer] {
+            assert!(gpu.download::<u32>(buffer, buffer.all()).unwrap() == sorted, "{row}");
+        }
+    }
 }

@@ -7,7 +7,7 @@ mod not_run;
 use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
-use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::{SILENT, slice};
 use olbvh::reference::build::build;
@@ -115,6 +115,20 @@ fn an_error_of_the_sink_ends_the_stack() {
     let mut stop = |_: Band| Err(olbvh::Error::Invalid("full".into()));
     let result = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut stop);
     assert!(result.is_err_and(|e| e.to_string().contains("full")));
+}
+
+/// Centres on vertices are each searched for in a star of tetrahedra. A dispatch takes no more of them than drivers let
+/// the loops of an invocation run for: one (Mesa 22.3) ends them after 65,535 passes, and the rest of a run was empty.
+#[test]
+fn runs_along_vertices_are_sliced_to_their_end() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([8, 128, 8]).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let settings = SliceSettings { at: Some(4.0), size: [4, 64], ..SliceSettings::default() };
+    let voxels = settings.voxels([0.0; 3], [8.0, 128.0, 8.0], mesh.origin).unwrap();
+    let sliced = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut |_| Ok(())).unwrap();
+    assert_eq!(sliced.tally.inside, voxels.voxels(), "{:?}", sliced.tally);
 }
 
 /// Where tetrahedra overlap, the owner of a voxel is found from that of the voxel before. That is the same one however

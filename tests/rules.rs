@@ -21,7 +21,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("render", &["error", "grid", "layout", "mesh"]),
     ("reference", &["error", "grid", "layout", "mesh", "options", "render", "slicing", "tree"]),
     ("formats", &["error", "grid", "mesh", "named"]),
-    ("gpu", &["error", "kernels", "primitives"]),
+    ("gpu", &["error", "kernels", "named", "primitives"]),
     ("kernels", &["error", "gpu", "named"]),
     ("primitives", &["error", "gpu", "kernels"]),
     ("build", &["error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
@@ -168,7 +168,7 @@ fn buffers_submissions_and_stages_are_named() {
     let mut n = 0;
     for (file, text) in sources() {
         let text = text.split("#[cfg(test)]").next().unwrap_or_default();
-        for call in [".buffer(", ".upload(", "Buffer::new(", "Buffer::staging(", "reserve(", "Guarded::new(", "Guarded::scratch("] {
+        for call in [".buffer(", ".upload(", "Buffer::staging(", "reserve(", "Guarded::new(", "Guarded::scratch("] {
             for name in literals(text, call) {
                 n += 1;
                 if !is_name(name) {

@@ -7,19 +7,18 @@
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint ASSIGN = 0;
 layout(constant_id = 4) const uint TETS = 32; // per invocation: 32 where there are few, one where there are thousands
-ARGUMENTS(9)
+ARGUMENTS(8)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, quantized)
+RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-RECORDS(4, vec4, vertices)
-BUFFER(5, readonly, uint, offsets) // index of the first share of every tetrahedron
-BUFFER(6, readonly, uint, shares)  // number of shares
-BUFFER(7, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves; zeroed
-BUFFER(8, readonly, uint, boundary)
+BUFFER(4, readonly, uint, offsets) // index of the first share of every tetrahedron
+BUFFER(5, readonly, uint, shares)  // number of shares
+BUFFER(6, READ_WRITE, uint, marks) // one bit per cell of the level of the leaves; zeroed
+BUFFER(7, readonly, uint, boundary)
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
 #include "shared/assign.glsl"

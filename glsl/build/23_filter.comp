@@ -10,23 +10,22 @@
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint ASSIGN = 1;
 layout(constant_id = 4) const uint LISTS = 0; // 1: marked cells and seeds
-ARGUMENTS(13)
+ARGUMENTS(12)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, quantized)
+RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-RECORDS(4, vec4, vertices)
-BUFFER(5, readonly, uint, offsets) // index of the first share of every tetrahedron
-BUFFER(6, readonly, uint, shares)  // number of shares
-BUFFER(7, writeonly, uint, hits)   // one bit per candidate
-BUFFER(8, writeonly, uint, counts) // hits per share
-BUFFER(9, readonly, uint, marks)
-BUFFER(10, readonly, uint, boundary)
-BUFFER(11, writeonly, uint, doubts)       // shares with centres in doubt: t for a first share, tets + i for another
-BUFFER(12, READ_WRITE, uint, doubt_count) // zeroed
+BUFFER(4, readonly, uint, offsets) // index of the first share of every tetrahedron
+BUFFER(5, readonly, uint, shares)  // number of shares
+BUFFER(6, writeonly, uint, hits)   // one bit per candidate
+BUFFER(7, writeonly, uint, counts) // hits per share
+BUFFER(8, readonly, uint, marks)
+BUFFER(9, readonly, uint, boundary)
+BUFFER(10, writeonly, uint, doubts)       // shares with centres in doubt: t for a first share, tets + i for another
+BUFFER(11, READ_WRITE, uint, doubt_count) // zeroed
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
 #include "shared/assign.glsl"

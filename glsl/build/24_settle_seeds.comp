@@ -6,22 +6,21 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-ARGUMENTS(12)
+ARGUMENTS(11)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, quantized)
+RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
-RECORDS(4, vec4, vertices)
-BUFFER(5, readonly, uint, offsets)
-BUFFER(6, READ_WRITE, uint, hits)
-BUFFER(7, READ_WRITE, uint, counts)
-BUFFER(8, readonly, uint, marks)
-RECORDS(9, uvec4, neighbours)
-BUFFER(10, readonly, uint, doubts)
-BUFFER(11, readonly, uint, doubt_count)
+BUFFER(4, readonly, uint, offsets)
+BUFFER(5, READ_WRITE, uint, hits)
+BUFFER(6, READ_WRITE, uint, counts)
+BUFFER(7, readonly, uint, marks)
+RECORDS(8, uvec4, neighbours)
+BUFFER(9, readonly, uint, doubts)
+BUFFER(10, readonly, uint, doubt_count)
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
 #include "shared/centre.glsl"

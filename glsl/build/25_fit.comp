@@ -4,7 +4,6 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-#include "shared/groups.glsl"
 layout(constant_id = 2) const uint EACH = 64; // items per workgroup of those dispatches
 ARGUMENTS(8)
     uint tets;
@@ -21,11 +20,7 @@ BUFFER(6, READ_WRITE, uint, live)   // tets + 1 if there is an attempt, else 0
 // Workgroups (x, y, z) of three dispatches: over tets + 1 items and over words of marks, over words of one bit per
 // tetrahedron, over tetrahedra.
 BUFFER(7, writeonly, uint, groups)
-
-void plan(uint slot, uint items) {
-    uvec3 size = groups_for(items, EACH);
-    for (uint c = 0u; c < 3u; ++c) groups.at[3u * slot + c] = size[c];
-}
+#include "shared/groups.glsl"
 
 void main() {
     if (item_index() > 0u) return;
@@ -45,7 +40,7 @@ void main() {
     uint n = again ? tets : 0u;
     live.at[0] = again ? tets + 1u : 0u;
     // Marks are cleared by the same dispatch, a word per invocation.
-    plan(0u, again ? max(tets + 1u, cell_words(level)) : 0u);
-    plan(1u, (n + 31u) / 32u);
-    plan(2u, n);
+    write_groups(0u, again ? max(tets + 1u, cell_words(level)) : 0u, EACH);
+    write_groups(1u, (n + 31u) / 32u, EACH);
+    write_groups(2u, n, EACH);
 }

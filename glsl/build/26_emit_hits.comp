@@ -9,7 +9,7 @@ ARGUMENTS(10)
     uint room;     // most entries
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, quantized)
+RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, offsets) // index of the first share of every tetrahedron

@@ -4,7 +4,6 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-#include "shared/groups.glsl"
 layout(constant_id = 2) const uint STAGE = 0;
 layout(constant_id = 3) const uint EACH = 64; // items per workgroup of the dispatches planned here
 ARGUMENTS(7)
@@ -19,11 +18,7 @@ BUFFER(3, writeonly, uint, table_length)   // length of the table of splits
 BUFFER(4, READ_WRITE, BuildStatus, status)
 BUFFER(5, writeonly, uint, groups)         // x, y, z: per level 0…10, then the leaves
 BUFFER(6, readonly, uint, node_total)      // total of the table's scan
-
-void plan(uint slot, uint items) {
-    uvec3 size = groups_for(items, EACH);
-    for (uint c = 0u; c < 3u; ++c) groups.at[3u * slot + c] = size[c];
-}
+#include "shared/groups.glsl"
 
 void main() {
     if (item_index() > 0u) return;
@@ -48,11 +43,11 @@ void main() {
         uint through = k >= level ? total : empty ? 1u : places.at[(k + 1u) * runs];
         if (total == 0u) through = 0u;
         status.at[0].levels[k] = through;
-        plan(k, k < level ? through - before : 0u);
+        write_groups(k, k < level ? through - before : 0u, EACH);
         if (k == level) {
             status.at[0].leaves = through - before;
             status.at[0].internal = before;
-            plan(11u, through - before);
+            write_groups(11u, through - before, EACH);
         }
         before = through;
     }

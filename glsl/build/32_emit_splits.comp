@@ -7,6 +7,7 @@
 #include "shared/grid.glsl"
 ARGUMENTS(7)
     uint capacity;
+    uint id_mask; // bits of an entry of P that hold its tetrahedron
 END_ARGUMENTS
 BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, entries)
@@ -24,6 +25,7 @@ void main() {
     uint first_leaf = status.at[0].internal;
     if (run == 0u) {
         grid.at[0].first_leaf = first_leaf;
+        grid.at[0].ids = id_mask;
         po.at[0] = 0u;
         co.at[0] = 0u;
         // A tree that does not fit also has a root, with an empty list.

@@ -6,24 +6,21 @@
 #include "shared/grid.glsl"
 ARGUMENTS(7)
     uint capacity;
-    uint id_mask; // bits of an entry that hold its tetrahedron
 END_ARGUMENTS
 BUFFER(0, readonly, uint, entries)
-BUFFER16(1, READ_WRITE, Grid, grid)
+BUFFER16(1, readonly, Grid, grid)
 BUFFER(2, readonly, BuildStatus, status)
 BUFFER(3, readonly, uint, codes)
 RECORDS(4, uvec4, cells)
-BUFFER16(5, readonly, uvec4, quantized) // vertices; the last word is the cell of the finest grid
+RECORDS(5, vec4, vertices)
 BUFFER(6, READ_WRITE, uint, p)
 #include "shared/quarters.glsl"
 #include "shared/spanned.glsl"
 
 void main() {
     uvec2 items = items_of_share(WORKGROUP * ROWS, min(entries.at[0], capacity));
-    if (items.x == 0u) grid.at[0].ids = id_mask;
     if (status.at[0].overflow != 0u) return;
     Grid g = grid.at[0];
-    g.ids = id_mask;
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) {
         uvec3 lo, hi;
         cells_spanned(words(cells.at[p.at[i]]), lo, hi);

@@ -11,7 +11,7 @@ ARGUMENTS(9)
     uint tets;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, uvec4, quantized)
+RECORDS(1, vec4, vertices)
 RECORDS(2, uvec4, cells)
 BUFFER(3, readonly, uint, bad)
 BUFFER(4, readonly, uint, field) // one float per point or tetrahedron, as bits

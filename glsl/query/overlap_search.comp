@@ -32,9 +32,8 @@ BUFFER16(12, READ_WRITE, SearchState, states) // zeroed
 BUFFER(13, READ_WRITE, uint, hits)
 BUFFER(14, READ_WRITE, OverlapStatus, status)
 #include "shared/tree.glsl"
+#include "shared/boundary_node.glsl"
 #include "shared/overlap_tets.glsl"
-
-bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
 bool walk_ended = false;
 Grid g;

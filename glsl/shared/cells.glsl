@@ -1,5 +1,4 @@
-// The quantized box of a tetrahedron at a level (the paper's Eq. 5). The including kernel declares cells, bad, and
-// `quantized`: the vertices, whose last word is their cell of the finest grid.
+// The quantized box of a tetrahedron at a level (the paper's Eq. 5). Needs grid.glsl, cells, bad and vertices.
 #include "shared/bad.glsl"
 #include "shared/spanned.glsl"
 

@@ -1,6 +1,7 @@
 // Point location in a leaf's list (SPEC 3.1). Twin of `listed` in src/reference/locate.rs. Needs tree.glsl, tet.glsl,
 // and flags, cells, vertices.
 
+#include "shared/boundary_node.glsl"
 #include "shared/candidates.glsl"
 
 // Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
@@ -33,8 +34,6 @@ void search(inout Best best, uint begin, uint end, Sought s) {
         }
     }
 }
-
-bool is_boundary_node(uint node) { return (flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
 
 // The owner, once the whole list has been searched; NONE if there is none.
 uint decide(Best best, uint leaf, float tolerance) {

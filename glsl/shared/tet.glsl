@@ -25,12 +25,11 @@ float dot_product(vec3 a, vec3 b) {
     return r;
 }
 
-// Six times the signed volume of (a, b, c, p).
+// Six times the signed volume of (a, b, c, p). It is computed relative to p, so that it is exactly 0 where p is one of
+// the others.
 float orient(vec3 a, vec3 b, vec3 c, vec3 p) {
-    precise vec3 ab = b - a;
-    precise vec3 ac = c - a;
-    precise vec3 ap = p - a;
-    return dot_product(cross_product(ab, ac), ap);
+    precise vec3 pa = a - p, pb = b - p, pc = c - p;
+    return -dot_product(cross_product(pa, pb), pc);
 }
 
 // A tetrahedron with its vertices in ascending global index.
@@ -98,9 +97,11 @@ bool holds(Bounds box, vec3 p) { return all(lessThanEqual(box.lo, p)) && all(les
 Weights weights(Tet t, vec3 p) {
     float vol = volume(t);
     float s = vol < 0.0 ? -1.0 : 1.0;
+    // `orient` of the four faces and p; its sign alternates with the opposite vertex.
+    precise vec3 a = t.v[0] - p, b = t.v[1] - p, c = t.v[2] - p, d = t.v[3] - p;
+    vec3 ab = cross_product(a, b);
     Weights r;
-    r.w = vec4(-s * orient(t.v[1], t.v[2], t.v[3], p), s * orient(t.v[0], t.v[2], t.v[3], p), -s * orient(t.v[0], t.v[1], t.v[3], p),
-               s * orient(t.v[0], t.v[1], t.v[2], p));
+    r.w = vec4(s * dot_product(cross_product(b, c), d), -s * dot_product(cross_product(a, c), d), s * dot_product(ab, d), -s * dot_product(ab, c));
     precise float sum = (r.w.x + r.w.y) + (r.w.z + r.w.w);
     r.sum = sum;
     Bounds box = bounds_of(t.v);

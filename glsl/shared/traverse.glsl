@@ -7,7 +7,8 @@
 //     ENTER_NODE(node, mask, first)  // done before F_N is asked about the children of the node; `first` is the first
 //     KEEPS(node)                    // whether a node that F_N accepted earlier is still to be visited
 //     FLIP                           // the children of a node are visited in the order of their digits XOR this
-// STACK is the number of nodes on the short stack. Any size gives the same leaves; a small one asks F_N more often.
+// STACK is the number of nodes on the short stack. Any size, from 0 on, gives the same leaves; a small one asks F_N more
+// often.
 #ifndef ENTER_NODE
 #define ENTER_NODE(node, mask, first)
 #endif
@@ -27,7 +28,7 @@ bool traverse(uint level) {
         visit_leaf(node);
         return true;
     }
-    Node stack[STACK];
+    Node stack[STACK + uint(STACK == 0u)]; // no array is empty
     uint top = 0u, held = 0u; // ring buffer: if it is full, the oldest node is dropped
     uint trail = 0u, resume = 0u;
     for (uint visits = 0u; visits < MAX_VISITS; ++visits) {
@@ -59,7 +60,7 @@ bool traverse(uint level) {
                 uint highest = uint(findMSB(accepted)), digit = highest ^ FLIP;
                 accepted ^= 1u << highest;
                 node = Node(first + bitCount(mask & ((1u << digit) - 1u)), parent.level + 1u, parent.code << 3 | digit);
-                if (k < left) {
+                if (STACK > 0u && k < left) {
                     stack[top] = node;
                     top = top + 1u == STACK ? 0u : top + 1u;
                     held = min(held + 1u, STACK);

@@ -105,7 +105,7 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
 /// there is none at the end.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if the pipeline cannot be made.
+/// [`crate::Error::Invalid`] for no rounds, [`crate::Error::Vulkan`] if the pipeline cannot be made.
 pub fn cmd_locate_lbvh(
     r: &mut Recorder<'_>,
     (mesh, tree): (&MeshView, &BinaryTree),
@@ -115,6 +115,7 @@ pub fn cmd_locate_lbvh(
     tolerance: f32,
     rounds: Rounds,
 ) -> Result<()> {
+    rounds.check()?;
     let (MeshArrays { grid, boundary, vertices, .. }, cells) = (mesh.arrays, mesh.input.cells);
     let (BinaryTree { nodes, root, ids }, LocateOutput { owners, barycentrics }) = (*tree, *output);
     let workgroup = r.gpu().target().query;
@@ -194,7 +195,7 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
-        mesh.check(&self.mesh.view)?;
+        mesh.check(&self.mesh)?;
         let gpu = &self.gpu;
         let n = points.len() as u64;
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
@@ -217,7 +218,11 @@ impl Lbvh {
     }
 }
 
-impl Sealed for Lbvh {}
+impl Sealed for Lbvh {
+    fn check(&self, mesh: &DeviceMesh) -> Result<()> {
+        mesh.check(&self.mesh)
+    }
+}
 
 impl Built for Lbvh {
     fn searched(&self) -> StructureView {

@@ -61,8 +61,8 @@ impl Lbvh {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: Progress<'_>) -> Result<Overlapped> {
-        mesh.check(&self.mesh.view)?;
-        other_mesh.check(&other.mesh.view)?;
+        mesh.check(&self.mesh)?;
+        other_mesh.check(&other.mesh)?;
         other_mesh.check_device(mesh.gpu())?;
         let gpu = &self.gpu;
         let mut done = Overlapped::default();

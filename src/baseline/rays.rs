@@ -153,7 +153,7 @@ impl Rays {
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
-        mesh.check(&self.mesh.view)?;
+        mesh.check(&self.mesh)?;
         let n = points.len() as u64;
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));

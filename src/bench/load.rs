@@ -1,7 +1,7 @@
 //! Work that keeps a device busy between measurements.
 
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu, Recorder};
+use crate::gpu::{Buffer, DeviceKind, Gpu, Recorder};
 use crate::primitives::cmd_copy;
 use std::cell::Cell;
 use std::time::Instant;
@@ -38,7 +38,7 @@ impl Load {
 
     /// The load for a device, which is brought to its full clock.
     pub(crate) fn new(gpu: &Gpu) -> Result<Self> {
-        if gpu.report().kind == "cpu" {
+        if gpu.report().kind == DeviceKind::Cpu {
             return Ok(Self::none());
         }
         let bytes = 4 * u64::from(WORDS);

@@ -68,7 +68,7 @@ impl Report {
             name: report.name.clone(),
             driver: report.driver.clone(),
             api: report.api.clone(),
-            kind: report.kind,
+            kind: report.kind.name(),
             subgroup: report.subgroup,
             ray_query: report.requirements.ray_tracing.queries,
             ray_pipeline: report.requirements.ray_tracing.pipelines,

@@ -105,15 +105,15 @@ impl Structure {
     }
 
     /// Locates points in the way that suits those of `quantity`: samples of rays each independently, as the paper does;
-    /// others, where leaves within the mesh have no lists, as [`LocateMethod::suited`] chooses.
+    /// others, where leaves within the mesh have no lists, as [`LocateMethod::fastest`] chooses.
     pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
-                let suited = |in_order| LocateMethod::suited(points.len(), mesh.input().tets as usize, in_order);
+                let fastest = |in_order| LocateMethod::fastest(tree.gpu(), points.len(), mesh.input().tets as usize, in_order);
                 let method = match (quantity, tree.memory().lists) {
                     (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => LocateMethod::Traversal(8),
-                    (Quantity::LocateRandom, Lists::Boundary) => suited(false),
-                    (Quantity::LocateCoherent, Lists::Boundary) => suited(true),
+                    (Quantity::LocateRandom, Lists::Boundary) => fastest(false),
+                    (Quantity::LocateCoherent, Lists::Boundary) => fastest(true),
                     _ => LocateMethod::Descent,
                 };
                 query::locate(mesh, tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)

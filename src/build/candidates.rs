@@ -86,7 +86,7 @@ impl Build<'_> {
         let MeshInput { cells, tets, .. } = mesh.input;
         let (workgroup, offsets) = (r.gpu().target().each, scratch.offsets);
         let marks = over.marks.unwrap_or_else(|| r.gpu().nothing());
-        let count = CountCells { grid, quantized: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
+        let count = CountCells { grid, vertices: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
         let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
         let spec = CountSpec { workgroup, share, clear, ..Default::default() };
         let clearing = over.marks.map_or(0, |marks| (marks.size / 4).div_ceil(u64::from(CLEARED)) as u32);
@@ -108,10 +108,10 @@ impl Build<'_> {
         let SeedScratch { marks, doubts, doubt_count } =
             filter.seeds.unwrap_or(SeedScratch { marks: nothing, doubts: nothing, doubt_count: nothing });
         let MeshArrays { bad, vertices, boundary, neighbours, .. } = mesh.arrays;
-        let (quantized, offsets, shares, capacity) = (vertices, scratch.offsets, over.total, filter.most);
+        let (offsets, shares, capacity) = (scratch.offsets, over.total, filter.most);
         let (hits, counts) = (filter.hits, filter.counts);
         if filter.seeds.is_some() {
-            let mark = Mark { grid, quantized, cells, bad, vertices, offsets, shares, marks, boundary, tets, capacity };
+            let mark = Mark { grid, vertices, cells, bad, offsets, shares, marks, boundary, tets, capacity };
             // A word of bits per invocation, or a single bit where invocations are plenty and should not wait for others.
             let (each, slot) = if r.gpu().target().sort.serial { (32, 1) } else { (1, 2) };
             let spec = MarkSpec { workgroup, assign: options.assign as u32, tets: each, ..Default::default() };
@@ -120,23 +120,8 @@ impl Build<'_> {
             r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;
             r.barrier("codes.mark → codes.filter");
         }
-        let arguments = Filter {
-            grid,
-            quantized,
-            cells,
-            bad,
-            vertices,
-            offsets,
-            shares,
-            hits,
-            counts,
-            marks,
-            boundary,
-            doubts,
-            doubt_count,
-            tets,
-            capacity,
-        };
+        let arguments =
+            Filter { grid, vertices, cells, bad, offsets, shares, hits, counts, marks, boundary, doubts, doubt_count, tets, capacity };
         let spec = FilterSpec { workgroup, assign: options.assign as u32, lists: u32::from(filter.seeds.is_some()), ..Default::default() };
         r.dispatch(&arguments, spec, over.groups(2, tets, workgroup))?;
         r.barrier("codes.filter → codes.filter_later");
@@ -144,22 +129,8 @@ impl Build<'_> {
         if filter.seeds.is_some() {
             r.barrier("codes.filter → codes.doubts");
             let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
-            let settle = SettleSeeds {
-                grid,
-                quantized,
-                cells,
-                bad,
-                vertices,
-                offsets,
-                hits,
-                counts,
-                marks,
-                neighbours,
-                doubts,
-                doubt_count,
-                tets,
-                capacity,
-            };
+            let settle =
+                SettleSeeds { grid, vertices, cells, bad, offsets, hits, counts, marks, neighbours, doubts, doubt_count, tets, capacity };
             r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
         }
         let entries = over.coarser.map_or(filter.entries, |coarser| coarser.entries);

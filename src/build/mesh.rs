@@ -23,8 +23,7 @@ pub enum BadCells {
     Reject,
 }
 
-/// The location of a mesh, and a share in the ownership of its memory. While this exists, no other mesh can occupy that
-/// location, so an equal view means the same mesh.
+/// The location of a mesh, and a share in the ownership of its memory.
 #[derive(Clone, Debug)]
 pub(crate) struct KeptMesh {
     pub view: MeshView,
@@ -169,9 +168,9 @@ impl DeviceMesh {
         self.kept.clone()
     }
 
-    /// Rejects a tree that was built over another mesh. The view is that of a [`KeptMesh`].
-    pub(crate) fn check(&self, built_over: &MeshView) -> Result<()> {
-        if *built_over == self.view() {
+    /// Rejects a tree that was built over another mesh.
+    pub(crate) fn check(&self, built_over: &KeptMesh) -> Result<()> {
+        if Arc::ptr_eq(&built_over.memory, &self.kept.memory) {
             Ok(())
         } else {
             Err(Error::Invalid("a tree that was built over another mesh; build one over this mesh".into()))

@@ -27,7 +27,8 @@ mod tree;
 pub(crate) use mesh::KeptMesh;
 pub use mesh::{BadCells, DeviceMesh};
 pub(crate) use plan::MAX_ENTRIES;
-pub use plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+pub use plan::{Capacity, TreeMemory};
+pub(crate) use plan::{CountScratch, FilterScratch, SortedScratch};
 #[cfg(feature = "cli")]
 pub(crate) use plan::{SHARE, filtered};
 pub(crate) use prepare::check_points;

@@ -133,7 +133,7 @@ impl TreeMemory {
         let p = arena.words(u64::from(capacity.entries))?;
         let nodes = u64::from(capacity.nodes);
         // At least one node is a leaf, so CO covers at most `nodes - 1` internal nodes.
-        let internal = if capacity.level == 0 { 0 } else { nodes - 1 };
+        let internal = if capacity.level == 0 { 0 } else { nodes.saturating_sub(1) };
         let leaves = nodes.min(u64::from(capacity.entries.max(1)));
         Self::carve_nodes(arena, head, p, [nodes, internal, leaves], capacity, options)
     }
@@ -167,7 +167,7 @@ impl TreeMemory {
 
 /// Scratch memory of the first half of a build: depth, counts, filter.
 #[derive(Clone, Copy, Debug)]
-pub struct CountScratch {
+pub(crate) struct CountScratch {
     pub(crate) offsets: BufferRef,
     pub(crate) total: BufferRef,
     pub(crate) candidates: BufferRef,
@@ -202,7 +202,7 @@ pub(crate) fn filtered(options: &BuildOptions) -> bool {
 /// Scratch memory of the filter: two words per share of up to 32 candidates of a tetrahedron; for `Lists::Boundary` a
 /// third one, and one bit per cell of the leaves' level.
 #[derive(Clone, Copy, Debug)]
-pub struct FilterScratch {
+pub(crate) struct FilterScratch {
     /// Capacity in shares.
     pub(crate) most: u32,
     pub(crate) hits: BufferRef,
@@ -243,7 +243,7 @@ impl FilterScratch {
 
 /// Scratch memory to filter coarser levels until the entries fit.
 #[derive(Clone, Copy, Debug)]
-pub struct CoarserScratch {
+pub(crate) struct CoarserScratch {
     /// The number of tetrahedra plus one while another level is to be tried, otherwise 0.
     pub(crate) live: BufferRef,
     /// Workgroups of the three dispatches that such a try takes over tetrahedra.
@@ -260,7 +260,7 @@ impl CoarserScratch {
 
 /// Additional scratch memory of `Lists::Boundary`.
 #[derive(Clone, Copy, Debug)]
-pub struct SeedScratch {
+pub(crate) struct SeedScratch {
     /// One bit per cell: the mesh surface may pass through it.
     pub(crate) marks: BufferRef,
     /// Shares with cell centres whose owner needs a closer look; their number is in `doubt_count`.
@@ -277,7 +277,7 @@ impl SeedScratch {
 
 /// Scratch memory of the second half: codes, sort, splits.
 #[derive(Clone, Copy, Debug)]
-pub struct SortedScratch {
+pub(crate) struct SortedScratch {
     pub(crate) codes: BufferRef,
     pub(crate) sort: SortScratch,
     pub(crate) splits: BufferRef,

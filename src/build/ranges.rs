@@ -41,7 +41,7 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
         r.barrier("ranges.clear → ranges.scatter");
         let scatter = ScatterRanges {
             grid,
-            quantized: mesh.arrays.vertices,
+            vertices: mesh.arrays.vertices,
             cells: input.cells,
             bad,
             field,

@@ -81,7 +81,7 @@ impl Build<'_> {
     pub fn codes(&self, r: &mut Recorder<'_>, ids: BufferRef, capacity: &Capacity, scratch: &SortedScratch) -> Result<()> {
         let Self { mesh, grid, counts, filter, .. } = *self;
         let MeshInput { cells, tets, .. } = mesh.input;
-        let (quantized, bad) = (mesh.arrays.vertices, mesh.arrays.bad);
+        let (vertices, bad) = (mesh.arrays.vertices, mesh.arrays.bad);
         let (offsets, candidates) = (counts.offsets, counts.candidates);
         let target = r.gpu().target();
         let pairs = Unsorted::place(r.gpu(), (scratch.codes, ids), 3 * capacity.level, capacity.entries, &scratch.sort);
@@ -96,7 +96,7 @@ impl Build<'_> {
                 let (hits, places) = (filter.hits, filter.counts);
                 let emit = EmitHits {
                     grid,
-                    quantized,
+                    vertices,
                     cells,
                     bad,
                     offsets,
@@ -120,7 +120,7 @@ impl Build<'_> {
                     scratch.emit_arguments,
                     "codes.scan → codes.emit",
                 )?;
-                let emit = Emit { grid, quantized, cells, bad, offsets, candidates, codes, ids, tets, capacity: capacity.entries };
+                let emit = Emit { grid, vertices, cells, bad, offsets, candidates, codes, ids, tets, capacity: capacity.entries };
                 r.dispatch(&emit, EmitSpec { workgroup: target.run.workgroup, rows: target.run.rows }, groups)?;
             }
             Ok(())
@@ -183,6 +183,7 @@ impl Build<'_> {
                 po,
                 co,
                 capacity: capacity.entries,
+                id_mask: id_mask(tree.lists, self.mesh.input.tets as usize),
             };
             r.dispatch(
                 &arguments,
@@ -206,9 +207,8 @@ impl Build<'_> {
             let groups = Groups::Indirect(scratch.arguments.part(0, 12));
             let (live, run, capacity) = (entries.word(r.gpu()), target.run, tree.capacity.entries);
             let (cells, vertices, codes) = (mesh.input.cells, mesh.arrays.vertices, scratch.codes);
-            let id_mask = id_mask(tree.lists, mesh.input.tets as usize);
-            if id_mask != u32::MAX {
-                let mark = MarkQuarters { entries: live, grid, status, codes, cells, quantized: vertices, p, capacity, id_mask };
+            if id_mask(tree.lists, mesh.input.tets as usize) != u32::MAX {
+                let mark = MarkQuarters { entries: live, grid, status, codes, cells, vertices, p, capacity };
                 r.dispatch(&mark, MarkQuartersSpec { workgroup: run.workgroup, rows: run.rows }, groups)?;
             } else if marks.is_none() {
                 let flag = FlagLeaves { entries: live, p, po, boundary_cells: mesh.arrays.boundary, status, flags, capacity };

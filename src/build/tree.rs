@@ -2,7 +2,6 @@
 
 use super::mesh::{DeviceMesh, KeptMesh};
 use super::plan::{Capacity, CountScratch, FilterScratch, MAX_ENTRIES, SortedScratch, TreeMemory, filtered};
-use super::prepare::MeshView;
 use super::stages::Build;
 use crate::error::Result;
 use crate::gpu::{Buffer, BufferRef, Gpu, StageTime};
@@ -31,9 +30,9 @@ pub struct Tree {
 
 impl Tree {
     /// Builds a tree over a mesh in four submissions (three if every candidate is an entry, as with the paper's lists),
-    /// not counting those that read numbers back where the host cannot do so itself. Between them the numbers of candidates, entries and nodes are read back, so that exactly the needed memory is
-    /// allocated. If [`BuildOptions::fineness`] calls for a finer tree, that is built afterwards, provided there is
-    /// memory for both.
+    /// not counting those that read numbers back where the host cannot do so itself. Between them the numbers of
+    /// candidates, entries and nodes are read back, so that exactly the needed memory is allocated. If
+    /// [`BuildOptions::fineness`] calls for a finer tree, that is built afterwards, provided there is memory for both.
     ///
     /// # Errors
     /// [`crate::Error::Invalid`] for α outside 0…10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree
@@ -178,8 +177,8 @@ impl Tree {
     }
 
     /// The mesh that the tree was built over.
-    pub(crate) fn mesh(&self) -> &MeshView {
-        &self.mesh.view
+    pub(crate) fn mesh(&self) -> &KeptMesh {
+        &self.mesh
     }
 
     /// The arrays in device memory.

@@ -98,7 +98,8 @@ impl OlbvhField {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhRounds {
-    /// Number of dispatches, one after the other; they skip what is finished.
+    /// Number of dispatches, one after the other; they skip what is finished. At least one, unless they continue work or
+    /// draw a picture.
     pub count: u32,
     /// Not 0: continue where an earlier recording of the same query ended.
     pub resume: u32,

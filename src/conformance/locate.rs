@@ -28,6 +28,8 @@ pub(crate) enum How {
     Runs,
     /// In sorted order, with the owning call.
     Sorted,
+    /// By runs in sorted order, with the owning call.
+    SortedRuns,
     /// Recorded, with the right owner, a wrong one, or none as a hint.
     Hints,
     /// All owners.
@@ -45,6 +47,7 @@ impl How {
             Self::Traversal(stack) => format!("stack-{stack}"),
             Self::Runs => "runs".into(),
             Self::Sorted => "sorted".into(),
+            Self::SortedRuns => "sorted-runs".into(),
             Self::Hints => "hints".into(),
             Self::All => "all-owners".into(),
             Self::Values => "values".into(),
@@ -70,23 +73,21 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
     let (points, _) = twin.points();
     let (mesh, locator) = (&twin.mesh, twin.locator(&built));
     match case.how {
-        How::Descent | How::Traversal(_) | How::Runs | How::Sorted => {
+        How::Descent | How::Traversal(_) | How::Runs | How::Sorted | How::SortedRuns => {
             let method = match case.how {
                 How::Traversal(stack) => LocateMethod::Traversal(stack),
                 How::Runs => LocateMethod::Runs,
                 How::Sorted => LocateMethod::Sorted,
+                How::SortedRuns => LocateMethod::SortedRuns,
                 _ => LocateMethod::Descent,
             };
             let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
-            let runs = (case.how == How::Runs).then(|| locator.locate_in_runs(points));
+            let order = if method.is_sorted() { order_of(&built.tree().grid, points) } else { (0..points.len() as u32).collect() };
+            let runs = matches!(case.how, How::Runs | How::SortedRuns).then(|| locator.locate_in_runs(points, &order));
             let expected = runs.as_deref().unwrap_or_else(|| twin.locations(&built));
             compare_locations(expected, &found.owners, &found.barycentrics, points)?;
             // The owners do not show whether points were sorted.
-            if case.how == How::Sorted {
-                order(gpu, &Scene::new(device, &tree)?, points, &order_of(&built.tree().grid, points))
-            } else {
-                Ok(())
-            }
+            if case.how == How::Sorted { same_order(gpu, &Scene::new(device, &tree)?, points, &order) } else { Ok(()) }
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
@@ -151,7 +152,7 @@ fn compare_locations(expected: &[Location], owners: &[u32], barycentrics: &[[f32
 }
 
 /// Compares the order that points are sorted into.
-fn order(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], expected: &[u32]) -> Verdict {
+fn same_order(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], expected: &[u32]) -> Verdict {
     let count = points.len() as u32;
     let input = gpu.upload("olbvh.conformance.points", points)?;
     let (memory, order) = Arena::reserve(gpu, "olbvh.conformance.order", |a| PointOrder::carve(gpu, a, count))?;

@@ -49,9 +49,10 @@ pub(super) fn add(cases: &mut Vec<Case>) {
                 add_location(cases, alpha == 0.0, LocateCase { mesh, alpha, assign, lists, how: How::Descent });
             }
         }
-        for how in [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Runs, How::Sorted, How::Hints, How::All, How::Values] {
+        let hows = [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Hints, How::All, How::Values];
+        for how in hows.into_iter().chain([How::Runs, How::Sorted, How::SortedRuns]) {
             for lists in Lists::EVERY {
-                let quick = matches!(how, How::Traversal(3) | How::Runs | How::Sorted | How::Hints | How::All);
+                let quick = !matches!(how, How::Traversal(8 | 1) | How::Values);
                 add_location(cases, quick, LocateCase { mesh, alpha: 0.5, assign: Assign::Aabb, lists, how });
             }
         }
@@ -91,7 +92,7 @@ pub(super) fn add(cases: &mut Vec<Case>) {
 
 /// Adds queries of a mesh of the caller.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for how in [How::Descent, How::Traversal(8), How::Runs, How::Sorted, How::Hints, How::All] {
+    for how in [How::Descent, How::Traversal(8), How::Runs, How::Sorted, How::SortedRuns, How::Hints, How::All] {
         for lists in Lists::EVERY {
             add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
         }

@@ -43,6 +43,8 @@ pub(crate) struct Assembly {
     negative: u64,
     flat: u64,
     tangled: u64,
+    /// Cells with nodes besides their corners.
+    curved: u64,
     corners: Vec<u32>,
     /// Number of corners of all cells together.
     n_corners: u64,
@@ -70,6 +72,7 @@ impl Assembly {
             negative: 0,
             flat: 0,
             tangled: 0,
+            curved: 0,
             corners: Vec::new(),
             n_corners: 0,
         }
@@ -124,6 +127,7 @@ impl Assembly {
             let point = piece.start + v as usize;
             self.merged.get(point).copied().unwrap_or(point as u32)
         };
+        self.curved += u64::from(nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other));
         let before = self.tets.len();
         let fate = match kind.shape {
             Shape::Flat => Fate::Boundary,
@@ -218,6 +222,12 @@ impl Assembly {
         }
         self.remove_replaced(&mut points);
         let fields = self.fields(points.len());
+        if self.curved > 0 {
+            let curved = self.curved;
+            self.warnings.push(format!(
+                "{curved} cells of higher order are taken by their corners: their edges are straight, and fields are linear in them"
+            ));
+        }
         let missing = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| format!("{} {}", c.count, c.name));
         let missing = missing.collect::<Vec<_>>().join(", ");
         if !missing.is_empty() {

@@ -70,7 +70,7 @@ impl BufferRef {
         Err(Error::Invalid(format!("{what} in a part of {} bytes; {bytes} are needed", self.size)))
     }
 
-    /// The 4-byte word at index `i`; empty if it is not within this part.
+    /// The 4-byte word at index `i`, cut off where this part ends.
     #[must_use]
     pub fn word(self, i: u64) -> Self {
         self.part(i.saturating_mul(4), 4)

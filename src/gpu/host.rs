@@ -68,11 +68,12 @@ impl Gpu {
     /// [`super::Recorder`] by one.
     ///
     /// # Errors
-    /// [`Error::NoDevice`] with what is missing, [`Error::SelfTest`], [`Error::Memory`].
+    /// [`Error::NoDevice`] with what is missing, [`Error::SelfTest`], [`Error::Memory`], [`Error::Vulkan`] if a call
+    /// fails, [`Error::Invalid`] for a target that does not fit the device.
     ///
     /// # Safety
-    /// The handles are valid and belong together. Everything that `host.enabled` names is enabled, and `host.family`
-    /// supports compute. The device outlives every clone of the `Gpu` and everything made from it. When the last of
+    /// The handles are valid and belong together. Everything that `host.enabled` names is enabled. `host.family`
+    /// supports compute, and `host.queue` passes on a queue of it. The device outlives every clone of the `Gpu` and everything made from it. When the last of
     /// these is dropped, nothing recorded through it is being executed.
     pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
         let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;

@@ -25,14 +25,6 @@ pub struct Buffer {
 }
 
 impl Buffer {
-    /// A device-local buffer of `size` bytes. At least 16 are allocated, so that an empty array has an address.
-    ///
-    /// # Errors
-    /// [`Error::Memory`] with the buffer's name and size.
-    pub fn new(gpu: &Gpu, name: &str, size: u64) -> Result<Self> {
-        Self::with_usage(gpu, name, size, MemoryLocation::GpuOnly, vk::BufferUsageFlags::empty())
-    }
-
     /// A host-visible buffer for transfers.
     pub(crate) fn staging(gpu: &Gpu, name: &str, size: u64, location: MemoryLocation) -> Result<Self> {
         Self::with_usage(gpu, name, size, location, vk::BufferUsageFlags::empty())
@@ -102,12 +94,12 @@ impl Buffer {
 }
 
 impl Gpu {
-    /// A device-local buffer, see [`Buffer::new`].
+    /// A device-local buffer of `size` bytes. At least 16 are allocated, so that an empty array has an address.
     ///
     /// # Errors
-    /// [`Error::Memory`].
+    /// [`Error::Memory`] with the buffer's name and size, [`Error::Vulkan`] if the memory cannot be bound.
     pub fn buffer(&self, name: &str, size: u64) -> Result<Buffer> {
-        Buffer::new(self, name, size)
+        Buffer::with_usage(self, name, size, MemoryLocation::GpuOnly, vk::BufferUsageFlags::empty())
     }
 }
 

@@ -38,7 +38,7 @@ pub use queue::HostQueue;
 pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
-pub use requirements::{DeviceReport, RayTracing, Requirements};
+pub use requirements::{DeviceKind, DeviceReport, RayTracing, Requirements};
 pub use submit::{StageTime, StageTimes};
 
 use crate::error::Error;

@@ -91,8 +91,7 @@ fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::Physica
         }
         return Ok((*device, report.clone()));
     }
-    let rank = |r: &DeviceReport| ["discrete", "integrated", "virtual", "other", "cpu"].iter().position(|k| *k == r.kind);
-    let best = all.iter().filter(|(_, r)| r.requirements.missing.is_empty()).min_by_key(|(_, r)| (rank(r), std::cmp::Reverse(r.version)));
+    let best = all.iter().filter(|(_, r)| r.requirements.missing.is_empty()).min_by_key(|(_, r)| (r.kind, std::cmp::Reverse(r.version)));
     best.cloned().ok_or_else(|| {
         let lacking = all.iter().map(|(_, r)| format!("{} lacks {}", r.name, r.requirements.missing.join(", ")));
         Error::NoDevice(lacking.collect::<Vec<_>>().join("; "))
@@ -103,7 +102,8 @@ impl Gpu {
     /// Opens a device and runs the self-test on it.
     ///
     /// # Errors
-    /// [`Error::NoVulkan`], [`Error::NoDevice`] with what is missing, [`Error::SelfTest`].
+    /// [`Error::NoVulkan`], [`Error::NoDevice`] with what is missing, [`Error::SelfTest`], [`Error::Memory`],
+    /// [`Error::Vulkan`] if a call fails, [`Error::Invalid`] for a target that does not fit the device.
     pub fn new(options: &GpuOptions) -> Result<Self> {
         let Session { entry, instance, debug } = open_instance()?;
         let made = choose(&instance, options.device.as_deref())

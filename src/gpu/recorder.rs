@@ -24,7 +24,7 @@ pub(crate) enum Groups {
     Indirect(BufferRef),
 }
 
-/// Folds a number of workgroups into two dimensions, as `glsl/primitives/dispatch_args.comp` does.
+/// Folds a number of workgroups into two dimensions, as `glsl/shared/groups.glsl` does.
 pub(crate) fn fold_groups(groups: u32) -> [u32; 3] {
     if groups > MAX_GROUPS { [32_768, groups.div_ceil(32_768), 1] } else { [groups, 1, 1] }
 }
@@ -132,7 +132,7 @@ impl<'a> Recorder<'a> {
     }
 
     /// The command buffer, into which the host may record its own commands in between. It reports its own barriers with
-    /// [`Recorder::host_barrier`].
+    /// [`Recorder::host_barrier`]. Null in a rehearsal, in which nothing is recorded.
     pub fn commands(&self) -> vk::CommandBuffer {
         self.commands
     }

@@ -1,6 +1,7 @@
 //! Requirements on a physical device, checked before a logical device is created.
 
 use crate::kernels::WorkgroupLimits;
+use crate::named::named;
 use ash::vk;
 use std::ffi::{CStr, c_char};
 
@@ -51,6 +52,27 @@ pub struct Requirements {
     pub queue_family: Option<(u32, u32)>,
 }
 
+/// Kinds of devices, in the order in which they are preferred.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum DeviceKind {
+    /// A GPU with memory of its own.
+    Discrete,
+    /// A GPU in the host's memory.
+    Integrated,
+    /// A part of a GPU in a virtual machine.
+    Virtual,
+    /// None of these.
+    Other,
+    /// A driver that runs on the host's processor, such as Mesa lavapipe.
+    Cpu,
+}
+
+named!(
+    DeviceKind,
+    "kind of device",
+    [Discrete = "discrete", Integrated = "integrated", Virtual = "virtual", Other = "other", Cpu = "cpu",]
+);
+
 /// A Vulkan device as listed by the `devices` command.
 #[derive(Clone, Debug)]
 pub struct DeviceReport {
@@ -72,8 +94,8 @@ pub struct DeviceReport {
     pub vendor: u32,
     /// Driver id, `VkDriverId`.
     pub driver_id: i32,
-    /// Kind: discrete, integrated, virtual, cpu, other.
-    pub kind: &'static str,
+    /// Kind of device.
+    pub kind: DeviceKind,
     /// Bytes of the largest device-local heap.
     pub memory: u64,
     /// Bytes of the largest buffer; `u64::MAX` before Vulkan 1.3, where it is not stated.
@@ -334,11 +356,11 @@ impl DeviceReport {
             vendor: properties.vendor_id,
             driver_id: driver.driver_id.as_raw(),
             kind: match properties.device_type {
-                vk::PhysicalDeviceType::DISCRETE_GPU => "discrete",
-                vk::PhysicalDeviceType::INTEGRATED_GPU => "integrated",
-                vk::PhysicalDeviceType::VIRTUAL_GPU => "virtual",
-                vk::PhysicalDeviceType::CPU => "cpu",
-                _ => "other",
+                vk::PhysicalDeviceType::DISCRETE_GPU => DeviceKind::Discrete,
+                vk::PhysicalDeviceType::INTEGRATED_GPU => DeviceKind::Integrated,
+                vk::PhysicalDeviceType::VIRTUAL_GPU => DeviceKind::Virtual,
+                vk::PhysicalDeviceType::CPU => DeviceKind::Cpu,
+                _ => DeviceKind::Other,
             },
             memory: heaps.iter().filter(|h| h.flags.contains(vk::MemoryHeapFlags::DEVICE_LOCAL)).map(|h| h.size).max().unwrap_or(0),
             largest_buffer: buffers.max_buffer_size,

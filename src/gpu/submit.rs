@@ -101,10 +101,13 @@ impl Gpu {
         let Some(queue) = self.host_queue() else {
             return Err(Error::Invalid("the host lent no queue: only the cmd_* functions can be used".into()));
         };
-        let mut result = Err(vk::Result::ERROR_UNKNOWN);
-        // SAFETY: the submitted commands and the fence belong to this device; the lock of the queue is held.
-        queue.locked(&mut |queue| result = unsafe { self.device().queue_submit(queue, submit, fence) });
-        result.map_err(failed("vkQueueSubmit"))
+        let mut result = None;
+        queue.locked(&mut |queue| {
+            // A second call, which would submit the commands again while they run, does nothing.
+            // SAFETY: the submitted commands and the fence belong to this device; the lock of the queue is held.
+            result.get_or_insert_with(|| unsafe { self.device().queue_submit(queue, submit, fence) });
+        });
+        result.unwrap_or(Err(vk::Result::ERROR_UNKNOWN)).map_err(failed("vkQueueSubmit"))
     }
 
     /// Waits for a submitted fence. When out of memory, a driver may stop waiting while the work still runs, and the
@@ -144,7 +147,7 @@ impl Gpu {
     /// # Errors
     /// [`Error::Memory`], or a failed Vulkan call.
     pub fn upload<T: Pod>(&self, name: &str, data: &[T]) -> Result<Buffer> {
-        let mut buffer = Buffer::new(self, name, size_of_val(data) as u64)?;
+        let mut buffer = self.buffer(name, size_of_val(data) as u64)?;
         self.write(&mut buffer, 0, data)?;
         Ok(buffer)
     }
@@ -218,8 +221,7 @@ impl Gpu {
 
     /// Reads back a range of any buffer through staging memory.
     pub(crate) fn download_ref(&self, part: BufferRef, bytes: &mut [u8]) -> Result<()> {
-        // A memory limit counts every byte, so nothing is kept then.
-        if bytes.len() as u64 <= READ_BACK && self.ledger().is_none() {
+        if bytes.len() as u64 <= READ_BACK {
             return self.read_back(part, bytes);
         }
         let most = self.staging_bytes();

@@ -7,7 +7,7 @@
 //! narrow. `olbvh tune` finds better parameters for the device at hand.
 
 use super::target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
-use crate::gpu::DeviceReport;
+use crate::gpu::{DeviceKind, DeviceReport};
 use crate::named::named;
 use ash::vk::DriverId;
 use std::borrow::Cow;
@@ -93,7 +93,7 @@ impl Row {
 
     /// The row for a device: by its driver where that is more specific than the vendor, otherwise by the vendor.
     pub fn of(device: &DeviceReport) -> Self {
-        Self::choose(device.kind == "cpu", DriverId::from_raw(device.driver_id), device.vendor)
+        Self::choose(device.kind == DeviceKind::Cpu, DriverId::from_raw(device.driver_id), device.vendor)
     }
 
     fn choose(processor: bool, driver: DriverId, vendor: u32) -> Self {

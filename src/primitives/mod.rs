@@ -28,8 +28,8 @@ pub struct Count {
     pub max: u32,
     /// The word with the true number.
     pub live: Option<BufferRef>,
-    /// Number of leading items that dispatches leave out.
-    pub skip: u32,
+    /// Number of leading items that dispatches leave out, of a number in device memory.
+    skip: u32,
 }
 
 impl Count {
@@ -64,7 +64,7 @@ impl Count {
 
     /// Workgroups as [`Count::groups`] gives them; the caller records the barrier.
     pub(crate) fn arguments(&self, r: &mut Recorder<'_>, per_group: u32, arguments: BufferRef) -> Result<Groups> {
-        let Some(live) = self.live else { return Ok(Groups::Count(self.max.saturating_sub(self.skip).div_ceil(per_group))) };
+        let Some(live) = self.live else { return Ok(Groups::Count(self.max.div_ceil(per_group))) };
         let words = arguments.part(0, 12);
         let spec = DispatchArgsSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
         r.dispatch(&DispatchArgs { live, groups: words, count: self.max, per_group, skip: self.skip }, spec, Groups::Count(1))?;

@@ -70,7 +70,7 @@ impl Unsorted {
     /// Where to write up to `max` pairs so that no copy is needed to have them in `keys` and `values` after the sort:
     /// there, or, if every pass of an odd number moves them from one place to another, in the scratch memory.
     pub fn place(gpu: &Gpu, (keys, values): (BufferRef, BufferRef), bits: u32, max: u32, scratch: &SortScratch) -> Self {
-        let target = gpu.target().sort;
+        let (target, bits) = (gpu.target().sort, bits.min(u32::BITS));
         let sorted = (keys, values);
         let elsewhere = !target.serial && bits > 0 && max > 1 && target.passes(bits).0 % 2 == 1;
         let (keys, values) = if elsewhere { scratch.apart(max) } else { sorted };
@@ -107,7 +107,7 @@ pub fn cmd_sort_pairs(
 
 /// Sorts pairs that were written to their first place, as [`cmd_sort_pairs`] does.
 pub(crate) fn cmd_sort(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch) -> Result<()> {
-    let bits = pairs.bits.min(u32::BITS);
+    let bits = pairs.bits;
     if bits == 0 || count.max < 2 {
         return Ok(());
     }

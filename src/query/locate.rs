@@ -4,7 +4,7 @@ use super::order::{PointOrder, cmd_sort_points};
 use super::{Progress, Scene, list_parts, upload_field};
 use crate::build::{DeviceMesh, Tree, check_field, check_points};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Groups, Recorder, StageTime};
+use crate::gpu::{BufferRef, DeviceKind, Gpu, Groups, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
@@ -32,7 +32,9 @@ pub enum LocateMethod {
     /// [`super::cmd_sort_points`]; [`locate`] computes this order itself. Invocations next to each other then read the
     /// same memory. Suits many points in no particular order.
     Sorted,
-    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (brought into 1…78). Only the
+    /// As [`LocateMethod::Runs`], but along such an order. Suits many points in no particular order on a processor.
+    SortedRuns,
+    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (at most 78 are used). Only the
     /// first [`MOST_TRAVERSED`] entries of a list are searched.
     Traversal(u32),
 }
@@ -43,12 +45,29 @@ impl LocateMethod {
     /// fewer than one per four tetrahedra, otherwise [`LocateMethod::Sorted`]. Both give the same owners.
     ///
     /// In a mesh of 1.5 million tetrahedra, a million random points take 0.32 ms sorted on an NVIDIA H100. Points along
-    /// a Z curve take 0.13 ms, and in runs 0.30 ms: a GPU is better used if every point has an invocation. On a processor
-    /// (lavapipe), points along a curve take 0.7 of the time in runs ([`LocateMethod::Runs`]).
+    /// a Z curve take 0.13 ms, and in runs 0.30 ms: a GPU is better used if every point has an invocation.
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
         // Only points that are sorted together get nearer to each other.
         let few = points.min(CHUNK).saturating_mul(4) < tets;
         if in_order || few { Self::Descent } else { Self::Sorted }
+    }
+
+    /// The fastest method on this device, for an application that does not mind that the owners of points in cells that
+    /// overlap may then differ between devices: as [`LocateMethod::suited`], but in runs on a processor, unless there
+    /// are fewer points than one per four tetrahedra.
+    pub fn fastest(gpu: &Gpu, points: usize, tets: usize, in_order: bool) -> Self {
+        let processor = gpu.report().kind == DeviceKind::Cpu;
+        let near = points.saturating_mul(4) >= tets;
+        match Self::suited(points, tets, in_order) {
+            Self::Descent if processor && in_order && near => Self::Runs,
+            Self::Sorted if processor => Self::SortedRuns,
+            method => method,
+        }
+    }
+
+    /// Whether points are taken in the order [`PointInput::order`].
+    pub fn is_sorted(self) -> bool {
+        matches!(self, Self::Sorted | Self::SortedRuns)
     }
 }
 
@@ -80,7 +99,7 @@ pub struct PointInput {
     /// or `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed. It may be the same part as
     /// [`LocateOutput::owners`]: a point's hint is read before its owner is written, and no other point reads it.
     pub hints: Option<BufferRef>,
-    /// For [`LocateMethod::Sorted`]: one word per place, the point that is located there; every point occurs once.
+    /// For methods that sort ([`LocateMethod::is_sorted`]): one word per place, the point that is located there; every point occurs once.
     /// Answers are stored by point, not by place.
     pub order: Option<BufferRef>,
 }
@@ -127,7 +146,7 @@ enum Guide {
 /// after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a stride below 3, for parts of fewer points, or for [`LocateMethod::Sorted`] without an order;
+/// [`Error::Invalid`] for a stride below 3, for parts of fewer points, or for a method that sorts without an order;
 /// [`Error::TooLarge`] for points of more than 2^31 floats.
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
@@ -142,8 +161,11 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let (run, guide, guides) = match options.method {
         LocateMethod::Descent | LocateMethod::Traversal(_) => (1, Guide::Hints, hints),
         LocateMethod::Runs => (POINT_RUN, Guide::Nothing, None),
-        LocateMethod::Sorted if order.is_none() => return Err(Error::Invalid("points to be located in an order that is not given".into())),
+        method if method.is_sorted() && order.is_none() => {
+            return Err(Error::Invalid("points to be located in an order that is not given".into()));
+        }
         LocateMethod::Sorted => (1, Guide::Order, order),
+        LocateMethod::SortedRuns => (POINT_RUN, Guide::Order, order),
     };
     r.stage("query.locate", |r| {
         if let LocateMethod::Traversal(stack) = options.method {
@@ -166,7 +188,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             };
             return r.dispatch(
                 &arguments,
-                LocateByTraversalSpec { workgroup, stack: stack.clamp(1, MAX_STACK), lists, most: MOST_TRAVERSED, ..Default::default() },
+                LocateByTraversalSpec { workgroup, stack: stack.min(MAX_STACK), lists, most: MOST_TRAVERSED, ..Default::default() },
                 groups(1),
             );
         }
@@ -277,8 +299,8 @@ pub fn locate(
     let most = points.len().min(at_once) as u64;
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
-    let values = gpu.buffer("olbvh.query.values", 4 * most)?;
-    let sorted = options.method == LocateMethod::Sorted;
+    let values = field.as_ref().map(|_| gpu.buffer("olbvh.query.values", 4 * most)).transpose()?;
+    let sorted = options.method.is_sorted();
     let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
     let (_memory, order) = Arena::reserve(gpu, "olbvh.query.order", carve)?;
     for chunk in points.chunks(at_once) {
@@ -293,7 +315,7 @@ pub fn locate(
                 r.barrier("sort_points → locate");
             }
             cmd_locate(r, &scene, &input, &output, options)?;
-            if let Some((field, on)) = &field {
+            if let (Some((field, on)), Some(values)) = (&field, &values) {
                 r.barrier("locate → interpolate");
                 cmd_interpolate(r, &scene, field.all(), *on, &output, values.all().part(0, 4 * n), count)?;
             }
@@ -301,8 +323,8 @@ pub fn locate(
         })?;
         all.owners.extend(gpu.download::<u32>(&owners, output.owners)?);
         all.barycentrics.extend(gpu.download::<[f32; 4]>(&barycentrics, output.barycentrics)?);
-        if field.is_some() {
-            all.values.extend(gpu.download::<f32>(&values, values.all().part(0, 4 * n))?);
+        if let Some(values) = &values {
+            all.values.extend(gpu.download::<f32>(values, values.all().part(0, 4 * n))?);
         }
         all.stages.extend(time.stages);
         report(all.owners.len() as u64, points.len() as u64);

@@ -19,7 +19,7 @@ pub(crate) use volume::{Canvas, Rays};
 pub use volume::{RenderInput, RenderMemory, RenderPart, Rendered, Visibility, cmd_render, render};
 
 use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef};
 use crate::mesh::On;
 use crate::reference::locate::LIST_PART;
@@ -75,7 +75,7 @@ use dispatch;
 
 /// How many dispatches one recording spends on work of unknown length. Each dispatch tests a limited number of
 /// candidates per item, so that no dispatch keeps the device busy for seconds. Later dispatches skip items that are
-/// finished.
+/// finished. No dispatches from the beginning of the work are refused, but by [`cmd_render`], which prepares the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
     /// Number of dispatches recorded, one after the other.
@@ -94,6 +94,14 @@ impl Rounds {
     pub fn resume(count: u32) -> Self {
         Self { count, resume: true }
     }
+
+    /// Rejects a beginning without a dispatch: what a resumed recording would read, no dispatch would have written.
+    pub(crate) fn check(self) -> Result<()> {
+        if self.count == 0 && !self.resume {
+            return Err(Error::Invalid("a query that begins with no rounds; it takes at least one".into()));
+        }
+        Ok(())
+    }
 }
 
 /// A mesh and the structure over it.
@@ -111,9 +119,8 @@ impl StructureView {
     /// # Errors
     /// [`crate::Error::Invalid`] if the structure was built over another mesh.
     pub fn new(mesh: &DeviceMesh, built: &dyn Built) -> Result<Self> {
-        let searched = built.searched();
-        mesh.check(&searched.mesh)?;
-        Ok(searched)
+        built.check(mesh)?;
+        Ok(built.searched())
     }
 
     /// Replaces the flags of the nodes if the structure is an octree.
@@ -139,14 +146,21 @@ pub trait Built: sealed::Sealed {
 
 pub(crate) mod sealed {
     /// Limits [`super::Built`] to the structures of this crate, which keep their memory alive.
-    pub trait Sealed {}
+    pub trait Sealed {
+        /// Rejects a mesh that the structure was not built over.
+        fn check(&self, mesh: &crate::build::DeviceMesh) -> crate::error::Result<()>;
+    }
 }
 
-impl sealed::Sealed for Tree {}
+impl sealed::Sealed for Tree {
+    fn check(&self, mesh: &DeviceMesh) -> Result<()> {
+        mesh.check(self.mesh())
+    }
+}
 
 impl Built for Tree {
     fn searched(&self) -> StructureView {
-        StructureView { mesh: *self.mesh(), structure: Structure::Octree(*self.memory()) }
+        StructureView { mesh: self.mesh().view, structure: Structure::Octree(*self.memory()) }
     }
 }
 

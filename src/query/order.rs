@@ -1,4 +1,4 @@
-//! The order in which [`super::LocateMethod::Sorted`] locates points: along the Morton curve.
+//! The order in which methods that sort ([`super::LocateMethod::is_sorted`]) locate points: along the Morton curve.
 
 use super::PointInput;
 use crate::error::Result;

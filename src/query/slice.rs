@@ -29,8 +29,9 @@ use crate::primitives::{Arena, Count};
 use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 
-/// Entries, nodes and steps of walks that one run of voxels may test in one dispatch, roughly.
-const LOCATE_BUDGET: u32 = 8192;
+/// Entries, nodes and tetrahedra of walks that one run of voxels may test in one dispatch, roughly. A test within a star
+/// takes up to eight passes of loops, and some drivers end the loops of an invocation after 65,535 passes in all.
+const LOCATE_BUDGET: u32 = 4096;
 /// Nodes and entries that one voxel may test in one dispatch.
 const TOUCH_BUDGET: u32 = 1024;
 
@@ -116,7 +117,7 @@ impl SliceMemory {
 ///
 /// # Errors
 /// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, for
-/// a field of too few values, or for a part of a binary tree. Only the device knows whether boxes are flat or too large
+/// a field of too few values, for no rounds, or for a part of a binary tree. Only the device knows whether boxes are flat or too large
 /// for the mesh; [`SliceStatus::refused`] reports that.
 pub fn cmd_slice(
     r: &mut Recorder<'_>,
@@ -125,6 +126,7 @@ pub fn cmd_slice(
     memory: &SliceMemory,
     rounds: Rounds,
 ) -> Result<()> {
+    rounds.check()?;
     input.voxels.check()?;
     let ([width, height], Rows { layer, first, count }) = (input.voxels.size, input.rows);
     let rows = u64::from(layer) * u64::from(height) + u64::from(first) + u64::from(count);

@@ -101,20 +101,25 @@ impl<'a> Locator<'a> {
         self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
     }
 
-    /// Locates points in runs of [`POINT_RUN`], each with the owner of the one before as its hint. There is no hint if
-    /// that owner was searched for in a list longer than [`LIST_PART`].
-    pub fn locate_in_runs(&self, points: &[[f32; 3]]) -> Vec<Location> {
-        let run = |points: &[[f32; 3]]| {
+    /// Locates points in runs of [`POINT_RUN`] along `order`, in which every point occurs once, each with the owner of
+    /// the one before as its hint. There is no hint if that owner was searched for in a list longer than [`LIST_PART`].
+    pub fn locate_in_runs(&self, points: &[[f32; 3]], order: &[u32]) -> Vec<Location> {
+        let run = |places: &[u32]| {
             let mut hint = NONE;
-            let next = |&p: &[f32; 3]| {
+            let next = |&i: &u32| {
+                let p = points[i as usize];
                 let near = self.stride_to(p, hint, HINTED);
                 let location = near.unwrap_or_else(|| self.locate(p));
                 hint = if near.is_none() && self.searches_long_list(p) { NONE } else { location.owner };
-                location
+                (i, location)
             };
-            points.iter().map(next).collect::<Vec<_>>()
+            places.iter().map(next).collect::<Vec<_>>()
         };
-        points.par_chunks(POINT_RUN as usize).flat_map_iter(run).collect()
+        let mut located = vec![Location::NOWHERE; points.len()];
+        for (i, location) in order.par_chunks(POINT_RUN as usize).flat_map_iter(run).collect::<Vec<_>>() {
+            located[i as usize] = location;
+        }
+        located
     }
 
     /// Whether [`Locator::locate`] searches for a point in a list that takes more than one dispatch.

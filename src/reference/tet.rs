@@ -36,9 +36,10 @@ pub(super) fn cross_bound(a: Vec3, b: Vec3) -> Vec3 {
     [a[1] * b[2] + a[2] * b[1], a[2] * b[0] + a[0] * b[2], a[0] * b[1] + a[1] * b[0]]
 }
 
-/// Six times the signed volume of (a, b, c, p).
+/// Six times the signed volume of (a, b, c, p). It is computed relative to p, so that it is exactly 0 where p is one of
+/// the others.
 pub fn orient(a: Vec3, b: Vec3, c: Vec3, p: Vec3) -> f32 {
-    dot(cross(sub(b, a), sub(c, a)), sub(p, a))
+    -dot(cross(sub(a, p), sub(b, p)), sub(c, p))
 }
 
 /// A tetrahedron with its vertices in ascending global index.

@@ -50,7 +50,7 @@ pub use transfer::TransferFunction;
 pub use valid::ValidTets;
 
 /// `1/√x` of a normal positive `x`, computed by correctly rounded multiplications and subtractions alone, so that every
-/// device gets the same bits. The relative error is below 2^-22. Twin of the function in the shading kernel.
+/// device gets the same bits. The relative error is below 2^-22. Twin of `inverse_sqrt` in `glsl/shared/rays.glsl`.
 pub fn inverse_sqrt(x: f32) -> f32 {
     let mut r = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
     let half = x * 0.5;

@@ -250,7 +250,7 @@ impl Rows {
 
     /// Row and layer of the `i`-th row.
     pub fn row(&self, i: u32, height: u32) -> [u32; 2] {
-        let (at, height) = (u64::from(self.first) + u64::from(i), u64::from(height));
+        let (at, height) = (u64::from(self.first) + u64::from(i), u64::from(height.max(1)));
         [(at % height) as u32, self.layer + (at / height) as u32]
     }
 }

@@ -4,7 +4,7 @@ use super::search::Work;
 use crate::bench::Load;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, StageTime};
+use crate::gpu::{DeviceKind, Gpu, StageTime};
 use crate::kernels::Target;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{BuildOptions, Lists};
@@ -71,7 +71,7 @@ impl<'a> Workload<'a> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
         let bounds = Bounds::from(device.grid());
         let Bounds { lo, hi } = bounds;
-        let of = usize::from(gpu.report().kind != "cpu");
+        let of = usize::from(gpu.report().kind != DeviceKind::Cpu);
         // Fractional parts of multiples of a generalised golden ratio: in no order, and spread evenly.
         let at = |i: u32, share: f64, c: usize| lo[c] + (hi[c] - lo[c]) * (f64::from(i) * share).fract() as f32;
         let points = (0..POINTS[of]).map(|i| [at(i, 0.819_172_513_4, 0), at(i, 0.671_043_606_7, 1), at(i, 0.549_700_477_9, 2)]).collect();

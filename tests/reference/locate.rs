@@ -1,11 +1,13 @@
 //! Point location: owners, hints, tolerance and values.
 
 use super::{Random, prepared, tree};
+use olbvh::formats::{LoadOptions, load};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
-use olbvh::options::Assign;
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::reference::boundary::{NONE, Topology};
 use olbvh::reference::brute;
+use olbvh::reference::build::build;
 use olbvh::reference::locate::{Location, Locator};
 use olbvh::reference::vertices::Vertices;
 use rayon::prelude::*;
@@ -100,6 +102,29 @@ fn no_point_of_a_mesh_is_lost() {
             assert!((x - p[c]).abs() < 2e-5, "{p:?}: {location:?} gives {x}");
         }
         assert!(b.iter().all(|&b| (-2e-5..=1.00002).contains(&b)), "{p:?}: {location:?}");
+    }
+}
+
+/// Every tetrahedron contains its own vertices, exactly, so that the owner of a vertex is the lowest-numbered
+/// tetrahedron around it, and all of these are among its owners.
+#[test]
+fn a_vertex_lies_in_all_tetrahedra_around_it() {
+    let file = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bracket_50k.vtu");
+    let bracket = load(file, &LoadOptions::default()).unwrap().mesh;
+    for mesh in [kuhn_jittered([9, 8, 7], 0.3, 5).unwrap(), bracket] {
+        let (mesh, topology) = prepared(mesh);
+        let mut around = vec![Vec::new(); mesh.points.len()];
+        (0u32..).zip(&mesh.tets).for_each(|(t, ids)| ids.iter().for_each(|&v| around[v as usize].push(t)));
+        for lists in Lists::EVERY {
+            let options = BuildOptions { lists, ..BuildOptions::default() };
+            let tree = build(&mesh, &topology, &options).unwrap();
+            let locator = Locator::new(&mesh, &topology, &tree);
+            for (v, expected) in around.iter().enumerate() {
+                let p = mesh.points[v];
+                assert_eq!(locator.owners(p), *expected, "vertex {v} with {lists}");
+                assert_eq!(locator.locate(p).owner, expected[0], "vertex {v} with {lists}");
+            }
+        }
     }
 }
 

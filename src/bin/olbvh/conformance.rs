@@ -19,7 +19,7 @@ use std::time::Duration;
 #[derive(clap::Args)]
 #[command(after_help = "Examples:
   olbvh conformance --filter quick                  less than two minutes on a software device
-  olbvh conformance --filter sort/21-bits           the cases whose name contains this text
+  olbvh conformance --filter locate/one-tet         the cases whose name contains this text
   olbvh conformance bracket.vtu                     trees and queries of this mesh
   olbvh conformance --filter large                  the cases with buffers of more than 2^26 words
   olbvh conformance --device 1 --junit report.xml   all but the large ones, with a report for CI
@@ -131,7 +131,7 @@ fn run_cases(args: &Args, common: &Common, chosen: &[Case]) -> Outcome<(Value, V
         let mut lab = lab(binding)?;
         let report = lab.device().report().clone();
         device = json!({
-            "name": report.name, "driver": report.driver, "api": report.api, "subgroup": report.subgroup, "kind": report.kind,
+            "name": report.name, "driver": report.driver, "api": report.api, "subgroup": report.subgroup, "kind": report.kind.name(),
         });
         for case in chosen {
             if common.verbose {

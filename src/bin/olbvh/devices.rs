@@ -89,7 +89,7 @@ impl<'a> Listed<'a> {
         });
         json!({
             "index": self.index, "name": d.name, "driver": d.driver, "api": d.api, "subgroup": d.subgroup,
-            "query_subgroup": d.query_subgroup, "kind": d.kind,
+            "query_subgroup": d.query_subgroup, "kind": d.kind.name(),
             "memory_bytes": d.memory, "largest_buffer_bytes": d.largest_buffer, "largest_allocation_bytes": d.largest_allocation,
             "qualifies": self.fault.is_none(), "missing": d.requirements.missing, "fault": self.fault,
             "ray_query": d.requirements.ray_tracing.queries, "ray_pipeline": d.requirements.ray_tracing.pipelines, "target": target,

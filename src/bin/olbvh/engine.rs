@@ -16,7 +16,7 @@ use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
 use olbvh::render::Bounds;
-use olbvh::slicing::Band;
+use olbvh::slicing::{Band, Tally};
 use olbvh::tree::TreeBytes;
 
 /// Receives progress: how much of how much is done.
@@ -43,7 +43,7 @@ pub trait Engine {
     /// Builds a tree over a mesh and draws a field.
     fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks>;
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>>;
 }
 
 /// Figures about a mesh and its tree.

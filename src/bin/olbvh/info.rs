@@ -23,8 +23,8 @@ Examples:
   olbvh info bracket.vtu --level 6            leaves of level 6
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
-Bad cells are left out of the tree: those with a vertex that does not exist or occurs twice, or with a coordinate that is not finite or has a \
-magnitude of 2^125 (4.3e37) or more. Boundary cells have a face on the surface or no volume, or overlap a neighbour, or lie at a crowded point \
+Bad cells, in which a vertex occurs twice, are left out of the tree. (A file with a cell whose vertex does not exist, or has a coordinate that is not \
+finite or of a magnitude of 2^125 (4.3e37) or more, is refused as a whole.) Boundary cells have a face on the surface or no volume, or overlap a neighbour, or lie at a crowded point \
 (where more than 128 cells may meet). Negative cells have their vertices in the other order, which does no harm where cells do not overlap.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
@@ -38,7 +38,7 @@ pub struct Args {
 
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    let options = args.tree.options(true)?;
+    let options = args.tree.options()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let summary = engine.summary(&loaded.mesh, &options)?;
@@ -160,20 +160,21 @@ fn add_tree(page: &mut Page, args: &Args, device: &str, s: &Summary) {
         args.tree.budget.map(|b| format!(", budget {}", bytes(b))).unwrap_or_default(),
         milliseconds(s.build_ms)
     ));
+    let asked = args.tree.level.map_or_else(|| format!("α = {} asks for", single(args.tree.alpha)), |_| "--level asks for".to_owned());
     let clipped =
-        if s.wanted > s.level { format!(" (a tree of level {}, as requested, would be too large)", s.wanted) } else { String::new() };
+        if s.wanted > s.level { format!(" (a tree of level {}, which {asked}, would be too large)", s.wanted) } else { String::new() };
     page.row("level of the leaves, l", format_args!("{}{clipped}", s.level));
     page.row("entries, n_m", grouped(s.entries));
     page.row("nodes, n_n", grouped(s.nodes));
     let (each, finer) = (s.entries / s.leaves.max(1), s.level + 1);
     let hint = args.tree.lists == Lists::Boundary && Fineness::Pictures.wants_finer(each) && s.wanted == s.level && finer <= MAX_LEVEL;
-    let hint = if hint { format!("; pictures are drawn faster with --level {finer}") } else { String::new() };
+    let hint = if hint { "; pictures are drawn with a finer tree, which is faster" } else { "" };
     page.row("leaves", format_args!("{}, of {each} entries on average{hint}", grouped(s.leaves)));
 }
 
 /// Adds the arrays of the tree and the neighbours.
 fn add_memory(page: &mut Page, s: &Summary) {
-    for (name, n) in s.memory.arrays() {
+    for (name, n) in s.memory.arrays().into_iter().filter(|(_, n)| *n > 0) {
         let what = match name {
             "P" => "primitive ids",
             "PO" => "primitive offsets",

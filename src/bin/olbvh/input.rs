@@ -86,19 +86,18 @@ impl TreeArgs {
     /// The checked options of a build for queries. Leaves are as fine as suits the queries, unless the arguments say
     /// how fine they should be.
     pub fn suited(&self, fineness: Fineness) -> Outcome<BuildOptions> {
-        let options = self.options(false)?;
+        let options = self.options()?;
         let by_default = options.alpha == 0.0 && options.level.is_none() && options.lists == Lists::Boundary && options.budget.is_none();
         Ok(BuildOptions { fineness: if by_default { fineness } else { Fineness::Alpha }, ..options })
     }
 
     /// The checked options of a build.
-    pub fn options(&self, boxes: bool) -> Outcome<BuildOptions> {
+    pub fn options(&self) -> Outcome<BuildOptions> {
         let options = BuildOptions {
             alpha: self.alpha,
             level: self.level,
             assign: self.assign,
             lists: self.lists,
-            boxes,
             budget: self.budget,
             ..BuildOptions::default()
         };

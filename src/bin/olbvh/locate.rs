@@ -30,8 +30,8 @@ the options; --all then finds all of them only with --lists all. Ids count the c
 barycentric coordinates b0 to b3 belong to the vertices of the tetrahedron in file order. For a cell that was split into tetrahedra (hexahedron, voxel, \
 wedge or pyramid), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
 A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; .csv, .vtu and .json are other formats. \
-If there is at least one point for every four cells (for at most 4,194,304 cells), points are sorted along a Z curve, and each is searched for near \
-the one before. --coherent searches in the given order instead, which saves the sorting. Results are always in the order of the points. \
+If there is at least one point for every four cells (for at most 4,194,304 cells), points are sorted along a Z curve before they are searched for. \
+--coherent saves the sorting. Results are always in the order of the points. \
 With --all, the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
@@ -42,7 +42,8 @@ pub struct Args {
     /// `-`: a .csv on standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Name of the field to interpolate. Default: the first field of points, or else the first field of cells.
+    /// Name of the field to interpolate; a vector's name stands for its length, and name.x, name.y and name.z for its
+    /// components. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Option<String>,
     /// Find every cell that contains a point, not only its owner.
@@ -53,9 +54,8 @@ pub struct Args {
     /// tree.
     #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
-    /// Search for each point near the one before it in the given order. This is fast for points that follow each other
-    /// closely, such as samples on a line or of a scan. Answers do not depend on it where cells do not overlap.
-    /// Default: no order is assumed.
+    /// Search for the points in the given order, without sorting them first. This is faster for points that follow each
+    /// other closely, such as samples on a line or of a scan. Answers do not depend on it.
     #[arg(long, conflicts_with = "all")]
     coherent: bool,
     #[command(flatten)]

@@ -9,6 +9,7 @@ mod devices;
 mod engine;
 mod info;
 mod input;
+mod legend;
 mod locate;
 mod output;
 mod overlap;

@@ -1,9 +1,10 @@
 //! The subcommand `olbvh render`.
 
 use crate::arguments::{message, named, range, vector};
-use crate::common::{Common, Outcome};
+use crate::common::{Common, Failure, Outcome};
 use crate::engine;
 use crate::input::{self, MemoryArgs, TreeArgs};
+use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{Picture, View};
@@ -44,8 +45,8 @@ pub struct Args {
     /// Output file, a .png picture. `-`: standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
-    /// Name of the field to draw. Default: the first field of points, or else of cells; without any field, the height
-    /// z.
+    /// Name of the field to draw; a vector's name stands for its length, and name.x, name.y and name.z for its
+    /// components. Default: the first field of points, or else of cells; without any field, the height z.
     #[arg(long)]
     field: Option<String>,
     /// Width and height in pixels; a single number gives a square.
@@ -88,6 +89,9 @@ pub struct Args {
     /// Background: white, black, grey, transparent, #rrggbb, or two colours TOP,BOTTOM for a gradient. Default: white.
     #[arg(long, value_name = "COLOR", value_parser = named::<Background>)]
     background: Option<Background>,
+    /// Show at the right which colour stands for which value, beside the mesh, which takes less of the picture then.
+    #[arg(long)]
+    legend: bool,
     /// Show colours without lighting.
     #[arg(long)]
     no_shading: bool,
@@ -120,17 +124,23 @@ struct Iso(Vec<f32>);
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
     let mut options = args.tree.suited(Fineness::Pictures)?;
-    let mut settings = args.settings()?;
+    let legend = args.legend()?;
+    let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
-    let [width, height] = args.size;
     let rays: u64 = settings.size.into_iter().map(u64::from).product();
     if options.fineness == Fineness::Pictures && 2 * rays < loaded.mesh.tets.len() as u64 {
         options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves
     }
     let field = args.field(&loaded.mesh, common)?;
     let expected = remark_on_iso(&settings.iso, &field, common);
+    if let (Some([lo, hi]), Some([least, most])) = (settings.range.or(settings.transfer.range()), field.range())
+        && (most < lo || least > hi)
+    {
+        let name = printable(&field.name);
+        common.remark(format_args!("values of {name} go from {least} to {most}, none of them within the range {lo} to {hi} that is shown"));
+    }
     let suited = suited_step(&loaded.mesh.points, &loaded.mesh.tets);
     settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
@@ -141,9 +151,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let (pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
+    let [width, height] = settings.size.map(|rays| rays / args.supersample);
     let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height);
     if expected && pixels.chunks(4 * width as usize).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
-        common.remark("the picture is empty: the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)");
+        common.remark(if stats.samples == 0 && loaded.report.flat == loaded.report.tetrahedra {
+            "the picture is empty: all cells are flat"
+        } else {
+            "the picture is empty: the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)"
+        });
     }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
         common.remark(format_args!(
@@ -151,6 +166,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         ));
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
+    let explained = Explained { field: &printable(&field.name), range: [lo, hi], plan: &plan };
+    let pixels = legend.map(|legend| legend.beside(&pixels, &explained)).unwrap_or(pixels);
+    let [width, height] = args.size;
     write_png(output.path(), width, height, &pixels)?;
     let json = json!({
         "file": args.output.display().to_string(), "width": width, "height": height, "supersample": args.supersample,
@@ -178,14 +196,24 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 }
 
 impl Args {
-    fn settings(&self) -> Outcome<RenderSettings> {
+    /// The legend, if there is to be one.
+    fn legend(&self) -> Outcome<Option<Legend>> {
+        if !self.legend {
+            return Ok(None);
+        }
+        let [width, height] = self.size;
+        let small = || Failure::Usage(format!("a picture of {width}x{height} is too small for --legend; take at least 220x128"));
+        Legend::new(self.size).map(Some).ok_or_else(small)
+    }
+
+    fn settings(&self, legend: Option<&Legend>) -> Outcome<RenderSettings> {
         let mut transfer = input::transfer(&self.tf)?;
         if let Some(Opacity(points)) = &self.opacity {
             transfer = transfer.with_opacity(points.clone())?;
         }
         let defaults = RenderSettings::default();
         let ([width, height], n) = (self.size, self.supersample);
-        let size = self.size.map(|pixels| pixels.saturating_mul(n));
+        let size = [width - legend.map_or(0, Legend::width), height].map(|pixels| pixels.saturating_mul(n));
         if n > 1 && size.iter().any(|&rays| rays > MAX_SIZE) {
             return Err(Error::Invalid(format!(
                 "{width}x{height} pixels of {n}x{n} rays; a picture has at most {MAX_SIZE} rays in each direction"
@@ -221,7 +249,8 @@ impl Args {
 
 /// Remarks on iso-values that show nothing, or little. Returns whether something may be seen.
 fn remark_on_iso(iso: &[f32], field: &Field, common: &Common) -> bool {
-    let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty()) else { return true };
+    // Those of a field of cells are an error, which says more.
+    let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty() && field.on == On::Points) else { return true };
     let seen = iso.iter().any(|iso| (lo..=hi).contains(iso));
     if !seen {
         common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", printable(&field.name)));

@@ -68,7 +68,8 @@ pub struct Args {
     /// Default: the thickness.
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     spacing: Option<f64>,
-    /// Name of the field to slice. Default: the first field of points, or else the first field of cells.
+    /// Name of the field to slice; a vector's name stands for its length, and name.x, name.y and name.z for its
+    /// components. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Option<String>,
     /// Value of voxels that the mesh only touches. nearest: that at the closest point of the mesh. linear: the field of
@@ -110,20 +111,20 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
+    if field.is_none() && format == OutputFormat::Png {
+        common.remark("the mesh has no fields; drawing voxels in one colour");
+    }
     let bounds = Bounds::from(&valid_grid(mesh));
     let voxels = args.voxels(format, &bounds, mesh.origin, common)?;
     let look = args.look(format, &colors, field, common);
     let placement = Placement::new(&voxels, mesh);
     let mut layers = Layers::create(&args.output, format, &placement, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
-    let mut tally = Tally::default();
     let start = Instant::now();
-    let mut sink = |band: Band| {
-        tally.add(&band.kinds);
-        layers.band(band)
-    };
+    let mut sink = |band: Band| layers.band(band);
     let asked = Stack { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
-    let took = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
+    let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
+    let (tally, took) = sliced.into_parts();
     layers.finish()?;
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
@@ -140,7 +141,7 @@ impl Args {
     fn format(&self) -> Outcome<OutputFormat> {
         let format = output::announce(&self.output, &FORMATS, &[&self.mesh])?;
         if format == OutputFormat::Npy {
-            for beside in ["kind.npy", "owner.npy"] {
+            for beside in ["kind.npy", "owner.npy"].into_iter().take(1 + usize::from(self.owners)) {
                 output::announce(&self.output.with_extension(beside), &FORMATS, &[&self.mesh])?;
             }
         }

@@ -23,13 +23,13 @@ pub struct OlbvhLocation {
     pub tolerance: f32,
     /// How points are located. 0: each one independently. 1: each one starting at the owner of the point before it, if
     /// each point lies near the one before; this pays on processors, from one point per four tetrahedra on. 2: like 0,
-    /// for many points in no order, which are sorted first.
+    /// for many points in no order, which are sorted first. 3: sorted first, then like 1, for processors.
     pub path: u32,
     /// For path 0, optional (size 0: none): a word per point, the tetrahedron where its search starts, for example its
     /// owner in the previous frame, or `UINT32_MAX`. It must be a valid tetrahedron of the mesh. The hints may be where
     /// the owners are: each is read before it is replaced.
     pub hints: OlbvhBuffer,
-    /// For path 2: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
+    /// For paths 2 and 3: scratch memory for the sort, of the size that `olbvh_location_parts` reports.
     pub memory: OlbvhBuffer,
     /// A word per point: its owner, or `UINT32_MAX` if there is none.
     pub owners: OlbvhBuffer,
@@ -69,6 +69,7 @@ impl OlbvhLocation {
             0 => LocateMethod::Descent,
             1 => LocateMethod::Runs,
             2 => LocateMethod::Sorted,
+            3 => LocateMethod::SortedRuns,
             other => return Err(Error::Invalid(format!("path {other} is not known"))),
         };
         Ok(LocateOptions { tolerance: tolerance(self.tolerance), method })
@@ -92,7 +93,7 @@ pub extern "C" fn olbvh_location_parts(
 ) -> OlbvhStatus {
     border(|| {
         let (scene, location) = (handle(scene, "scene")?, handle(location, "location")?);
-        let sorted = location.options()?.method == LocateMethod::Sorted;
+        let sorted = location.options()?.method.is_sorted();
         let bytes = if sorted { location.memory.carve(|a| PointOrder::carve(&scene.gpu, a, location.count))?.0 } else { 0 };
         put(out, OlbvhLocationParts { bytes })
     })
@@ -108,7 +109,7 @@ pub extern "C" fn olbvh_cmd_locate(
     recorded(recording, |r| {
         let (OlbvhScene { gpu, scene, .. }, location) = (scene_on(r, scene, "scene")?, handle(location, "location")?);
         let (options, mut input) = (location.options()?, location.input());
-        if options.method == LocateMethod::Sorted {
+        if options.method.is_sorted() {
             let order = location.memory.place(|a| PointOrder::carve(gpu, a, location.count))?;
             cmd_sort_points(r, scene.tree.grid, &input, &order)?;
             r.barrier("sort_points → locate");

@@ -56,8 +56,9 @@ impl PairMemory {
 /// finished.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]).
+/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]), or for no rounds.
 pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, rounds: Rounds) -> Result<()> {
+    rounds.check()?;
     if b.tree.lists != Lists::All {
         return Err(Error::Invalid("pairs of cells are found by lists: build the tree over the second mesh with `Lists::All`".into()));
     }
@@ -89,8 +90,9 @@ pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &Pair
 /// writes; no barrier after.
 ///
 /// # Errors
-/// [`Error::Vulkan`] if a pipeline cannot be made.
+/// [`Error::Invalid`] for no rounds, [`Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_list_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, found: BufferRef, rounds: Rounds) -> Result<()> {
+    rounds.check()?;
     if !rounds.resume {
         cmd_exclusive_scan(r, memory.counts, memory.places, memory.total, Count::host(a.mesh.input.tets), &memory.scan)?;
     }

@@ -81,8 +81,9 @@ impl OverlapMemory {
 /// reads the answers.
 ///
 /// # Errors
-/// [`crate::Error::Vulkan`] if a pipeline cannot be made.
+/// [`crate::Error::Invalid`] for no rounds, [`crate::Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapMemory, rounds: Rounds) -> Result<()> {
+    rounds.check()?;
     let [forth, back] = memory.directions;
     let directions = [
         Direction { own: *a, other: *b, arrays: forth, held: back.around },

@@ -4,7 +4,7 @@
 use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render, cmd_render_marked};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Recorder};
+use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
@@ -16,7 +16,7 @@ use bytemuck::Pod;
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long. Fewer for
 /// integrated GPUs, which may be slow, and whose systems end submissions that take seconds.
 fn strip(gpu: &Gpu) -> u32 {
-    if matches!(gpu.report().kind, "discrete" | "cpu") { 1 << 20 } else { 1 << 18 }
+    if matches!(gpu.report().kind, DeviceKind::Discrete | DeviceKind::Cpu) { 1 << 20 } else { 1 << 18 }
 }
 
 /// A finished picture, and what it cost; times are those of the device.
@@ -103,7 +103,8 @@ impl<'a> Canvas<'a> {
         };
         let in_strips = in_strips && matches!(searched.structure, Structure::Octree(_));
         let mut rows = if in_strips { strip_rows(strip(gpu), plan.size) } else { plan.size[1] }.max(1);
-        while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > gpu.memory_left() - gpu.memory_left() / 4 {
+        let left = gpu.memory_left(); // once: other threads allocate and free
+        while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > left - left / 4 {
             rows = rows.div_ceil(2).next_multiple_of(BLOCK);
         }
         let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
@@ -216,8 +217,8 @@ pub fn render(
 ) -> Result<Rendered> {
     let [width, height] = plan.size;
     let rays = u64::from(width) * u64::from(height);
-    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(strip(mesh.gpu())))?;
     super::rays(plan.size)?;
+    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(strip(mesh.gpu())))?;
     let mut colors = Vec::with_capacity(rays as usize);
     for row in (0..height).step_by(canvas.rows as usize) {
         let size = [width, canvas.rows.min(height - row)];

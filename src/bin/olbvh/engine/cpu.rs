@@ -13,7 +13,7 @@ use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Scene};
-use olbvh::slicing::{BAND_VOXELS, bands};
+use olbvh::slicing::{BAND_VOXELS, Tally, bands};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
 use std::time::Instant;
@@ -97,18 +97,20 @@ impl Engine for Cpu {
         })
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks> {
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
         let Stack { field, voxels, extrapolate, .. } = *asked;
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
-            let mut done = 0;
+            let (mut tally, mut done) = (Tally::default(), 0);
             // Bands are those of the device, so that owners are equal even where tetrahedra overlap.
             for rows in bands(voxels, BAND_VOXELS) {
-                sink(slicer.band(rows))?;
+                let band = slicer.band(rows);
+                tally.add(&band.kinds);
+                sink(band)?;
                 done += u64::from(rows.count) * u64::from(voxels.size[0]);
                 report(done, voxels.voxels());
             }
-            Ok(())
+            Ok(tally)
         })
     }
 }
@@ -150,7 +152,8 @@ impl<'a> CpuTree<'a> {
         // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
         for chunk in points.chunks(locate::CHUNK) {
             let found = match options.method {
-                LocateMethod::Runs => locator.locate_in_runs(chunk),
+                LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
+                LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk)),
                 LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => locator.locate_each(chunk),
             };
             all.owners.extend(found.iter().map(|l| l.owner));

@@ -11,6 +11,7 @@ use olbvh::options::BuildOptions;
 use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::overlap::Overlap;
+use olbvh::slicing::Tally;
 use std::path::PathBuf;
 
 /// An opened device, and the target of its kernels with its origin.
@@ -104,7 +105,7 @@ impl Engine for Device {
         blocks::render(&self.0, self.memory(memory), asked, report)
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks> {
-        Ok(blocks::slice(&self.0, self.memory(memory), asked, report, sink)?.into_parts().1)
+    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
+        blocks::slice(&self.0, self.memory(memory), asked, report, sink)
     }
 }

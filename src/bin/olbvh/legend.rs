@@ -1,0 +1,221 @@
+//! The colour legend of a picture, in a strip at its right side: which colour stands for which value.
+
+use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
+use olbvh::render::{Background, Plan};
+
+/// Characters of a label, such as `-1234.567` or `-1.50e-12`.
+const LABEL: usize = 9;
+/// Gap between two labels, in parts of the height of a line.
+const GAP: f64 = 1.5;
+
+/// A legend of a size that suits the picture.
+pub struct Legend {
+    font: RasterHeight,
+    /// Width and height of the whole picture.
+    size: [u32; 2],
+}
+
+/// What a legend explains.
+pub struct Explained<'a> {
+    /// Name of the field.
+    pub field: &'a str,
+    /// Values at the two ends of the colours.
+    pub range: [f32; 2],
+    /// The colours, the background, and the values of iso-surfaces, if these are drawn.
+    pub plan: &'a Plan,
+}
+
+impl Legend {
+    /// The legend of a picture of this size; `None` if the picture has no room for one.
+    pub fn new(size: [u32; 2]) -> Option<Self> {
+        let font = match size[1] {
+            ..700 => RasterHeight::Size16,
+            700..1400 => RasterHeight::Size24,
+            _ => RasterHeight::Size32,
+        };
+        let legend = Self { font, size };
+        (size[0] >= 2 * legend.width() && size[1] >= 8 * legend.line()).then_some(legend)
+    }
+
+    /// Height of a line of text in pixels.
+    fn line(&self) -> u32 {
+        self.font.val() as u32
+    }
+
+    /// Width of a character.
+    fn letter(&self) -> u32 {
+        get_raster_width(FontWeight::Regular, self.font) as u32
+    }
+
+    /// Width of the strip: a margin of half a line at either side, the bar, which is a line wide, a tick, and labels.
+    pub fn width(&self) -> u32 {
+        self.line() * 2 + self.letter() * (LABEL as u32 + 1)
+    }
+
+    /// The picture with the legend beside `drawn`, which is narrower by [`Legend::width`]: four bytes per pixel, straight
+    /// alpha.
+    pub fn beside(&self, drawn: &[u8], of: &Explained<'_>) -> Vec<u8> {
+        let ([width, height], strip, line) = (self.size, self.width(), self.line());
+        let mut ink = Ink::new(self, &of.plan.background);
+        let (left, bar) = (line / 2, (height * 3 / 5).max(4 * line));
+        let top = (height - bar) / 2 + line;
+        ink.text([left, top - 2 * line], &short(of.field, ((strip - line) / self.letter()) as usize));
+        // Ends lie in the middle of the outermost rows, as values do in the table of colours.
+        let last = of.plan.table.len() - 1;
+        for y in 0..bar {
+            let place = f64::from(bar - 1 - y) / f64::from(bar - 1);
+            let [r, g, b, _] = of.plan.table[(place * last as f64).round() as usize];
+            (left..left + line).for_each(|x| ink.set([x, top + y], [r, g, b, 1.0]));
+        }
+        let [lo, hi] = of.range.map(f64::from);
+        let most = (f64::from(bar) / (GAP * 2.0 * f64::from(line))) as usize;
+        let marks = if of.plan.iso.is_empty() { marks([lo, hi], most) } else { of.plan.iso.iter().map(|&v| f64::from(v)).collect() };
+        let digits = digits(&marks);
+        let mut free = f64::INFINITY; // above the label below
+        for value in marks {
+            let place = if lo < hi { (value - lo) / (hi - lo) } else { 0.5 };
+            if !(0.0..=1.0).contains(&place) {
+                continue;
+            }
+            let y = top + (f64::from(bar - 1) * (1.0 - place)).round() as u32;
+            let begin = if of.plan.iso.is_empty() { left + line } else { left };
+            (begin..left + line + self.letter() / 2).for_each(|x| ink.set([x, y], ink.colour));
+            if f64::from(y) + f64::from(line) <= free {
+                ink.text([left + line + self.letter(), y - line / 2], &label(value, digits));
+                free = f64::from(y);
+            }
+        }
+        let inner = 4 * (width - strip) as usize;
+        let rows = drawn.chunks_exact(inner).zip(ink.pixels.chunks_exact(4 * strip as usize));
+        rows.flat_map(|(picture, legend)| picture.iter().chain(legend)).copied().collect()
+    }
+}
+
+/// The strip while it is drawn.
+struct Ink<'a> {
+    legend: &'a Legend,
+    background: &'a Background,
+    pixels: Vec<u8>,
+    /// Colour of text: black or white, whichever is seen on the background.
+    colour: [f32; 4],
+}
+
+impl<'a> Ink<'a> {
+    fn new(legend: &'a Legend, background: &'a Background) -> Self {
+        let (width, height) = (legend.width(), legend.size[1]);
+        let pixels = (0..height).flat_map(|y| (0..width).flat_map(move |_| background.pixel([0.0; 4], y, height))).collect();
+        let [r, g, b, alpha] = background.pixel([0.0; 4], height / 2, height).map(f32::from);
+        let dark = alpha > 0.0 && 0.3 * r + 0.6 * g + 0.1 * b < 110.0;
+        let shade = if dark { 1.0 } else { 0.0 };
+        Self { legend, background, pixels, colour: [shade, shade, shade, 1.0] }
+    }
+
+    /// Sets a pixel to a colour of this opacity (straight alpha) over the background.
+    fn set(&mut self, [x, y]: [u32; 2], [r, g, b, a]: [f32; 4]) {
+        let (width, height) = (self.legend.width(), self.legend.size[1]);
+        if x < width && y < height {
+            let at = 4 * (y as usize * width as usize + x as usize);
+            self.pixels[at..at + 4].copy_from_slice(&self.background.pixel([r * a, g * a, b * a, a], y, height));
+        }
+    }
+
+    /// Writes a line whose upper left corner is at `at`.
+    fn text(&mut self, at: [u32; 2], text: &str) {
+        for (i, letter) in (0..).zip(text.chars()) {
+            let raster = |letter| get_raster(letter, FontWeight::Regular, self.legend.font);
+            let Some(raster) = raster(letter).or_else(|| raster('?')) else { continue };
+            for (y, row) in (0..).zip(raster.rows()) {
+                for (x, &strength) in (0..).zip(row).filter(|(_, strength)| **strength > 0) {
+                    let [r, g, b, _] = self.colour;
+                    self.set([at[0] + i * self.legend.letter() + x, at[1] + y], [r, g, b, f32::from(strength) / 255.0]);
+                }
+            }
+        }
+    }
+}
+
+/// The first `most` characters of a name; two dots stand for what is left out.
+fn short(name: &str, most: usize) -> String {
+    if name.chars().count() <= most { name.into() } else { name.chars().take(most - 2).chain("..".chars()).collect() }
+}
+
+/// At most `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten.
+fn marks([lo, hi]: [f64; 2], most: usize) -> Vec<f64> {
+    if hi - lo <= lo.abs().max(hi.abs()) * 1e-6 {
+        return vec![lo];
+    }
+    let rough = (hi - lo) / most.max(2) as f64;
+    let power = 10f64.powf(rough.log10().floor());
+    let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= rough).unwrap_or(rough);
+    // A hair beyond the ends, since multiples are rounded.
+    let [first, last] = [(lo / step - 1e-6).ceil(), (hi / step + 1e-6).floor()];
+    (0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).collect()
+}
+
+/// How labels are written: in fixed notation with so many digits after the point, or in powers of ten with so many.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Digits {
+    Fixed(usize),
+    Powers(usize),
+}
+
+/// The digits that tell values apart.
+fn digits(values: &[f64]) -> Digits {
+    let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+    let apart = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 0.0).fold(largest, f64::min);
+    if largest == 0.0 {
+        return Digits::Fixed(0);
+    }
+    let [order, least] = [largest, apart].map(|x| (x.log10() + 1e-9).floor() as i32);
+    // Values that are not round, such as those of iso-surfaces, need more digits than their order.
+    let whole = |power: i32| values.iter().map(|v| v / 10f64.powi(power)).all(|x| (x - x.round()).abs() < 1e-4);
+    let behind = (order - 6..=least).rev().find(|&power| whole(power));
+    let behind = behind.unwrap_or(least - 2).max(order - 6);
+    let fixed = behind.min(0).unsigned_abs() as usize;
+    let signs = usize::from(values.iter().any(|v| *v < 0.0)) + usize::from(fixed > 0);
+    if order.max(0) as usize + fixed + signs < LABEL - 1 {
+        Digits::Fixed(fixed)
+    } else {
+        Digits::Powers((order - behind).clamp(0, 3) as usize)
+    }
+}
+
+fn label(value: f64, digits: Digits) -> String {
+    let value = value + 0.0; // no -0
+    match digits {
+        Digits::Fixed(n) => format!("{value:.n$}"),
+        Digits::Powers(n) => format!("{value:.n$e}"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn labels(range: [f64; 2]) -> Vec<String> {
+        let marks = marks(range, 6);
+        let digits = digits(&marks);
+        marks.into_iter().map(|v| label(v, digits)).collect()
+    }
+
+    #[test]
+    fn marks_are_round_and_labels_short() {
+        assert_eq!(labels([20.0, 95.0]), ["20", "40", "60", "80"]);
+        assert_eq!(labels([-1.0, 1.0]), ["-1.0", "-0.5", "0.0", "0.5", "1.0"]);
+        assert_eq!(labels([0.0, 0.25]), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]);
+        assert_eq!(labels([1e8, 3e8]), ["1.0e8", "1.5e8", "2.0e8", "2.5e8", "3.0e8"]);
+        assert_eq!(labels([-2e-9, 1e-9]), ["-2.0e-9", "-1.5e-9", "-1.0e-9", "-5.0e-10", "0.0e0", "5.0e-10", "1.0e-9"]);
+        assert_eq!(labels([7.0, 7.0]), ["7"]);
+        for (lo, hi) in [(1e-30, 1e-29), (-3e37, 3e37), (1000.0, 1000.01), (0.0, 0.0), (-7.5, 123_456.0)] {
+            assert!(labels([lo, hi]).iter().all(|l| !l.is_empty() && l.len() <= LABEL), "{:?}", labels([lo, hi]));
+        }
+    }
+
+    #[test]
+    fn iso_values_keep_their_digits() {
+        let values = [0.125, 40.0];
+        assert_eq!(digits(&values), Digits::Fixed(3));
+        assert_eq!(short("temperature", 20), "temperature");
+        assert_eq!(short("temperature", 6), "temp..");
+    }
+}
