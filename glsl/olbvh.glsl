@@ -1,5 +1,5 @@
-// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners of a point, value and
-// gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), walks (SPEC 2.6), all owners of a
+// point, value and gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
 //
 //     #version 460
 //     #include "olbvh.glsl"                     first of all, since it enables extensions
@@ -99,6 +99,30 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (owner == NONE) return NONE;
     weights_of_owner = barycentric(load_tet(words(cells.at[owner])), x);
     return owner;
+}
+
+// Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
+// owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
+// is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
+// OLBVH_NONE twice. Both points must lie in the bounds of the mesh enlarged by their size on every side.
+uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
+    weights_of_owner = vec4(0.0);
+    left = uvec2(NONE);
+    Grid g = grid.at[0];
+    if (!near_bounds(g, start) || !near_bounds(g, end)) return NONE;
+    vec3 x = normalise(g, end);
+    uint face;
+    uint t = walk_leg(from, normalise(g, start), x, face);
+    if (face != NONE) {
+        left = uvec2(t, face);
+        return NONE;
+    }
+    Best best = no_best();
+    arrive(t, x, best);
+    // Rounding may lead a walk astray round an edge, and a walk of many steps ends early.
+    if (!best.inside) return olbvh_locate(end, 0.0, weights_of_owner);
+    weights_of_owner = barycentric(load_tet(words(cells.at[best.owner])), x);
+    return best.owner;
 }
 
 // The number of tetrahedra that contain a point; `owners` receives the first OLBVH_OWNERS of them, in no particular

@@ -1,5 +1,5 @@
-// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), all owners of a point, value and
-// gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
+// olbvh for the shaders of other programs, in any stage: point location (SPEC 3.1), walks (SPEC 2.6), all owners of a
+// point, value and gradient of a field, and traversal with the host's own predicates (the paper's Alg. 3).
 //
 //     #version 460
 //     #include "olbvh.glsl"                     first of all, since it enables extensions
@@ -1007,27 +1007,32 @@ bool olbvh_walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout 
     return false;
 }
 
-// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends.
-uint olbvh_walk_leg(uint t, vec3 a, vec3 b) {
-    uint from = olbvh_NONE;
+// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends, or the last one
+// before it leaves the mesh, through the face opposite to vertex number `left`; else `left` is NONE.
+uint olbvh_walk_leg(uint t, vec3 a, vec3 b, out uint left) {
+    uint from = t;
+    left = olbvh_NONE;
     for (uint s = 0u; s < olbvh_LEG; ++s) {
         ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
         uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
-        uint next = olbvh_NONE;
+        uint face = olbvh_NONE;
         for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = olbvh_way_before(before[f], behind[f]);
             if (at < first) {
                 first = at;
-                next = beside[f];
+                face = f;
             }
         }
-        if (next == olbvh_NONE) break;
+        if (face == olbvh_NONE || beside[face] == olbvh_NONE) {
+            left = face;
+            break;
+        }
         from = t;
-        t = next;
+        t = beside[face];
     }
     return t;
 }
@@ -1060,9 +1065,10 @@ olbvh_Best olbvh_walk_from_seed(uint seed, olbvh_LeafCell cell, vec3 x) {
         } else {
             uint k = way - olbvh_ARRIVALS;
             vec3 by = olbvh_cell_point(cell, k);
+            uint left; // the cell is full of mesh: nothing leads out of it
             t = seed;
             // The first point is the centre, where the walk starts.
-            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = olbvh_walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x);
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = olbvh_walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x, left);
         }
         olbvh_arrive(t, x, best);
     }
@@ -1127,6 +1133,30 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     if (owner == olbvh_NONE) return olbvh_NONE;
     weights_of_owner = olbvh_barycentric(olbvh_load_tet(olbvh_words(olbvh_cells.at[owner])), x);
     return owner;
+}
+
+// Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
+// owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
+// is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
+// OLBVH_NONE twice. Both points must lie in the bounds of the mesh enlarged by their size on every side.
+uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
+    weights_of_owner = vec4(0.0);
+    left = uvec2(olbvh_NONE);
+    olbvh_Grid g = olbvh_grid.at[0];
+    if (!olbvh_near_bounds(g, start) || !olbvh_near_bounds(g, end)) return olbvh_NONE;
+    vec3 x = olbvh_normalise(g, end);
+    uint face;
+    uint t = olbvh_walk_leg(from, olbvh_normalise(g, start), x, face);
+    if (face != olbvh_NONE) {
+        left = uvec2(t, face);
+        return olbvh_NONE;
+    }
+    olbvh_Best best = olbvh_no_best();
+    olbvh_arrive(t, x, best);
+    // Rounding may lead a walk astray round an edge, and a walk of many steps ends early.
+    if (!best.inside) return olbvh_locate(end, 0.0, weights_of_owner);
+    weights_of_owner = olbvh_barycentric(olbvh_load_tet(olbvh_words(olbvh_cells.at[best.owner])), x);
+    return best.owner;
 }
 
 // The number of tetrahedra that contain a point; `owners` receives the first OLBVH_OWNERS of them, in no particular

@@ -10,6 +10,9 @@
 //!
 //!    - `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)`: owner of a point or `OLBVH_NONE`, and its
 //!      barycentric coordinates; the usual tolerance is 1e-5
+//!    - `uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights, out uvec2 left)`: owner of `end`, reached on a
+//!      straight way from `start` in the tetrahedron `from`, as particles move; or `OLBVH_NONE` if the way leads out of
+//!      the mesh, by the face of `left.x` that is opposite to its vertex number `left.y`
 //!    - `uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS])`: the number of tetrahedra that contain a point,
 //!      and the first of them; `OLBVH_OWNERS` is 32 unless you define it
 //!    - `float olbvh_value(uint owner, vec4 weights)`: value of the field, which has one float per point; NaN without a

@@ -10,9 +10,9 @@ use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::glsl::{OLBVH, SceneBuffers};
 use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
-use olbvh::mesh::{On, kuhn_jittered};
+use olbvh::mesh::{Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{LocateOptions, SILENT, locate, locate_all};
+use olbvh::query::{LocateOptions, Located, SILENT, locate, locate_all};
 use submit::submit;
 
 /// What a host's kernels begin with.
@@ -103,6 +103,68 @@ void main() {
     }
 }
 "#;
+
+/// A kernel that walks from every point to the next but six, and writes where it ended.
+const WALKS: &str = r#"
+#include "olbvh.glsl"
+void main() {
+    uint i = gl_GlobalInvocationID.x, k = (i + 7u) % count;
+    if (i >= count) return;
+    vec3 start = vec3(points[3 * i], points[3 * i + 1], points[3 * i + 2]);
+    vec3 end = vec3(points[3 * k], points[3 * k + 1], points[3 * k + 2]);
+    olbvh_open(tree);
+    vec4 b;
+    uvec2 left = uvec2(OLBVH_NONE);
+    uint from = olbvh_locate(start, 0.0, b), owner = OLBVH_NONE;
+    if (from != OLBVH_NONE) owner = olbvh_walk(from, start, end, b, left);
+    found[5 * i] = from;
+    found[5 * i + 1] = owner;
+    found[5 * i + 2] = left.x;
+    found[5 * i + 3] = left.y;
+    found[5 * i + 4] = floatBitsToUint(b.x);
+}
+"#;
+
+/// Checks walks between points of a box full of tetrahedra: those to a point within reach its owner, those to a point
+/// outside leave through a boundary face where the way crosses the surface of the box.
+fn check_walks(mesh: &Mesh, device: &DeviceMesh, points: &[[f32; 3]], expected: &Located, found: &[[u32; 5]]) {
+    let neighbours = device.neighbours().unwrap();
+    let size: [f32; 3] = [0, 1, 2].map(|c| mesh.points.iter().map(|p| p[c]).fold(0.0, f32::max));
+    let (mut reached, mut outside) = (0, 0);
+    for (i, &[from, owner, last, vertex, weight]) in found.iter().enumerate() {
+        let k = (i + 7) % points.len();
+        let (a, b) = (points[i], points[k]);
+        let what = format!("from {a:?} in {from} to {b:?}: {owner}, left {last} by {vertex}");
+        let deep = |p: [f32; 3]| (0..3).map(|c| p[c].min(size[c] - p[c])).fold(f32::MAX, f32::min);
+        if from == u32::MAX || deep(a) < 1e-3 || deep(b).abs() < 1e-3 {
+            continue;
+        }
+        if deep(b) > 0.0 {
+            assert_eq!((owner, weight), (expected.owners[k], expected.barycentrics[k][0].to_bits()), "{what}");
+            assert_eq!([last, vertex], [u32::MAX; 2], "{what}");
+            reached += 1;
+        } else {
+            assert_eq!((owner, neighbours[last as usize][vertex as usize]), (u32::MAX, u32::MAX), "{what}");
+            let part = |c: usize| {
+                if b[c] < 0.0 {
+                    a[c] / (a[c] - b[c])
+                } else if b[c] > size[c] {
+                    (size[c] - a[c]) / (b[c] - a[c])
+                } else {
+                    1.0
+                }
+            };
+            let part = (0..3).map(part).fold(1.0, f32::min);
+            for c in 0..3 {
+                let corners = mesh.tets[last as usize].map(|v| mesh.points[v as usize][c]);
+                let at = a[c] + (b[c] - a[c]) * part;
+                assert!(corners.iter().any(|&x| x > at - 1e-3) && corners.iter().any(|&x| x < at + 1e-3), "{what}: crosses at {at}");
+            }
+            outside += 1;
+        }
+    }
+    assert!(reached > 500 && outside > 100, "{reached} walks ended in the mesh, {outside} outside");
+}
 
 fn compile(binding: Binding, kernel: &str) -> Vec<u32> {
     let compiler = shaderc::Compiler::new().unwrap();
@@ -217,6 +279,7 @@ fn check(binding: Binding) {
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
         let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
+        check_walks(&mesh, &device, &points, &expected, &run::<5>(&gpu, WALKS, &scene, level, &points));
         let nearest = [0, 1, 3].map(|stack| run::<2>(&gpu, &format!("#define OLBVH_STACK {stack}\n{NEAREST}"), &scene, level, &points));
         for (i, [all, nearer]) in nearest[0].iter().enumerate() {
             assert_eq!(nearer, all, "{binding:?} {lists:?}: the leaf nearest to point {i} is {} away", f32::from_bits(*all));

@@ -78,27 +78,32 @@ bool walk_towards(inout uint t, inout uint s, bool arrived, vec3 x, inout Best b
     return false;
 }
 
-// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends.
-uint walk_leg(uint t, vec3 a, vec3 b) {
-    uint from = NONE;
+// Walks straight from `a`, which lies in `t`, to `b`. Returns the tetrahedron where the segment ends, or the last one
+// before it leaves the mesh, through the face opposite to vertex number `left`; else `left` is NONE.
+uint walk_leg(uint t, vec3 a, vec3 b, out uint left) {
+    uint from = t;
+    left = NONE;
     for (uint s = 0u; s < LEG; ++s) {
         ++walked_tets;
         Tet tet = load_tet(words(cells.at[t]));
         vec4 before = own_weights(weights(tet, a), tet), behind = own_weights(weights(tet, b), tet);
         uvec4 beside = words(neighbours.at[t]);
         float first = 3.40282347e38;
-        uint next = NONE;
+        uint face = NONE;
         for (uint f = 0u; f < 4u; ++f) {
             if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = way_before(before[f], behind[f]);
             if (at < first) {
                 first = at;
-                next = beside[f];
+                face = f;
             }
         }
-        if (next == NONE) break;
+        if (face == NONE || beside[face] == NONE) {
+            left = face;
+            break;
+        }
         from = t;
-        t = next;
+        t = beside[face];
     }
     return t;
 }
@@ -131,9 +136,10 @@ Best walk_from_seed(uint seed, LeafCell cell, vec3 x) {
         } else {
             uint k = way - ARRIVALS;
             vec3 by = cell_point(cell, k);
+            uint left; // the cell is full of mesh: nothing leads out of it
             t = seed;
             // The first point is the centre, where the walk starts.
-            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x);
+            [[dont_unroll]] for (uint leg = k == 0u ? 1u : 0u; leg < 2u; ++leg) t = walk_leg(t, leg == 0u ? cell.centre : by, leg == 0u ? by : x, left);
         }
         arrive(t, x, best);
     }

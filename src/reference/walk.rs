@@ -246,9 +246,10 @@ impl Walker<'_> {
         walked.best.inside || (walked.best.in_box && walked.best.smallest >= GAP)
     }
 
-    /// Walks along the segment from `a`, which lies in `t`, to `b`, and returns the tetrahedron in which it ends.
+    /// Walks along the segment from `a`, which lies in `t`, to `b`. Returns the tetrahedron in which it ends, or the last
+    /// one before it leaves the mesh.
     fn leg(&self, mut t: u32, a: Vec3, b: Vec3, walked: &mut Walked) -> u32 {
-        let mut from = NONE;
+        let mut from = t;
         for _ in 0..LEG {
             walked.steps += 1;
             let (tet, at_b) = self.weights(t, b);

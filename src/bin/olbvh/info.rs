@@ -3,7 +3,7 @@
 use crate::common::{Common, Outcome};
 use crate::engine::{self, Engine, Shapes, Summary};
 use crate::input::TreeArgs;
-use crate::output;
+use crate::output::{self, Progress};
 use crate::text::{Page, bytes, grouped, joined, milliseconds, single};
 use olbvh::formats::{Fate, Loaded, printable};
 use olbvh::grid::MAX_LEVEL;
@@ -41,7 +41,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let options = args.tree.options()?;
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
+    let progress = Progress::new(common, "building");
     let summary = engine.summary(&loaded.mesh, &options)?;
+    drop(progress);
     let json = json(args, engine.as_ref(), &loaded, &summary);
     output::result(common, &json, &page(args, engine.as_ref(), &loaded, &summary, common.verbose).to_string())
 }

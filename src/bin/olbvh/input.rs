@@ -2,6 +2,7 @@
 
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
+use crate::output::Progress;
 use crate::text::counted;
 use olbvh::error::Error;
 use olbvh::formats::{LoadOptions, Loaded, Merge, load, printable};
@@ -122,7 +123,9 @@ impl ReadArgs {
     /// Reads a mesh and prints the warnings of its reader.
     pub fn mesh(&self, path: &Path, common: &Common) -> Outcome<Loaded> {
         let options = LoadOptions { merge: self.merge, ..LoadOptions::default() };
+        let progress = Progress::new(common, "reading");
         let loaded = load(path, &options).map_err(|error| refused(path, error))?;
+        drop(progress);
         for warning in &loaded.report.warnings {
             common.remark(format_args!("{}: {warning}", path.display()));
         }

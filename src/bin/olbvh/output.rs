@@ -7,6 +7,7 @@ use olbvh::formats::{OutputFile, OutputFormat, destination, is_part};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
+use std::time::Duration;
 
 /// Prints text, which ends with a newline, on standard output.
 pub fn print(text: &str) -> Outcome {
@@ -150,26 +151,30 @@ pub fn write_text(path: &Path, text: &str) -> Outcome {
     Ok(file.commit()?)
 }
 
-/// A progress bar on standard error, if that is a terminal and `--quiet` is not given.
+/// The progress of long work, on standard error, if that is a terminal and neither `--quiet` nor `--verbose`, which tells
+/// more, is given: what is done and for how long, and, once that is known, how much of it.
 pub struct Progress(Option<ProgressBar>);
 
 impl Progress {
-    /// Makes a progress bar with the label `label`.
+    /// Shows that work called `label` has begun.
     pub fn new(common: &Common, label: &'static str) -> Self {
-        let shown = !common.quiet && std::io::stderr().is_terminal();
+        let shown = !common.quiet && !common.verbose && std::io::stderr().is_terminal();
         Self(shown.then(|| {
-            let style = ProgressStyle::with_template("{msg:10} {wide_bar} {percent:>3} % {eta:>5}");
-            let bar = ProgressBar::new(0).with_message(label);
-            if let Ok(style) = style { bar.with_style(style) } else { bar }
+            let bar = ProgressBar::new_spinner().with_message(label);
+            restyle(&bar, "{spinner} {msg} … {elapsed}");
+            bar.enable_steady_tick(Duration::from_millis(100));
+            bar
         }))
     }
 
     /// Shows that `done` of `total` units of work are finished.
     pub fn set(&self, done: u64, total: u64) {
-        if let Some(bar) = &self.0 {
+        let Some(bar) = &self.0 else { return };
+        if bar.length() != Some(total) {
             bar.set_length(total);
-            bar.set_position(done);
+            restyle(bar, "{spinner} {msg:10} {wide_bar} {percent:>3} % {eta:>5}");
         }
+        bar.set_position(done);
     }
 
     /// Hides the bar while something is printed.
@@ -178,6 +183,12 @@ impl Progress {
             Some(bar) => bar.suspend(print),
             None => print(),
         }
+    }
+}
+
+fn restyle(bar: &ProgressBar, template: &str) {
+    if let Ok(style) = ProgressStyle::with_template(template) {
+        bar.set_style(style);
     }
 }
 
