@@ -104,7 +104,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
 // Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
 // owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
 // is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
-// OLBVH_NONE twice. Both points must lie in the bounds of the mesh enlarged by their size on every side.
+// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent.
 uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
     weights_of_owner = vec4(0.0);
     left = uvec2(NONE);

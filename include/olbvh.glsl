@@ -814,7 +814,8 @@ struct olbvh_Exchange {
     bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
-// Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
+// Tetrahedra tested by strides and walks so far, and passes over stars as a part of such a test, which count towards a
+// kernel's budget.
 uint olbvh_walked_tets = 0u;
 
 olbvh_Stand olbvh_stand_nowhere() { return olbvh_Stand(olbvh_NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }
@@ -984,6 +985,7 @@ void olbvh_arrive(uint first, vec3 x, inout olbvh_Best best) {
         olbvh_consider(best, t, tet, w);
         olbvh_grow_star(t, tet, w, x);
     }
+    olbvh_walked_tets += olbvh_star_size * olbvh_star_size / 16u; // the passes of `in_star` are work as well
 }
 
 bool olbvh_settled(olbvh_Best best) { return best.inside || (best.in_box && best.smallest >= olbvh_GAP); }
@@ -1138,7 +1140,7 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
 // Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
 // owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
 // is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
-// OLBVH_NONE twice. Both points must lie in the bounds of the mesh enlarged by their size on every side.
+// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent.
 uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
     weights_of_owner = vec4(0.0);
     left = uvec2(olbvh_NONE);

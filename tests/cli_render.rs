@@ -75,7 +75,8 @@ fn a_legend_stands_beside_the_mesh() {
     let labels = all.chunks(width).flat_map(|row| &row[left + 40..]).filter(|pixel| pixel[..3] != [255, 0, 0]).count();
     assert!(labels > 50, "{labels} pixels of labels");
     let message = fails(folder.path(), 2, &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "100x100", "--legend"]);
-    assert!(message.contains("too small for --legend"), "{message}");
+    assert!(message.contains("too small for --legend; take at least 204x128"), "{message}");
+    picture("narrow.png", &["--size", "210x1500", "--legend"]);
 }
 
 /// A pixel is the mean of its rays: of black and white ones, as the mesh is seen or the background.

@@ -20,7 +20,8 @@ struct Exchange {
     bvec3 before; // whether the fresh vertex comes before each of the corners kept
 };
 
-// Tetrahedra tested by strides and walks so far, which count towards a kernel's budget.
+// Tetrahedra tested by strides and walks so far, and passes over stars as a part of such a test, which count towards a
+// kernel's budget.
 uint walked_tets = 0u;
 
 Stand stand_nowhere() { return Stand(NONE, uvec4(0u), uvec4(0u), uvec4(0u), vec4(0.0), vec4(0.0), vec4(0.0)); }

@@ -55,6 +55,7 @@ void arrive(uint first, vec3 x, inout Best best) {
         consider(best, t, tet, w);
         grow_star(t, tet, w, x);
     }
+    walked_tets += star_size * star_size / 16u; // the passes of `in_star` are work as well
 }
 
 bool settled(Best best) { return best.inside || (best.in_box && best.smallest >= GAP); }

@@ -171,9 +171,9 @@ impl Gpu {
 
     /// The same device with a memory limit: all buffers made from this handle and its clones, transfer buffers
     /// included (but for 64 KiB of host memory that small results are read back through), may take at most `bytes`
-    /// together; a buffer beyond that is refused with [`Error::Memory`]. The
-    /// allocator takes memory from the driver in blocks of 16 MiB, or of the buffer's size if that is larger. Memory of
-    /// dropped buffers is not kept: the limit replaces a pool ([`Gpu::with_pool`]).
+    /// together; a buffer beyond that is refused with [`Error::Memory`]. The allocator takes memory from the driver in
+    /// blocks of 16 MiB, or of the buffer's size if that is larger. Memory of dropped buffers is not kept: the limit
+    /// replaces a pool ([`Gpu::with_pool`]).
     #[must_use]
     pub fn with_memory(&self, bytes: u64) -> Self {
         Self { memory: Keep::Limited(Arc::new(Ledger::new(bytes))), ..self.clone() }

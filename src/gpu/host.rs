@@ -73,8 +73,8 @@ impl Gpu {
     ///
     /// # Safety
     /// The handles are valid and belong together. Everything that `host.enabled` names is enabled. `host.family`
-    /// supports compute, and `host.queue` passes on a queue of it. The device outlives every clone of the `Gpu` and everything made from it. When the last of
-    /// these is dropped, nothing recorded through it is being executed.
+    /// supports compute, and `host.queue` passes on a queue of it. The device outlives every clone of the `Gpu` and
+    /// everything made from it. When the last of these is dropped, nothing recorded through it is being executed.
     pub unsafe fn from_raw(host: HostDevice, options: &GpuOptions) -> Result<Self> {
         let HostDevice { instance, physical, device, family, queue, allocator, pipeline_cache, enabled } = host;
         // SAFETY: the caller promises that the handles are valid and belong together.

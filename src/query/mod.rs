@@ -75,7 +75,7 @@ use dispatch;
 
 /// How many dispatches one recording spends on work of unknown length. Each dispatch tests a limited number of
 /// candidates per item, so that no dispatch keeps the device busy for seconds. Later dispatches skip items that are
-/// finished. No dispatches from the beginning of the work are refused, but by [`cmd_render`], which prepares the picture.
+/// finished. To begin with none is an error, but for [`cmd_render`], which then only prepares the picture.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Rounds {
     /// Number of dispatches recorded, one after the other.

@@ -29,9 +29,9 @@ use crate::primitives::{Arena, Count};
 use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 
-/// Entries, nodes and tetrahedra of walks that one run of voxels may test in one dispatch, roughly. A test within a star
-/// takes up to eight passes of loops, and some drivers end the loops of an invocation after 65,535 passes in all.
-const LOCATE_BUDGET: u32 = 4096;
+/// Entries, nodes and tetrahedra of walks that one run of voxels may test in one dispatch, roughly. A test takes up to
+/// five passes of loops, and some drivers end the loops of an invocation after 65,535 passes in all.
+const LOCATE_BUDGET: u32 = 8192;
 /// Nodes and entries that one voxel may test in one dispatch.
 const TOUCH_BUDGET: u32 = 1024;
 
@@ -117,8 +117,8 @@ impl SliceMemory {
 ///
 /// # Errors
 /// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, for
-/// a field of too few values, for no rounds, or for a part of a binary tree. Only the device knows whether boxes are flat or too large
-/// for the mesh; [`SliceStatus::refused`] reports that.
+/// a field of too few values, for no rounds, or for a part of a binary tree. Only the device knows whether boxes are
+/// flat or too large for the mesh; [`SliceStatus::refused`] reports that.
 pub fn cmd_slice(
     r: &mut Recorder<'_>,
     searched: &StructureView,

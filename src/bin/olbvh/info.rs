@@ -24,8 +24,8 @@ Examples:
   olbvh info kuhn:127,127,127 --json          the mesh `Jets` of the paper
 
 Bad cells, in which a vertex occurs twice, are left out of the tree. (A file with a cell whose vertex does not exist, or has a coordinate that is not \
-finite or of a magnitude of 2^125 (4.3e37) or more, is refused as a whole.) Boundary cells have a face on the surface or no volume, or overlap a neighbour, or lie at a crowded point \
-(where more than 128 cells may meet). Negative cells have their vertices in the other order, which does no harm where cells do not overlap.")]
+finite or of a magnitude of 2^125 (4.3e37) or more, is refused as a whole.) Boundary cells have a face on the surface or no volume, or overlap a \
+neighbour, or lie at a crowded point (where more than 128 cells may meet). Negative cells have their vertices in the other order, which does no harm where cells do not overlap.")]
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,

@@ -26,15 +26,13 @@ pub struct Explained<'a> {
 }
 
 impl Legend {
-    /// The legend of a picture of this size; `None` if the picture has no room for one.
-    pub fn new(size: [u32; 2]) -> Option<Self> {
-        let font = match size[1] {
-            ..700 => RasterHeight::Size16,
-            700..1400 => RasterHeight::Size24,
-            _ => RasterHeight::Size32,
-        };
-        let legend = Self { font, size };
-        (size[0] >= 2 * legend.width() && size[1] >= 8 * legend.line()).then_some(legend)
+    /// The legend of a picture of this size, with the largest letters that suit its height and leave half its width to
+    /// the mesh. If there are none, the error is the smallest size that has room for a legend.
+    pub fn new(size: [u32; 2]) -> Result<Self, [u32; 2]> {
+        let with = |font| Self { font, size };
+        let fonts = [(RasterHeight::Size32, 1400), (RasterHeight::Size24, 700), (RasterHeight::Size16, 128)];
+        let found = fonts.into_iter().find(|&(font, height)| size[1] >= height && size[0] >= 2 * with(font).width());
+        found.map(|(font, _)| with(font)).ok_or_else(|| [2 * with(RasterHeight::Size16).width(), 128])
     }
 
     /// Height of a line of text in pixels.
@@ -139,7 +137,7 @@ fn short(name: &str, most: usize) -> String {
     if name.chars().count() <= most { name.into() } else { name.chars().take(most - 2).chain("..".chars()).collect() }
 }
 
-/// At most `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten.
+/// About `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten.
 fn marks([lo, hi]: [f64; 2], most: usize) -> Vec<f64> {
     if hi - lo <= lo.abs().max(hi.abs()) * 1e-6 {
         return vec![lo];

@@ -202,8 +202,9 @@ impl Args {
             return Ok(None);
         }
         let [width, height] = self.size;
-        let small = || Failure::Usage(format!("a picture of {width}x{height} is too small for --legend; take at least 220x128"));
-        Legend::new(self.size).map(Some).ok_or_else(small)
+        let small =
+            |[w, h]: [u32; 2]| Failure::Usage(format!("a picture of {width}x{height} is too small for --legend; take at least {w}x{h}"));
+        Legend::new(self.size).map(Some).map_err(small)
     }
 
     fn settings(&self, legend: Option<&Legend>) -> Outcome<RenderSettings> {
