@@ -860,9 +860,9 @@ typedef struct olbvh_build_status {
    */
   uint32_t longest_leaf;
   /*
-   Unused.
+   Bit k: on level k, some tetrahedron has more than 32 candidates.
    */
-  uint32_t pad;
+  uint32_t large_levels;
   /*
    Sum of the estimates from which the level by alpha follows, lower word first.
    */
@@ -918,6 +918,10 @@ typedef struct olbvh_mesh_status {
    Not 0: the table of faces is full, as it can be beyond 429 million tetrahedra only. The tree must not be used.
    */
   uint32_t overflow;
+  /*
+   Number of faces that more than two tetrahedra share, none of which are neighbours there.
+   */
+  uint32_t branched;
 } olbvh_mesh_status;
 
 #ifdef __cplusplus

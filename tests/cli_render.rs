@@ -123,7 +123,21 @@ fn points_that_coincide_are_merged_on_demand() {
 fn info_tells_mesh_and_tree() {
     let folder = TempDir::new().unwrap();
     let result = json(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
-    has_keys(&result, &["cells", "points", "bad_cells", "boundary_cells", "crowded_points", "fields", "bounds", "tree", "tangled_cells"]);
+    has_keys(
+        &result,
+        &[
+            "cells",
+            "points",
+            "bad_cells",
+            "boundary_cells",
+            "crowded_points",
+            "branched_faces",
+            "fields",
+            "bounds",
+            "tree",
+            "tangled_cells",
+        ],
+    );
     assert_eq!(result["neighbour_bytes"], 16 * 720);
     has_keys(&result["tree"], &["l", "entries", "nodes", "leaves", "bytes", "paper_bytes", "build_ms"]);
     assert_eq!((result["cells"].as_u64(), result["points"].as_u64()), (Some(720), Some(210)));

@@ -50,4 +50,5 @@ fn crowded_faces_find_each_other() {
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     assert_eq!(expected.counts.boundary as usize, mesh.tets.len());
     assert!(device.neighbours().unwrap() == expected.neighbours, "neighbours of crowded faces");
+    assert_eq!(device.status().branched, expected.counts.branched);
 }

@@ -9,7 +9,7 @@
 #include "shared/corners.glsl"
 #include "shared/shapes.glsl"
 layout(constant_id = 2) const uint MATES = 1;
-ARGUMENTS(7)
+ARGUMENTS(8)
     uint tets;
     uint share; // tetrahedra per workgroup
 END_ARGUMENTS
@@ -20,7 +20,12 @@ BUFFER(3, READ_WRITE, uint, boundary) // one bit per tetrahedron, zeroed
 BUFFER(4, READ_WRITE, MeshStatus, status)
 RECORDS(5, uvec4, cells)
 BUFFER(6, readonly, uint, thin) // thin corners at every vertex
+BUFFER(7, readonly, uint, branches) // see mates.glsl
 #include "shared/bad.glsl"
+
+bool any_branched = status.at[0].branched > 0u;
+
+bool is_branched(uint face) { return any_branched && (branches.at[face >> 5u] >> (face & 31u) & 1u) != 0u; }
 
 uint shape_of(uint t) { return shapes.at[t >> 4u] >> (2u * (t & 15u)) & 3u; }
 
@@ -29,17 +34,20 @@ bool is_crowded(uvec4 v) { return max(max(thin.at[v.x], thin.at[v.y]), max(thin.
 uvec4 neighbours_of(uint t) {
     uvec4 held = neighbours.at[t], across;
     for (uint f = 0u; f < 4u; ++f) {
-        if (MATES != 0u) across[f] = held[f] == ALONE || held[f] == CROWDED ? NONE : face_of_mate(held[f]) >> 2;
+        if (MATES != 0u) across[f] = held[f] == ALONE || is_branched(4u * t + f) || is_branched(face_of_mate(held[f])) ? NONE : face_of_mate(held[f]) >> 2;
         else across[f] = held[f] == NONE || is_bad(t) || is_bad(held[f]) ? NONE : held[f];
     }
     if (MATES != 0u || across != held) neighbours.at[t] = across;
     return across;
 }
 
-// Whether a tetrahedron, which is not flat, lies on the positive side of the face opposite to one of its vertices.
-bool is_positive(uint shape, uvec4 ids, uint opposite) {
-    uvec4 before = uvec4(lessThan(ids, uvec4(opposite)));
-    return (shape == MIRRORED) == (((before.x + before.y + before.z + before.w) & 1u) == 0u);
+// Whether a tetrahedron, which is not flat, and its neighbour across face f, whose vertex opposite to that face is
+// given, lie on the same side of it. A flat neighbour lies on no side.
+bool is_fold(uint shape, uint theirs, uvec4 ids, uint f, uint opposite) {
+    uvec4 below_mine = uvec4(lessThan(ids, uvec4(ids[f]))), below_theirs = uvec4(lessThan(ids, uvec4(opposite)));
+    below_theirs[f] = 0u;
+    uint crossed = (below_mine.x + below_mine.y + below_mine.z + below_mine.w) ^ (below_theirs.x + below_theirs.y + below_theirs.z + below_theirs.w);
+    return theirs != FLAT && (shape == theirs) == ((crossed & 1u) == 0u);
 }
 
 void main() {
@@ -52,15 +60,16 @@ void main() {
         uvec4 ids = words(cells.at[t]);
         uint shape = shape_of(t);
         bool on_boundary = any(equal(across, uvec4(NONE))) || shape == FLAT || (any_crowded && is_crowded(ids));
-        uint all = ids.x ^ ids.y ^ ids.z ^ ids.w;
-        for (uint f = 0u; f < 4u && !on_boundary; ++f) {
-            // Two tetrahedra on the same side of a face are a fold, unless one of them is flat: a flat one lies on no
-            // side.
-            uint theirs = shape_of(across[f]);
-            if (theirs == FLAT) continue;
-            uvec4 v = words(cells.at[across[f]]);
-            uint opposite = v.x ^ v.y ^ v.z ^ v.w ^ all ^ ids[f];
-            on_boundary = is_positive(shape, ids, ids[f]) == is_positive(theirs, v, opposite);
+        if (!on_boundary) {
+            // Those of the four neighbours are loaded together.
+            uint all = ids.x ^ ids.y ^ ids.z ^ ids.w;
+            uvec4 opposite, theirs;
+            for (uint f = 0u; f < 4u; ++f) {
+                uvec4 v = words(cells.at[across[f]]);
+                opposite[f] = v.x ^ v.y ^ v.z ^ v.w ^ all ^ ids[f];
+                theirs[f] = shape_of(across[f]);
+            }
+            for (uint f = 0u; f < 4u; ++f) on_boundary = on_boundary || is_fold(shape, theirs[f], ids, f, opposite[f]);
         }
         if (on_boundary) atomicOr(boundary.at[t >> 5u], 1u << (t & 31u));
         boundary_cells += uint(on_boundary);

@@ -1,9 +1,10 @@
 #version 460
 // Depth, 1 of 2 (SPEC 2.4): sums the estimates of Eq. 11, and counts the candidates (the entries with `Aabb`) that
-// every level would have.
+// every level would have. Also finds out on which levels a tetrahedron has more than SHARE of them.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
+layout(constant_id = 2) const uint SHARE = 32; // most candidates of a share, see shares.glsl
 ARGUMENTS(5)
     uint tets;
     uint stride;
@@ -32,6 +33,7 @@ void main() {
     for (uint i = local_index(); i < 12u; i += WORKGROUP) low[i] = high[i] = 0u;
     barrier();
     Grid g = grid.at[0];
+    uint large = 0u;
     uvec2 sums[12];
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
     uvec2 items = items_of_share(share, tets);
@@ -53,8 +55,11 @@ void main() {
             uint before = sums[1u + level].x, product = n.x * n.y * n.z;
             sums[1u + level].x = before + product;
             sums[1u + level].y += uint(before > NONE - product);
+            large |= uint(product > SHARE) << level;
         }
     }
+    large = subgroupOr(large);
+    if (subgroupElect() && large != 0u) atomicOr(status.at[0].large_levels, large);
     for (uint i = 0u; i < 12u; ++i) ADD_WIDE(low[i], high[i], sums[i].x, sums[i].y)
     barrier();
     for (uint i = local_index(); i < 12u; i += WORKGROUP) {

@@ -1,10 +1,11 @@
 #version 460
 // Depth, 2 of 2 (SPEC 2.4): chooses the largest level that the mean estimate allows (Eq. 12, in integers) and whose
-// candidates and memory fit.
+// candidates and memory fit. Also plans the dispatch that counts candidates.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-ARGUMENTS(4)
+layout(constant_id = 2) const uint EACH = 64; // items per workgroup of that dispatch
+ARGUMENTS(6)
     uint tets;
     uint alpha;    // in units of 1/65536
     uint requested; // level in place of the one by alpha; NONE: there is none
@@ -14,11 +15,16 @@ ARGUMENTS(4)
     uint deepest;  // deepest level allowed
     uint budget[2]; // most words of all arrays, low word first
     uint box_words; // words of a box, per node
+    uint shared_out; // not 0: candidates are counted in shares
+    uint marked;     // not 0: the dispatch also clears the marks of the level
 END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, mesh)
 BUFFER16(1, writeonly, Grid, grid)
 BUFFER(2, READ_WRITE, BuildStatus, status)
 BUFFER(3, writeonly, uint, candidates) // word for the scans: candidates of the chosen level
+BUFFER(4, writeonly, uint, live)       // counts to be scanned, see 20_count.comp
+BUFFER(5, writeonly, uint, groups)     // workgroups (x, y, z) of the dispatch
+#include "shared/groups.glsl"
 
 bool less_equal(uvec2 a, uvec2 b) { return a.y < b.y || (a.y == b.y && a.x <= b.x); } // low word first
 
@@ -77,4 +83,8 @@ void main() {
     status.at[0].candidates = n;
     grid.at[0].level = level;
     candidates.at[0] = n;
+    bool single = shared_out != 0u && (status.at[0].large_levels >> level & 1u) == 0u;
+    uint counts = single ? 1u : tets + 1u;
+    live.at[0] = counts;
+    write_groups(0u, max(counts, marked == 0u ? 0u : cell_words(level)), EACH);
 }

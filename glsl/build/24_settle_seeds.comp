@@ -6,7 +6,7 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
-ARGUMENTS(11)
+ARGUMENTS(12)
     uint tets;
     uint capacity; // most shares
 END_ARGUMENTS
@@ -21,6 +21,7 @@ BUFFER(7, readonly, uint, marks)
 RECORDS(8, uvec4, neighbours)
 BUFFER(9, readonly, uint, doubts)
 BUFFER(10, readonly, uint, doubt_count)
+BUFFER(11, readonly, uint, shares) // number of shares
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
 #include "shared/centre.glsl"
@@ -49,7 +50,7 @@ void main() {
     uint k = item_index();
     if (k >= min(doubt_count.at[0], capacity)) return;
     uint item = doubts.at[k];
-    Share share = item < tets ? Share(offsets.at[item], item, 0u) : later_share(item - tets, tets);
+    Share share = item < tets ? first_share(item, tets, shares.at[0]) : later_share(item - tets, tets);
     Grid g = grid.at[0];
     CellBox box = coarser(finest_box(share.t), g.level);
     uvec3 at = first_candidate(box, share.first);

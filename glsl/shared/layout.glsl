@@ -22,6 +22,7 @@ struct MeshStatus {
     uint negative;  // Tetrahedra of negative volume in the caller's order of vertices.
     uint crowded;   // Vertices with so many thin corners that more tetrahedra may meet there than a star can have.
     uint overflow;  // Not 0: the table of faces was full, which it can be beyond 429 million tetrahedra only.
+    uint branched;  // Faces that more than two tetrahedra share, which are then not neighbours there.
 };
 
 // The result of a build (SPEC 2.4, 2.5).
@@ -35,7 +36,7 @@ struct BuildStatus {
     uint leaves;           // Nodes on the last level.
     uint boundary_leaves;  // Leaves with the boundary flag.
     uint longest_leaf;     // Entries of the longest leaf.
-    uint pad;              // Unused.
+    uint large_levels;     // Bit k: on level k, some tetrahedron has more candidates than a share holds.
     uint sum[2];           // Sum of the estimates of Eq. 11, low word first.
     uint total[22];        // Candidates of every level, low word first.
     uint levels[11];       // NO: element k is the number of nodes on levels 0 to k.

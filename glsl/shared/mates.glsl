@@ -1,8 +1,7 @@
-// What is known of each face (four per tetrahedron) while faces are matched: ALONE until another face with the same
-// vertices is found; then that face's number plus 1; or CROWDED, the largest word, if more than two faces have these
-// vertices.
+// What is known of each face (four per tetrahedron) while faces are matched: ALONE, or the number of another face with
+// the same vertices plus 1. Where more than two faces have the same vertices, this is known for two of them, of which
+// one is marked in `branches` (a bit per face).
 const uint ALONE = 0u;
-const uint CROWDED = 0xffffffffu;
 
 uint mate(uint face) { return face + 1u; }
 

@@ -1,7 +1,7 @@
 // Candidates are processed in shares of up to 32 candidates of one tetrahedron. Every tetrahedron has at least one
 // share. A dispatch over the first shares of all tetrahedra needs no search; the other shares follow in a second
-// dispatch (LATER), which is empty for most meshes. The including kernel declares offsets, the scanned numbers of
-// shares (tets + 1). Needs cells.glsl.
+// dispatch (LATER), which is empty for most meshes; then there are as many shares as tetrahedra. Otherwise offsets, which
+// the including kernel declares, are the scanned numbers of shares (tets + 1). Needs cells.glsl.
 layout(constant_id = 3) const uint LATER = 0;
 
 struct Share {
@@ -9,6 +9,9 @@ struct Share {
     uint t;
     uint first; // its first candidate
 };
+
+// The first share of a tetrahedron, where there are `all` shares.
+Share first_share(uint t, uint tets, uint all) { return Share(all == tets ? t : offsets.at[t], t, 0u); }
 
 // Share number i among those that are not the first of their tetrahedron.
 Share later_share(uint i, uint tets) {
@@ -25,7 +28,7 @@ Share later_share(uint i, uint tets) {
 // The share of invocation i of a dispatch, where there are `all` shares. Returns false if it has none.
 bool share_of(uint i, uint tets, uint all, out Share share) {
     if (i >= (LATER == 0u ? tets : all - tets)) return false;
-    if (LATER == 0u) share = Share(offsets.at[i], i, 0u);
+    if (LATER == 0u) share = first_share(i, tets, all);
     else share = later_share(i, tets);
     return share.index < all;
 }

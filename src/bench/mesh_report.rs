@@ -1,10 +1,10 @@
 //! All figures of one mesh: its tetrahedra, and all structures over it.
 
+use super::measure::Timing;
 use super::quantity::Quantity;
 use super::structure::Kind;
 use super::structure_report::StructureReport;
 use super::subject::{Subject, corners, volume};
-use crate::gpu::StageTime;
 use glam::DVec3;
 use serde::Serialize;
 
@@ -51,8 +51,11 @@ pub struct MeshReport {
     pub boundary: u32,
     /// Shape of the tetrahedra.
     pub quality: Quality,
-    /// Milliseconds for bounds, neighbours and boundary, which are computed once per mesh for all structures.
+    /// Milliseconds for bounds, neighbours and boundary, which are computed once per mesh for all structures: the median
+    /// of `topology`.
     pub topology_ms: f64,
+    /// Times of these.
+    pub topology: Timing,
     /// The structures.
     pub structures: Vec<StructureReport>,
     /// Structures that were not measured, and why.
@@ -68,7 +71,8 @@ impl MeshReport {
             points: input.points,
             boundary: status.boundary,
             quality: Quality::of(subject),
-            topology_ms: StageTime::sum(subject.device.stages()),
+            topology_ms: subject.topology.milliseconds(),
+            topology: subject.topology.clone(),
             structures: Vec::new(),
             skipped: Vec::new(),
         }

@@ -72,9 +72,8 @@ pub fn run(gpu: &Gpu, name: &str, mesh: &Mesh, whole: &Report, progress: &dyn Fn
     let mut report = MeshReport::new(&subject);
     let topology = (mesh.tets.len() <= settings.reference_tets).then(|| topology(mesh)).transpose()?;
     let mut expected: Option<Answers> = None;
-    let load = Load::new(gpu)?;
     for kind in whole.suite.kinds() {
-        match measure_structure(&subject, kind, expected.as_ref(), topology.as_ref(), whole, &load, progress) {
+        match measure_structure(&subject, kind, expected.as_ref(), topology.as_ref(), whole, progress) {
             Ok(Some((measured, answers))) => {
                 report.structures.push(measured);
                 expected.get_or_insert(answers);
@@ -97,7 +96,6 @@ fn measure_structure(
     expected: Option<&Answers>,
     topology: Option<&Topology>,
     whole: &Report,
-    load: &Load,
     progress: &dyn Fn(&str),
 ) -> Result<Option<(StructureReport, Answers)>> {
     let Some(structure) = Structure::build(subject.gpu, &subject.device, kind)? else { return Ok(None) };
@@ -109,7 +107,7 @@ fn measure_structure(
         check_tree(subject, topology, tree, &answers)?;
     }
     let lost = expected.map(|first| check(subject, kind, first, &answers)).transpose()?.flatten();
-    let mut measured = measure(subject, kind, (&structure, moved.as_ref()), &answers, lost, load, &whole.settings.budget)?;
+    let mut measured = measure(subject, kind, (&structure, moved.as_ref()), &answers, lost, &whole.settings.budget)?;
     measured.set_stages(subject, &structure, &whole.copy);
     Ok(Some((measured, answers)))
 }
@@ -121,7 +119,6 @@ fn measure(
     (structure, moved): (&Structure, Option<&Structure>),
     answers: &Answers,
     lost: Option<Lost>,
-    load: &Load,
     budget: &Budget,
 ) -> Result<StructureReport> {
     let mut report = StructureReport::new(kind, structure, lost);
@@ -130,7 +127,7 @@ fn measure(
             report.figures.push(Figure::new(quantity, runs.timing(stage), work));
         }
     };
-    let gpu = subject.gpu;
+    let (gpu, load) = (subject.gpu, &subject.load);
     let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
     rebuilt()?; // `structure` still holds its memory, so the first one gets memory that the system has yet to give
     add(Quantity::Build, Some(repeat(load, budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));

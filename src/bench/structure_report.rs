@@ -7,7 +7,6 @@ use super::structure::{Kind, Structure};
 use super::subject::Subject;
 use super::traffic::traffic;
 use crate::baseline::RayMethod;
-use crate::gpu::StageTime;
 use serde::Serialize;
 
 /// One measurement.
@@ -97,7 +96,7 @@ pub struct StructureReport {
 pub struct StageFigure {
     /// Name of the stage.
     pub stage: String,
-    /// Median of the milliseconds on the device; for stages of `mesh.`, the single time of the upload.
+    /// Median of the milliseconds on the device; for stages of `mesh.`, of all structures together.
     pub ms: f64,
     /// Bytes that the stage must read and write at least.
     pub bytes: u64,
@@ -111,9 +110,10 @@ impl StructureReport {
     /// Compares the stages of an octree's construction with the copy rate, if stages are timed.
     pub(super) fn set_stages(&mut self, subject: &Subject<'_>, structure: &Structure, copy: &CopyRate) {
         let Structure::Octree(tree) = structure else { return };
-        let build = self.figure(Quantity::Build).map(|f| f.timing.stages_ms.clone()).unwrap_or_default();
+        let mut times = subject.topology.stages_ms.clone();
+        times.extend(self.figure(Quantity::Build).map(|f| f.timing.stages_ms.clone()).unwrap_or_default());
         let stage = |(name, bytes): (&'static str, u64)| {
-            let ms = build.get(name).copied().unwrap_or_else(|| StageTime::sum(subject.device.stages().iter().filter(|s| s.name == name)));
+            let ms = times.get(name).copied().unwrap_or(0.0);
             let gb_per_s = bytes as f64 / ms * 1e-6;
             (ms > 0.0).then(|| StageFigure { stage: name.into(), ms, bytes, gb_per_s, of_copy_rate: gb_per_s / copy.gb_per_s })
         };

@@ -1,5 +1,7 @@
 //! A mesh on the device, and the queries that all structures over it answer.
 
+use super::load::Load;
+use super::measure::{Timing, repeat};
 use super::quantity::Quantity;
 use super::structure::Structure;
 use super::suite::Settings;
@@ -24,6 +26,10 @@ pub(super) struct Subject<'a> {
     pub name: &'a str,
     pub mesh: &'a Mesh,
     pub device: DeviceMesh,
+    /// Times of stage 0, which is done once per mesh for all structures.
+    pub topology: Timing,
+    /// What keeps the device at its clock before every measurement.
+    pub load: Load,
     /// The same mesh, moved, if the overlap is measured.
     pub moved: Option<DeviceMesh>,
     /// Points to locate, and the quantity that they measure.
@@ -36,6 +42,12 @@ pub(super) struct Subject<'a> {
 impl<'a> Subject<'a> {
     pub(super) fn new(gpu: &'a Gpu, name: &'a str, mesh: &'a Mesh, settings: &Settings) -> Result<Self> {
         let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip)?;
+        let load = Load::new(gpu)?;
+        let topology = {
+            let mut again = device.again()?;
+            again()?; // the first one gets memory that the system has yet to give
+            repeat(&load, &settings.budget, again)?.timing(None)
+        };
         let grid = *device.grid();
         let bounds = Bounds::from(&grid);
         let extent = [0, 1, 2].map(|c| bounds.hi[c] - bounds.lo[c]);
@@ -62,7 +74,7 @@ impl<'a> Subject<'a> {
         let voxels = (settings.slice > 0).then(|| slice.voxels(bounds.lo, bounds.hi, [0.0; 3])).transpose()?;
         let samples = plan.as_ref().map(|plan| (Quantity::LocateSamples, samples(plan, &bounds, settings.points as usize)));
         let points = [(Quantity::LocateRandom, random), (Quantity::LocateCoherent, coherent)].into_iter().chain(samples).collect();
-        Ok(Self { gpu, name, mesh, device, moved, points, field, plan, voxels })
+        Ok(Self { gpu, name, mesh, device, topology, load, moved, points, field, plan, voxels })
     }
 
     /// Centre of a voxel of the slice, given by its index.

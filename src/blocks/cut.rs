@@ -167,7 +167,7 @@ impl<'a> Source<'a> {
 
     /// The neighbours across the faces of each tetrahedron, as in [`crate::reference::boundary::Topology`].
     pub(super) fn neighbours(&self) -> Vec<[u32; 4]> {
-        neighbours(self.mesh, &self.topology.valid)
+        neighbours(self.mesh, &self.topology.valid).0
     }
 
     /// Number of bad tetrahedra, which no block has.

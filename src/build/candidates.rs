@@ -8,7 +8,7 @@ use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{Count as CountCells, CountSpec, Filter, FilterSpec, Fit, FitSpec, Mark, MarkSpec, SettleSeeds, SettleSeedsSpec};
 use crate::primitives::{Count, cmd_exclusive_scan};
 
-/// What is counted and filtered: all tetrahedra, or as many as a word in device memory says.
+/// What is counted and filtered: all tetrahedra at the chosen level, or at a coarser one if that is to be tried.
 #[derive(Clone, Copy)]
 struct Over {
     /// The word that receives the number of shares.
@@ -18,15 +18,12 @@ struct Over {
     marks: Option<BufferRef>,
 }
 
-/// Most words of marks that an invocation clears.
-const CLEARED: u32 = 256;
-
 impl Over {
     fn all(scratch: &CountScratch, marks: Option<BufferRef>) -> Self {
         Self { total: scratch.total, coarser: None, marks }
     }
 
-    /// The workgroups of a dispatch over `items` items; `slot` is its place among the three dispatches that [`Fit`]
+    /// The workgroups of a dispatch that filters `items` items; `slot` is its place among the three dispatches that [`Fit`]
     /// plans.
     fn groups(&self, slot: u64, items: u32, workgroup: u32) -> Groups {
         self.coarser.map_or(Groups::Count(items.div_ceil(workgroup)), |coarser| Groups::Indirect(coarser.groups.part(12 * slot, 12)))
@@ -86,12 +83,13 @@ impl Build<'_> {
         let MeshInput { cells, tets, .. } = mesh.input;
         let (workgroup, offsets) = (r.gpu().target().each, scratch.offsets);
         let marks = over.marks.unwrap_or_else(|| r.gpu().nothing());
-        let count = CountCells { grid, vertices: mesh.arrays.vertices, cells, bad: mesh.arrays.bad, counts: offsets, marks, tets };
+        let (live, groups) = over.coarser.map_or((scratch.live, scratch.groups), |coarser| (coarser.live, coarser.groups));
+        let (vertices, bad) = (mesh.arrays.vertices, mesh.arrays.bad);
+        let count = CountCells { grid, vertices, cells, bad, counts: offsets, marks, live, tets };
         let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
         let spec = CountSpec { workgroup, share, clear, ..Default::default() };
-        let clearing = over.marks.map_or(0, |marks| (marks.size / 4).div_ceil(u64::from(CLEARED)) as u32);
-        r.dispatch(&count, spec, over.groups(0, clearing.max(tets + 1), workgroup))?;
-        let all = over.coarser.map_or(Count::host(tets + 1), |coarser| Count::device(tets + 1, coarser.live));
+        r.dispatch(&count, spec, Groups::Indirect(groups.part(0, 12)))?;
+        let all = Count::device(tets + 1, live);
         cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
     }
 
@@ -113,7 +111,7 @@ impl Build<'_> {
         if filter.seeds.is_some() {
             let mark = Mark { grid, vertices, cells, bad, offsets, shares, marks, boundary, tets, capacity };
             // A word of bits per invocation, or a single bit where invocations are plenty and should not wait for others.
-            let (each, slot) = if r.gpu().target().sort.serial { (32, 1) } else { (1, 2) };
+            let (each, slot) = if r.gpu().target().sort.serial { (32, 1) } else { (8, 2) };
             let spec = MarkSpec { workgroup, assign: options.assign as u32, tets: each, ..Default::default() };
             r.dispatch(&mark, spec, over.groups(slot, tets.div_ceil(each), workgroup))?;
             r.barrier("codes.mark → codes.mark_later");
@@ -129,8 +127,22 @@ impl Build<'_> {
         if filter.seeds.is_some() {
             r.barrier("codes.filter → codes.doubts");
             let doubtful = Count::device(capacity, doubt_count).groups(r, workgroup, filter.arguments, "codes.doubts → codes.settle")?;
-            let settle =
-                SettleSeeds { grid, vertices, cells, bad, offsets, hits, counts, marks, neighbours, doubts, doubt_count, tets, capacity };
+            let settle = SettleSeeds {
+                grid,
+                vertices,
+                cells,
+                bad,
+                offsets,
+                hits,
+                counts,
+                marks,
+                neighbours,
+                doubts,
+                doubt_count,
+                shares,
+                tets,
+                capacity,
+            };
             r.dispatch(&settle, SettleSeedsSpec { workgroup, later: 1, ..Default::default() }, doubtful)?;
         }
         let entries = over.coarser.map_or(filter.entries, |coarser| coarser.entries);

@@ -89,16 +89,8 @@ impl DeviceMesh {
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
         let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
-        let carve = |a: &mut Arena| MeshScratch::carve(a, points, tets);
-        let (_memory, scratch) = Arena::reserve(gpu, "olbvh.mesh.scratch", carve)?;
-        let stage0 = Stage0::new(&input, &arrays, &scratch)?;
-        let given = given.as_ref().map(Buffer::all);
-        let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), time)| time.stages);
-        let stages = if tets < LARGE {
-            submit(&|r| stage0.prepare(r, given))?
-        } else {
-            [submit(&|r| stage0.begin(r, given))?, submit(&|r| stage0.match_faces(r))?, submit(&|r| stage0.boundary(r, 1))?].concat()
-        };
+        let (_memory, scratch) = Self::scratch(gpu, &input)?;
+        let stages = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given.as_ref().map(Buffer::all))?;
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
@@ -109,6 +101,30 @@ impl DeviceMesh {
         let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
         let kept = KeptMesh { view: MeshView { input, arrays }, memory };
         Ok(Self { gpu: gpu.clone(), kept, grid, status, stages })
+    }
+
+    fn scratch(gpu: &Gpu, input: &MeshInput) -> Result<(Buffer, MeshScratch)> {
+        Arena::reserve(gpu, "olbvh.mesh.scratch", |a: &mut Arena| MeshScratch::carve(a, input.points, input.tets))
+    }
+
+    /// Runs stage 0, and returns the times of its parts.
+    fn prepare(gpu: &Gpu, stage0: &Stage0<'_>, given: Option<BufferRef>) -> Result<Vec<StageTime>> {
+        let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), time)| time.stages);
+        if stage0.tets() < LARGE {
+            return submit(&|r| stage0.prepare(r, given));
+        }
+        Ok([submit(&|r| stage0.begin(r, given))?, submit(&|r| stage0.match_faces(r))?, submit(&|r| stage0.boundary(r, 1))?].concat())
+    }
+
+    /// A function that does all of stage 0 again in the memory of before, with the same results, and returns the times of
+    /// its parts. For meshes that were uploaded without a given grid.
+    #[cfg(feature = "cli")]
+    pub(crate) fn again(&self) -> Result<impl FnMut() -> Result<Vec<StageTime>>> {
+        let (memory, scratch) = Self::scratch(&self.gpu, self.input())?;
+        Ok(move || {
+            let _held = &memory;
+            Self::prepare(&self.gpu, &Stage0::new(self.input(), self.arrays(), &scratch)?, None)
+        })
     }
 
     /// The bad tetrahedra, which were left out, in ascending order.

@@ -7,6 +7,7 @@ use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
 use crate::primitives::{Arena, ScanScratch, SortScratch};
+pub(crate) use crate::reference::depth::SHARE;
 
 /// Most entries of a tree: an index is a signed word to shaders.
 pub(crate) const MAX_ENTRIES: u32 = i32::MAX.cast_unsigned();
@@ -171,6 +172,10 @@ pub(crate) struct CountScratch {
     pub(crate) offsets: BufferRef,
     pub(crate) total: BufferRef,
     pub(crate) candidates: BufferRef,
+    /// The number of counts: one per tetrahedron and one for the total, or just that.
+    pub(crate) live: BufferRef,
+    /// Workgroups of the dispatch that counts.
+    pub(crate) groups: BufferRef,
     pub(crate) scan: ScanScratch,
 }
 
@@ -186,13 +191,12 @@ impl CountScratch {
             offsets: arena.words(u64::from(tets) + 1)?,
             total: arena.words(1)?,
             candidates: arena.words(1)?,
+            live: arena.words(1)?,
+            groups: arena.words(3)?,
             scan: ScanScratch::carve(gpu, arena, tets + 1)?,
         })
     }
 }
-
-/// Most candidates of a share; the filter tests the candidates of one tetrahedron in shares.
-pub(crate) const SHARE: u32 = 32;
 
 /// Whether candidates have to be tested before they become entries; only the paper's lists take all of them.
 pub(crate) fn filtered(options: &BuildOptions) -> bool {

@@ -1,7 +1,7 @@
 //! The stages of a build, which append to a recorder. Those that choose the entries are in [`super::candidates`];
 //! [`super`] calls them in order.
 
-use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory};
+use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SortedScratch, TreeMemory, filtered};
 use super::prepare::{MeshInput, MeshView, summing_share};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
@@ -47,15 +47,21 @@ impl Build<'_> {
             r.barrier("depth.clear → depth.estimate");
             let share = summing_share(tets, workgroup);
             let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, share };
-            r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(share)))?;
+            r.dispatch(
+                &estimate,
+                EstimateDepthSpec { workgroup, share: SHARE, ..Default::default() },
+                Groups::Count(tets.div_ceil(share)),
+            )?;
             r.barrier("depth.estimate → depth.choose");
-            let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
-            let candidates = counts.candidates;
+            let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), each: workgroup, ..Default::default() };
+            let CountScratch { candidates, live, groups, .. } = *counts;
             let choose = ChooseDepth {
                 mesh: mesh.arrays.status,
                 grid,
                 status,
                 candidates,
+                live,
+                groups,
                 tets,
                 alpha,
                 requested,
@@ -65,6 +71,8 @@ impl Build<'_> {
                 deepest,
                 budget,
                 box_words,
+                shared_out: u32::from(filtered(options)),
+                marked: u32::from(self.marks().is_some()),
             };
             r.dispatch(&choose, once, Groups::Count(1))?;
             r.barrier("depth.choose → codes.count");

@@ -149,6 +149,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     compare_one("build.choose_depth", "status.overflow", &expected.status.overflow, &status.overflow)?;
     let Some(expected_tree) = expected.tree() else { return compare_status(&expected.status, &status) };
     compare("build.count", "offsets", &expected.offsets, &in_scratch(scratch.counts.offsets, expected.offsets.len())?)?;
+    compare("build.count", "total", &[expected.shares], &in_scratch(scratch.counts.total, 1)?)?;
     if let Some(filter) = &scratch.filter {
         compare("build.filter", "entries", &[expected.status.entries], &in_scratch(filter.entries, 1)?)?;
     }

@@ -11,8 +11,10 @@ use std::sync::Arc;
 /// A tree and the intermediate results of its construction.
 pub(crate) struct Expected {
     /// Where the candidates of each tetrahedron start (or, if candidates are filtered, their shares of 32), followed by
-    /// the total number.
+    /// the total number; empty where every tetrahedron has one share, so that only their number is needed.
     pub offsets: Vec<u32>,
+    /// The total number of candidates or shares.
+    pub shares: u32,
     /// Whether the device stores boxes; the reference implementation always does.
     pub boxes: bool,
     /// Expected content of the device's status block.
@@ -29,6 +31,7 @@ impl Expected {
         let heuristic = sizes.heuristic(options.alpha_fixed()?);
         let mut status = BuildStatus { wanted_level: heuristic, ..BuildStatus::default() };
         let sum: u64 = (0..).zip(sizes.histogram).map(|(alpha, n): (u64, u64)| alpha * n).sum();
+        status.large_levels = sizes.large_levels;
         status.sum = [sum as u32, (sum >> 32) as u32];
         for (k, n) in sizes.entries.iter().enumerate() {
             (status.total[2 * k], status.total[2 * k + 1]) = (*n as u32, (n >> 32) as u32);
@@ -38,8 +41,9 @@ impl Expected {
         let fits = |k: u32| k <= level && room.is_some_and(|room| sizes.entries[k as usize] <= u64::from(room));
         let Some(mut chosen) = (0..=heuristic).rev().find(|&k| fits(k)) else {
             status.overflow = 1;
-            return Ok(Self { offsets: Vec::new(), boxes: options.boxes, status, built: None });
+            return Ok(Self { offsets: Vec::new(), shares: 0, boxes: options.boxes, status, built: None });
         };
+        let first = chosen;
         let mut built = twin.built(options.assign, options.lists, chosen)?;
         while chosen > 0 && built.tree().p.len() as u64 > u64::from(most) {
             chosen -= 1;
@@ -56,6 +60,11 @@ impl Expected {
             Some(*sum)
         }));
 
+        let shares = offsets.last().copied().unwrap_or(0);
+        // Where a coarser level was chosen because of its entries, candidates were counted in any case.
+        let counted = share == 1 || status.large_levels >> first & 1 != 0 || chosen < first;
+        offsets.retain(|_| counted);
+
         status.level = chosen;
         status.candidates = sizes.entries[chosen as usize] as u32;
         status.entries = tree.p.len() as u32;
@@ -67,7 +76,7 @@ impl Expected {
         for (k, n) in status.levels.iter_mut().enumerate() {
             *n = tree.no.get(k).copied().unwrap_or(status.nodes);
         }
-        Ok(Self { offsets, boxes: options.boxes, status, built: Some(built) })
+        Ok(Self { offsets, shares, boxes: options.boxes, status, built: Some(built) })
     }
 
     /// The tree of the reference implementation, with boxes; `None` if not even the root fits.

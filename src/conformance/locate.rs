@@ -11,6 +11,7 @@ use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
 use crate::primitives::Arena;
+use crate::query::code_bits;
 use crate::query::{
     LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, SILENT, Scene, cmd_locate, cmd_sort_points, locate, locate_all,
 };
@@ -82,7 +83,8 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                 _ => LocateMethod::Descent,
             };
             let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
-            let order = if method.is_sorted() { order_of(&built.tree().grid, points) } else { (0..points.len() as u32).collect() };
+            let order =
+                if method.is_sorted() { order_of(&built.tree().grid, points, code_bits(gpu)) } else { (0..points.len() as u32).collect() };
             let runs = matches!(case.how, How::Runs | How::SortedRuns).then(|| locator.locate_in_runs(points, &order));
             let expected = runs.as_deref().unwrap_or_else(|| twin.locations(&built));
             compare_locations(expected, &found.owners, &found.barycentrics, points)?;

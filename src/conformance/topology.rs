@@ -30,6 +30,7 @@ pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {
     compare_one("build.measure_cells", "status.negative", &counts.negative, &status.negative)?;
     compare_one("build.match_faces", "status.overflow", &0, &status.overflow)?;
     compare("build.match_faces", "neighbours", &expected.neighbours, &found.neighbours()?)?;
+    compare_one("build.match_faces", "status.branched", &counts.branched, &status.branched)?;
     compare("build.find_boundary", "boundary", &expected.boundary, &found.boundary_bits()?)?;
     compare_one("build.find_boundary", "status.boundary", &counts.boundary, &status.boundary)
 }

@@ -10,6 +10,7 @@ mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
+pub(crate) use order::code_bits;
 pub use order::{PointOrder, cmd_sort_points};
 pub use overlap::{OverlapInput, OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};
 pub(crate) use slice::Slicing;

@@ -23,8 +23,19 @@ impl PointOrder {
     /// [`crate::Error::Invalid`] if the arena is too small.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, count: u32) -> Result<Self> {
         let n = u64::from(count);
-        Ok(Self { order: arena.words(n)?, codes: arena.words(n)?, sort: SortScratch::carve(gpu, arena, count, CODE_BITS)? })
+        Ok(Self { order: arena.words(n)?, codes: arena.words(n)?, sort: SortScratch::carve(gpu, arena, count, code_bits(gpu))? })
     }
+}
+
+/// Fewest bits of the Morton code that points are sorted by, which make cells of a few dozen points: one more pass of a
+/// sort takes longer than finer cells save.
+const LEAST_CODE_BITS: u32 = 16;
+
+/// How many bits of the Morton code points are sorted by: all those of as many passes of the device's sort as
+/// [`LEAST_CODE_BITS`] take. 16 on most GPUs, 22 on processors.
+pub(crate) fn code_bits(gpu: &Gpu) -> u32 {
+    let digit = gpu.target().sort.digit_bits.max(1);
+    LEAST_CODE_BITS.next_multiple_of(digit).min(CODE_BITS)
 }
 
 /// Records the sorting of points along the Morton curve over a mesh's `grid` ([`crate::build::MeshArrays::grid`]);
@@ -44,9 +55,10 @@ pub fn cmd_sort_points(r: &mut Recorder<'_>, grid: BufferRef, input: &PointInput
     input.check()?;
     order.check(4 * u64::from(count), "an order of points")?;
     let workgroup = r.gpu().target().query;
+    let code_bits = code_bits(r.gpu());
     r.stage("query.sort_points", |r| {
-        let spec = PointCodesSpec { workgroup, code_bits: CODE_BITS, ..Default::default() };
-        let pairs = Unsorted::place(r.gpu(), (codes, order), CODE_BITS, count, sort);
+        let spec = PointCodesSpec { workgroup, code_bits, ..Default::default() };
+        let pairs = Unsorted::place(r.gpu(), (codes, order), code_bits, count, sort);
         let Unsorted { keys: codes, values: order, .. } = pairs;
         r.dispatch(&PointCodes { grid, points, codes, order, count, stride }, spec, Groups::Count(count.div_ceil(workgroup)))?;
         cmd_sort(r, &pairs, Count::host(count), sort)

@@ -28,6 +28,8 @@ pub struct Counts {
     pub flat: u32,
     /// Crowded vertices; see [`super::corners`].
     pub crowded: u32,
+    /// Faces that more than two valid tetrahedra share, none of which are neighbours there.
+    pub branched: u32,
 }
 
 /// Why a tetrahedron is bad.
@@ -120,7 +122,7 @@ impl Topology {
 /// [`Error::TooLarge`] if the faces of the mesh, or its points, do not fit 32-bit indices.
 pub fn topology(mesh: &Mesh) -> Result<Topology> {
     let Topology { valid, grid, bad, counts, .. } = Topology::bare(mesh)?;
-    let neighbours = neighbours(mesh, &valid);
+    let (neighbours, branched) = neighbours(mesh, &valid);
     let normalised: Vec<_> = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
     let signs: Vec<Signs> = mesh.tets.par_iter().enumerate().map(|(t, &ids)| Signs::new(bit(&valid, t as u32), ids, &normalised)).collect();
     let thin = thin_corners_at(mesh, &normalised, &valid);
@@ -133,6 +135,7 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
         negative: count(|s| s.caller < 0),
         flat: count(|s| s.valid && s.sorted == 0),
         crowded: thin.iter().filter(|&&count| count > MOST_THIN).count() as u32,
+        branched,
         ..counts
     };
     Ok(Topology { neighbours, boundary, valid, grid, counts, bad })
@@ -183,9 +186,9 @@ fn face(ids: [u32; 4], i: usize) -> [u32; 3] {
     face
 }
 
-/// The neighbours across faces. Faces are bucketed by their smallest vertex, and equal faces are matched within a
-/// bucket.
-pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
+/// The neighbours across faces, and the number of faces that more than two tetrahedra share. Faces are bucketed by their
+/// smallest vertex, and equal faces are matched within a bucket.
+pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> (Vec<[u32; 4]>, u32) {
     let faces_of = |t: usize| (0..4).map(move |i| (4 * t + i, face(mesh.tets[t], i)[0] as usize));
     let valid_tets = || (0..mesh.tets.len()).filter(|&t| bit(valid, t as u32));
     let mut ends = vec![0u32; mesh.points.len() + 1];
@@ -202,6 +205,7 @@ pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
         ends[v] += 1;
     }
     let partner: Vec<[AtomicU32; 4]> = mesh.tets.par_iter().map(|_| [NONE; 4].map(AtomicU32::new)).collect();
+    let branched = AtomicU32::new(0);
     let set = |slot: u32, tet: u32| partner[slot as usize / 4][slot as usize % 4].store(tet, Ordering::Relaxed);
     (0..mesh.points.len()).into_par_iter().with_min_len(1024).for_each_init(Vec::new, |bucket, v| {
         let begin = if v == 0 { 0 } else { ends[v - 1] };
@@ -213,13 +217,17 @@ pub(crate) fn neighbours(mesh: &Mesh, valid: &[u32]) -> Vec<[u32; 4]> {
         bucket.extend(slots[begin as usize..ends[v] as usize].iter().map(key));
         bucket.sort_unstable();
         for same in bucket.chunk_by(|a, b| (a.0, a.1) == (b.0, b.1)) {
-            if let [a, b] = same {
-                set(a.2, b.2 / 4);
-                set(b.2, a.2 / 4);
+            match same {
+                [_] => {}
+                [a, b] => {
+                    set(a.2, b.2 / 4);
+                    set(b.2, a.2 / 4);
+                }
+                _ => _ = branched.fetch_add(1, Ordering::Relaxed),
             }
         }
     });
-    partner.into_par_iter().map(|p| p.map(AtomicU32::into_inner)).collect()
+    (partner.into_par_iter().map(|p| p.map(AtomicU32::into_inner)).collect(), branched.into_inner())
 }
 
 /// Signs of a tetrahedron's volume; 0 for bad tetrahedra.

@@ -13,6 +13,9 @@ use rayon::prelude::*;
 /// Number of levels, and of values of `α_P`.
 const LEVELS: usize = MAX_LEVEL as usize + 1;
 
+/// Most candidates of a share: where candidates are tested, those of one tetrahedron are taken in shares.
+pub const SHARE: u32 = 32;
+
 /// What one pass over the tetrahedra gathers: enough to choose a level, and to bound the size of the tree at every
 /// level.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -21,6 +24,8 @@ pub struct Sizes {
     pub histogram: [u64; LEVELS],
     /// `n_m(l)`: number of entries of the assignment `Aabb` at each level; an upper bound for the other assignments.
     pub entries: [u64; LEVELS],
+    /// Bit k: on level k, some tetrahedron has more than [`SHARE`] such entries.
+    pub large_levels: u32,
 }
 
 /// `α_P`: integer log2 of the longest side of the bounding box in finest cells (Eq. 11); 0 for a length of 0.
@@ -44,6 +49,7 @@ pub fn measure(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Sizes {
                 let shift = LEVELS - 1 - level;
                 let [x, y, z] = per_axis(|c| u64::from((finest.hi[c] >> shift) - (finest.lo[c] >> shift) + 1));
                 *entries += x * y * z;
+                sizes.large_levels |= u32::from(x * y * z > u64::from(SHARE)) << level;
             }
         }
         sizes
@@ -53,6 +59,7 @@ pub fn measure(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Sizes {
 
 impl Sizes {
     fn sum(mut self, other: Self) -> Self {
+        self.large_levels |= other.large_levels;
         for level in 0..LEVELS {
             self.histogram[level] += other.histogram[level];
             self.entries[level] += other.entries[level];

@@ -21,13 +21,14 @@ pub const LIST_PART: u32 = 16_384;
 /// Most points that are sorted and located together.
 pub const CHUNK: usize = 1 << 20;
 
-/// Number of leading bits of the Morton code that points are sorted by; the sort takes two passes over them.
+/// Most leading bits of the Morton code that points are sorted by.
 pub const CODE_BITS: u32 = 22;
 
-/// The order of points along the Morton curve, as [`crate::query::cmd_sort_points`] computes it. Points too far outside
-/// the bounds for any mesh come last.
-pub fn order_of(grid: &Grid, points: &[[f32; 3]]) -> Vec<u32> {
-    let code = |p: [f32; 3]| place(grid, p).map_or(NONE, |(cell, _)| morton(cell)) >> (3 * MAX_LEVEL - CODE_BITS) & ((1 << CODE_BITS) - 1);
+/// The order of points along the Morton curve, as [`crate::query::cmd_sort_points`] computes it with this many leading
+/// bits of the code, at most [`CODE_BITS`]. Points too far outside the bounds for any mesh come last.
+pub fn order_of(grid: &Grid, points: &[[f32; 3]], bits: u32) -> Vec<u32> {
+    let bits = bits.min(CODE_BITS);
+    let code = |p: [f32; 3]| place(grid, p).map_or(NONE, |(cell, _)| morton(cell)) >> (3 * MAX_LEVEL - bits) & ((1 << bits) - 1);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     order.sort_by_cached_key(|&i| code(points[i as usize]));
     order

@@ -153,9 +153,10 @@ fn bad_cells_are_named_and_left_out() {
 fn identical_cells_and_crowded_faces_have_no_neighbours() {
     let (_, topology) = named("identical-1000");
     assert!(topology.neighbours.iter().all(|n| *n == [NONE; 4]));
-    assert_eq!(topology.counts.boundary, 1000);
+    assert_eq!((topology.counts.boundary, topology.counts.branched), (1000, 4));
     let (_, topology) = named("three-on-a-face");
     assert!(topology.neighbours.iter().all(|n| *n == [NONE; 4]));
+    assert_eq!(topology.counts.branched, 1);
     // Two equal tetrahedra share all four faces, each of which is a fold.
     let (_, topology) = prepared(Mesh::new(named("single").0.points, vec![[0, 1, 2, 3], [3, 2, 0, 1]]));
     assert_eq!(topology.neighbours, [[1; 4], [0; 4]]);

@@ -88,7 +88,7 @@ fn same_owners(name: &str, mesh: Mesh, n: usize) -> (u32, u32) {
         let (all, walking) = (Locator::new(&mesh, &topology, &all), Locator::new(&mesh, &topology, &tree));
         let some = &points[..if alpha > 1.0 { n / 10 } else { n }];
         let expected = all.locate_each(some);
-        for order in [(0..some.len() as u32).collect(), order_of(&topology.grid, some)] {
+        for order in [(0..some.len() as u32).collect(), order_of(&topology.grid, some, 16), order_of(&topology.grid, some, 22)] {
             for locator in [&all, &walking] {
                 assert!(locator.locate_in_runs(some, &order) == expected, "{name} α {alpha} {assign}: runs");
             }

@@ -75,6 +75,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "negative_cells": s.counts.negative,
         "flat_cells": s.counts.flat,
         "crowded_points": s.counts.crowded,
+        "branched_faces": s.counts.branched,
         "tangled_cells": loaded.report.tangled,
         "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
         "bounds": { "min": lo, "max": hi },
@@ -136,6 +137,9 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, s: &Summary) {
     page.row("flat cells", grouped(counts.flat));
     if counts.crowded > 0 {
         page.row("crowded points", format_args!("{}, whose many cells count as boundary", grouped(counts.crowded)));
+    }
+    if counts.branched > 0 {
+        page.row("branched faces", format_args!("{}, each of more than two cells, which overlap there", grouped(counts.branched)));
     }
     if report.tangled > 0 {
         page.row("tangled cells", format_args!("{}, whose pieces overlap", grouped(report.tangled)));

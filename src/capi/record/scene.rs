@@ -113,8 +113,8 @@ pub struct OlbvhBuildStatus {
     pub boundary_leaves: u32,
     /// Number of entries of the longest leaf, for `olbvh_plan.longest_leaf`.
     pub longest_leaf: u32,
-    /// Unused.
-    pub pad: u32,
+    /// Bit k: on level k, some tetrahedron has more than 32 candidates.
+    pub large_levels: u32,
     /// Sum of the estimates from which the level by alpha follows, lower word first.
     pub sum: [u32; 2],
     /// Number of candidates on every level from 0 to 10, two words each, lower word first.
@@ -147,6 +147,8 @@ pub struct OlbvhMeshStatus {
     pub crowded: u32,
     /// Not 0: the table of faces is full, as it can be beyond 429 million tetrahedra only. The tree must not be used.
     pub overflow: u32,
+    /// Number of faces that more than two tetrahedra share, none of which are neighbours there.
+    pub branched: u32,
 }
 
 /// A plan with its defaults resolved.

@@ -131,9 +131,9 @@ fn statuses_have_the_layout_of_the_device() {
             $(assert_eq!(offset_of!($header, $field), offset_of!($device, $field), stringify!($field));)*
         };
     }
-    same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow);
+    same!(OlbvhMeshStatus, MeshStatus: lo hi bad boundary zero_volume negative crowded overflow branched);
     same!(OlbvhBuildStatus, BuildStatus: level wanted_level candidates entries nodes internal leaves boundary_leaves longest_leaf
-        pad sum total levels overflow);
+        large_levels sum total levels overflow);
 }
 
 #[test]

@@ -153,7 +153,7 @@ impl<'a> CpuTree<'a> {
         for chunk in points.chunks(locate::CHUNK) {
             let found = match options.method {
                 LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
-                LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk)),
+                LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk, locate::CODE_BITS)),
                 LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => locator.locate_each(chunk),
             };
             all.owners.extend(found.iter().map(|l| l.owner));

@@ -70,6 +70,7 @@ impl Engine for Device {
                 negative: cells.negative,
                 flat: cells.zero_volume,
                 crowded: cells.crowded,
+                branched: cells.branched,
             },
             bad: bad.into_iter().filter_map(|t| Some((t, fault_of(mesh, t)?))).collect(),
             bounds: tree.grid().into(),
