@@ -46,24 +46,33 @@ bool touched(Grid g, uint begin, uint end, uint code) {
     return false;
 }
 
-// The octants that the entries of a leaf are near; all octants for lists longer than MAX_LIST_FOR_OCTANTS.
-uint octants(Grid g, uint begin, uint end) {
-    if (end - begin > MAX_LIST_FOR_OCTANTS) return ALL_OCTANTS;
+// The octants that the entries of a leaf are near, for every invocation that `asks`. The whole subgroup takes one list
+// after the other, so that a long list does not become a long loop.
+uint octants(Grid g, bool asks, uint begin, uint end) {
     uint mask = 0u;
-    for (uint i = begin; i < end && mask != ALL_OCTANTS; ++i) {
-        mask |= octants_near(g, p.at[i]);
+    while (subgroupAny(asks)) {
+        bool turn = gl_SubgroupInvocationID == subgroupMin(asks ? gl_SubgroupInvocationID : NONE);
+        uint first = subgroupMax(turn ? begin : 0u), last = subgroupMax(turn ? end : 0u), near = 0u;
+        for (; first < last && near != ALL_OCTANTS; first += gl_SubgroupSize) {
+            uint i = first + gl_SubgroupInvocationID;
+            near = subgroupOr(near | (i < last ? octants_near(g, p.at[i]) : 0u));
+        }
+        if (turn) mask = near;
+        asks = asks && !turn;
     }
     return mask;
 }
 
 void main() {
     uint i = item_index();
-    uint entries = 0u, flagged = 0u;
-    if (i < status.at[0].leaves && status.at[0].overflow == 0u) {
-        uint node = status.at[0].internal + i;
-        uint begin = po.at[i], end = po.at[i + 1u];
+    uint entries = 0u, flagged = 0u, node = 0u, begin = 0u, end = 0u;
+    Grid g = grid.at[0];
+    bool is_leaf = i < status.at[0].leaves && status.at[0].overflow == 0u;
+    if (is_leaf) {
+        node = status.at[0].internal + i;
+        begin = po.at[i];
+        end = po.at[i + 1u];
         entries = end - begin;
-        Grid g = grid.at[0];
         bool flag;
         if (MARKED != 0u) {
             flag = entries > 0u && is_marked(g.level, unmorton(codes.at[end - 1u]));
@@ -75,8 +84,6 @@ void main() {
             atomicOr(flags.at[node >> 5u], 1u << (node & 31u));
             flagged = 1u;
         }
-        uint mask = g.ids != NONE && flagged != 0u ? octants(g, begin, end) : entries > 0u ? ALL_OCTANTS : 0u;
-        atomicOr(masks.at[node >> 2u], mask << (8u * (node & 3u)));
         if (BOXES != 0u) {
             vec3 lo, hi;
             cell_box(g, g.level, end == 0u ? 0u : codes.at[end - 1u], lo, hi);
@@ -86,6 +93,11 @@ void main() {
             }
         }
     }
+    // All octants where entries have no quarters, in leaves within the mesh, and for very long lists.
+    bool asks = g.ids != NONE && flagged != 0u && entries <= MAX_LIST_FOR_OCTANTS;
+    uint mask = octants(g, asks, begin, end);
+    if (!asks && entries > 0u) mask = ALL_OCTANTS;
+    if (is_leaf) atomicOr(masks.at[node >> 2u], mask << (8u * (node & 3u)));
     entries = subgroupMax(entries);
     flagged = subgroupAdd(flagged);
     if (subgroupElect()) {
