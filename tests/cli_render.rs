@@ -79,6 +79,26 @@ fn a_legend_stands_beside_the_mesh() {
     picture("narrow.png", &["--size", "210x1500", "--legend"]);
 }
 
+/// The edges of a solid block's bounds are those of the block: the box changes only pixels there, and few beside it.
+#[test]
+fn a_box_lies_around_the_mesh() {
+    let folder = TempDir::new().unwrap();
+    let picture = |name: &str, more: &[&str]| {
+        let red =
+            ["--tf", "grey", "--no-shading", "--opacity", "1", "--background", "#ff0000", "--size", "120x90", "--camera", "iso,fov=50"];
+        json(folder.path(), &[&["render", "kuhn:5,4,3", "-o", name, "--device", "cpu"], &red[..], more].concat());
+        pixels(&folder.path().join(name)).1
+    };
+    let (plain, boxed) = (picture("plain.png", &[]), picture("box.png", &["--box"]));
+    let red = |i: usize| plain[i][..3] == [255, 0, 0];
+    let changed: Vec<usize> = (0..plain.len()).filter(|&i| plain[i] != boxed[i]).collect();
+    let inside = changed.iter().filter(|&&i| !red(i)).count();
+    // Nine edges are seen, three of them within the block's outline.
+    assert!(inside > 100 && changed.len() < 900, "{inside} of {} changed pixels on the block", changed.len());
+    let around = |i: usize| (0..25).map(move |k| i + 120 * (k / 5) + k % 5 - 242);
+    assert!(changed.iter().all(|&i| around(i).any(|j| !red(j))), "lines lie on the block's outline, or less than three pixels beside it");
+}
+
 /// A pixel is the mean of its rays: of black and white ones, as the mesh is seen or the background.
 #[test]
 fn rays_of_a_pixel_are_averaged() {

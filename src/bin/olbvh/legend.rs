@@ -89,12 +89,20 @@ impl Legend {
     }
 }
 
+/// The colour of lines and letters in a picture of this height: black or white, whichever is seen on the background.
+pub fn ink(background: &Background, height: u32) -> [f32; 4] {
+    let [r, g, b, alpha] = background.pixel([0.0; 4], height / 2, height).map(f32::from);
+    let dark = alpha > 0.0 && 0.3 * r + 0.6 * g + 0.1 * b < 110.0;
+    let shade = if dark { 1.0 } else { 0.0 };
+    [shade, shade, shade, 1.0]
+}
+
 /// The strip while it is drawn.
 struct Ink<'a> {
     legend: &'a Legend,
     background: &'a Background,
     pixels: Vec<u8>,
-    /// Colour of text: black or white, whichever is seen on the background.
+    /// Colour of text.
     colour: [f32; 4],
 }
 
@@ -102,10 +110,7 @@ impl<'a> Ink<'a> {
     fn new(legend: &'a Legend, background: &'a Background) -> Self {
         let (width, height) = (legend.width(), legend.size[1]);
         let pixels = (0..height).flat_map(|y| (0..width).flat_map(move |_| background.pixel([0.0; 4], y, height))).collect();
-        let [r, g, b, alpha] = background.pixel([0.0; 4], height / 2, height).map(f32::from);
-        let dark = alpha > 0.0 && 0.3 * r + 0.6 * g + 0.1 * b < 110.0;
-        let shade = if dark { 1.0 } else { 0.0 };
-        Self { legend, background, pixels, colour: [shade, shade, shade, 1.0] }
+        Self { legend, background, pixels, colour: ink(background, height) }
     }
 
     /// Sets a pixel to a colour of this opacity (straight alpha) over the background.

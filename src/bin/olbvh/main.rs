@@ -7,6 +7,7 @@ mod common;
 mod conformance;
 mod devices;
 mod engine;
+mod frame;
 mod info;
 mod input;
 mod legend;

@@ -3,6 +3,7 @@
 use crate::arguments::{message, named, range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
+use crate::frame;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
@@ -12,11 +13,12 @@ use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::Fineness;
+use olbvh::reference::boundary::valid_grid;
 use olbvh::render::camera::{CameraSpec, HELP};
 use olbvh::render::clip;
 use olbvh::render::maps::MAPS;
 use olbvh::render::settings::MAX_SIZE;
-use olbvh::render::{Background, Clip, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
+use olbvh::render::{Background, Bounds, Clip, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -27,7 +29,7 @@ Examples:
   olbvh render bracket.vtu -o hot.png --field temperature --tf inferno --background black
   olbvh render bracket.vtu -o top.png --camera top,ortho --size 1600x900 --supersample 2
   olbvh render bracket.vtu -o part.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   some of the values
-  olbvh render bracket.vtu -o iso.png --iso 40,55,70 --opacity 0.5   three translucent iso-surfaces
+  olbvh render bracket.vtu -o iso.png --iso 40,55,70 --opacity 0.5 --box   three translucent iso-surfaces
   olbvh render bracket.vtu -o half.png --clip view --opacity 1       the half near the viewer cut away
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
@@ -92,6 +94,9 @@ pub struct Args {
     /// Show at the right which colour stands for which value, beside the mesh, which takes less of the picture then.
     #[arg(long)]
     legend: bool,
+    /// Draw the edges of the mesh's bounds, which show where in the mesh iso-surfaces lie, or what clips leave.
+    #[arg(long = "box")]
+    bounds: bool,
     /// Show colours without lighting.
     #[arg(long)]
     no_shading: bool,
@@ -147,8 +152,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "rendering");
     let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
     let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
-    let Picture { rendered, plan, range: [lo, hi] } = picture;
-    let (pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
+    let Picture { mut rendered, plan, range: [lo, hi] } = picture;
+    let (mut pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     let [width, height] = settings.size.map(|rays| rays / args.supersample);
@@ -159,6 +164,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         } else {
             "the picture is empty: the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)"
         });
+    }
+    if args.bounds {
+        let bounds = Bounds::from(&valid_grid(&loaded.mesh));
+        frame::draw(&mut rendered.colors, &plan, &bounds, args.supersample);
+        pixels = plan.pixels(&rendered.colors, args.supersample);
     }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
         common.remark(format_args!(
