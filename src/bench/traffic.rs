@@ -15,9 +15,9 @@
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
 //! | `mesh.boundary` | cells 16 t, vertices 16 p; faces, mates and neighbours, each 16 t written and read |
 //! | `build.depth` | cells 16 t, points 12 p |
-//! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan |
-//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
-//! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t (of shares 8 s), codes and ids 8 n |
+//! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; nothing where every tetrahedron has one share |
+//! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
+//! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and places of shares 8 s, codes and ids 8 n |
 //! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after odd passes 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
@@ -43,9 +43,11 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let level = status.level;
     let cells_and_vertices = 16 * t + 16 * p;
     let filtered = filtered(options);
+    let counted = !filtered || status.large_levels >> level & 1 != 0;
+    let offsets = if counted { 4 * t } else { 0 };
     let shares = t.max(u64::from(status.candidates / SHARE));
     let marks = if options.lists == Lists::Boundary { 8u64.pow(level).div_ceil(8) } else { 0 };
-    let filter = cells_and_vertices + 4 * t + 8 * shares + SCAN * shares + 3 * marks;
+    let filter = cells_and_vertices + offsets + 8 * shares + SCAN * shares + 3 * marks;
     let (passes, digit_bits) = target.sort.passes(3 * level);
     let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
     let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
@@ -60,9 +62,9 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
         ("mesh.faces", 4 * 16 * t),
         ("mesh.boundary", 3 * 16 * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
-        ("build.count", cells_and_vertices + 4 * t + SCAN * t),
+        ("build.count", if counted { cells_and_vertices + 4 * t + SCAN * t } else { 0 }),
         ("build.filter", if filtered { filter } else { 0 }),
-        ("build.emit", cells_and_vertices + 4 * t + if filtered { 8 * shares } else { 0 } + 8 * n),
+        ("build.emit", cells_and_vertices + offsets + if filtered { 8 * shares } else { 0 } + 8 * n),
         ("build.sort", sort),
         ("build.count_splits", 4 * n + (4 + SCAN) * runs),
         ("build.splits", 4 * n + 4 * runs + 4 * leaves + 4 * internal + nodes / 8 + nodes),
