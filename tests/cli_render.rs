@@ -175,6 +175,21 @@ fn info_tells_mesh_and_tree() {
     }
 }
 
+/// A face of three cells; any device and the CPU count it.
+#[test]
+fn info_counts_faces_of_more_than_two_cells() {
+    let folder = TempDir::new().unwrap();
+    let mesh = "# vtk DataFile Version 3.0\nthree cells on a face\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 6 float\n\
+        0 0 0 1 0 0 0 1 0 0 0 1 1 1 1 0.5 0.5 3\nCELLS 3 15\n4 0 1 2 3\n4 4 1 3 2\n4 5 1 2 3\nCELL_TYPES 3\n10 10 10\n";
+    std::fs::write(folder.path().join("three.vtk"), mesh).unwrap();
+    for device in [&["--device", "cpu"][..], &[]] {
+        let arguments = [&["info", "three.vtk"], device].concat();
+        assert_eq!(json(folder.path(), &arguments)["branched_faces"], 1);
+        let page = olbvh(folder.path(), &arguments);
+        assert!(text(&page.stdout).contains("branched faces"), "{}", text(&page.stdout));
+    }
+}
+
 #[test]
 fn locate_finds_points_and_values() {
     let folder = TempDir::new().unwrap();

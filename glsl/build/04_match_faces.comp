@@ -3,7 +3,8 @@
 // for first in the slots near the place of its middle vertex, which its neighbours in the file have just used, so that
 // this memory is likely to be cached; then anywhere in the table. (The smallest vertex of a face would not do: a vertex
 // before all its neighbours is that of all its faces, which its slots cannot hold.) mates[face] receives the other face
-// (see mates.glsl). The result does not depend on the order of arrival, since the words of `mates` only grow.
+// (see mates.glsl). The result does not depend on the order of arrival: only the second face of a pair writes mates, those
+// of both, and where there are more than two, none becomes a neighbour, whichever is second.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/mates.glsl"

@@ -34,8 +34,12 @@ bool is_crowded(uvec4 v) { return max(max(thin.at[v.x], thin.at[v.y]), max(thin.
 uvec4 neighbours_of(uint t) {
     uvec4 held = neighbours.at[t], across;
     for (uint f = 0u; f < 4u; ++f) {
-        if (MATES != 0u) across[f] = held[f] == ALONE || is_branched(4u * t + f) || is_branched(face_of_mate(held[f])) ? NONE : face_of_mate(held[f]) >> 2;
-        else across[f] = held[f] == NONE || is_bad(t) || is_bad(held[f]) ? NONE : held[f];
+        if (MATES != 0u) {
+            uint other = face_of_mate(held[f]);
+            across[f] = held[f] == ALONE || is_branched(4u * t + f) || is_branched(other) ? NONE : other >> 2;
+        } else {
+            across[f] = held[f] == NONE || is_bad(t) || is_bad(held[f]) ? NONE : held[f];
+        }
     }
     if (MATES != 0u || across != held) neighbours.at[t] = across;
     return across;

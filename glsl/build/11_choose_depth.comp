@@ -15,7 +15,7 @@ ARGUMENTS(6)
     uint deepest;  // deepest level allowed
     uint budget[2]; // most words of all arrays, low word first
     uint box_words; // words of a box, per node
-    uint shared_out; // not 0: candidates are counted in shares
+    uint in_shares; // not 0: candidates are counted in shares
     uint marked;     // not 0: the dispatch also clears the marks of the level
 END_ARGUMENTS
 BUFFER(0, readonly, MeshStatus, mesh)
@@ -83,7 +83,7 @@ void main() {
     status.at[0].candidates = n;
     grid.at[0].level = level;
     candidates.at[0] = n;
-    bool single = shared_out != 0u && (status.at[0].large_levels >> level & 1u) == 0u;
+    bool single = in_shares != 0u && (status.at[0].large_levels >> level & 1u) == 0u;
     uint counts = single ? 1u : tets + 1u;
     live.at[0] = counts;
     write_groups(0u, max(counts, marked == 0u ? 0u : cell_words(level)), EACH);

@@ -6,7 +6,7 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint ASSIGN = 0;
-layout(constant_id = 4) const uint TETS = 32; // per invocation: 32 where there are few, one where there are thousands
+layout(constant_id = 4) const uint TETS = 32; // per invocation: 32 where there are few, 8 where there are thousands
 ARGUMENTS(8)
     uint tets;
     uint capacity; // most shares

@@ -21,7 +21,7 @@ const SUMMING_GROUPS: u32 = 1024;
 const SUMMING_ROWS: u32 = 512;
 
 /// Tetrahedra of one invocation of the kernels that look at neighbours. Few, so that the workgroups at work at a time,
-/// which start in order, are close together in the mesh and find in caches what others have used (H100: 3.1 → 1.7 ms for
+/// which start in order, are close together in the mesh and find in caches what others have used (H100: 3.1 → 1.8 ms for
 /// the faces of 12 million tetrahedra); more than one, since processors take time for every workgroup.
 const MATCHING_ROWS: u32 = 4;
 

@@ -71,7 +71,7 @@ impl Build<'_> {
                 deepest,
                 budget,
                 box_words,
-                shared_out: u32::from(filtered(options)),
+                in_shares: u32::from(filtered(options)),
                 marked: u32::from(self.marks().is_some()),
             };
             r.dispatch(&choose, once, Groups::Count(1))?;

@@ -139,7 +139,7 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, s: &Summary) {
         page.row("crowded points", format_args!("{}, whose many cells count as boundary", grouped(counts.crowded)));
     }
     if counts.branched > 0 {
-        page.row("branched faces", format_args!("{}, each of more than two cells, which overlap there", grouped(counts.branched)));
+        page.row("branched faces", format_args!("{}, each of more than two cells, some of which overlap", grouped(counts.branched)));
     }
     if report.tangled > 0 {
         page.row("tangled cells", format_args!("{}, whose pieces overlap", grouped(report.tangled)));

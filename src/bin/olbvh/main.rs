@@ -3,11 +3,11 @@
 
 mod arguments;
 mod bench;
+mod bounding_box;
 mod common;
 mod conformance;
 mod devices;
 mod engine;
-mod frame;
 mod info;
 mod input;
 mod legend;

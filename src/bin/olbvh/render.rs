@@ -1,9 +1,9 @@
 //! The subcommand `olbvh render`.
 
 use crate::arguments::{message, named, range, vector};
+use crate::bounding_box;
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
-use crate::frame;
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
@@ -167,7 +167,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     if args.bounds {
         let bounds = Bounds::from(&valid_grid(&loaded.mesh));
-        frame::draw(&mut rendered.colors, &plan, &bounds, args.supersample);
+        bounding_box::draw(&mut rendered.colors, &plan, &bounds, args.supersample);
         pixels = plan.pixels(&rendered.colors, args.supersample);
     }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {

@@ -149,7 +149,7 @@ impl<'a> CpuTree<'a> {
     fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: OnProgress<'_>) -> Located {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Located::default();
-        // Chunks and runs are those of the device, so that owners are equal even where tetrahedra overlap.
+        // Chunks and runs are those of a device (sorted ones, those of a processor), so that owners are equal even where tetrahedra overlap.
         for chunk in points.chunks(locate::CHUNK) {
             let found = match options.method {
                 LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
