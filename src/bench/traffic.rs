@@ -15,7 +15,7 @@
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
 //! | `mesh.boundary` | cells 16 t, vertices 16 p; faces, mates and neighbours, each 16 t written and read |
 //! | `build.depth` | cells 16 t, points 12 p |
-//! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; nothing where every tetrahedron has one share |
+//! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; only a number where every tetrahedron has one share |
 //! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and places of shares 8 s, codes and ids 8 n |
 //! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after odd passes 16 n |
@@ -62,7 +62,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
         ("mesh.faces", 4 * 16 * t),
         ("mesh.boundary", 3 * 16 * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
-        ("build.count", if counted { cells_and_vertices + 4 * t + SCAN * t } else { 0 }),
+        ("build.count", if counted { cells_and_vertices + 4 * t + SCAN * t } else { SCAN }),
         ("build.filter", if filtered { filter } else { 0 }),
         ("build.emit", cells_and_vertices + offsets + if filtered { 8 * shares } else { 0 } + 8 * n),
         ("build.sort", sort),
