@@ -216,6 +216,36 @@ fn locate_finds_points_and_values() {
     assert_eq!(table("a.csv", &[]), table("b.csv", &["--coherent"]));
 }
 
+/// Fields by name, all of them, or the first one, which is called `value`.
+#[test]
+fn locate_interpolates_any_number_of_fields() {
+    let folder = TempDir::new().unwrap();
+    let mesh = "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n\
+                4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nVECTORS v float\n0 3 4 0 3 4 0 3 4 0 3 4\nSCALARS owner float 1\nLOOKUP_TABLE default\n\
+                2 2 2 2\nCELL_DATA 1\nSCALARS region float 1\nLOOKUP_TABLE default\n7\n";
+    std::fs::write(folder.path().join("one.vtk"), mesh).unwrap();
+    std::fs::write(folder.path().join("p.csv"), "0.25,0.25,0.25\n5,5,5\n").unwrap();
+    for device in [&["--device", "cpu"][..], &[]] {
+        for (more, header, first) in [
+            (&[][..], "value", "5"),
+            (&["--field", "v.z"], "value", "4"),
+            (&["--field", "region", "--field", "v"], "region,v", "7,5"),
+            (&["--all-fields"], "v,v.x,v.y,v.z,owner_,region", "5,0,3,4,2,7"),
+        ] {
+            let result = json(folder.path(), &[&["locate", "one.vtk", "p.csv", "-o", "o.csv"], device, more].concat());
+            let table = std::fs::read_to_string(folder.path().join("o.csv")).unwrap();
+            let without_coordinates = |line: &str| {
+                line.split(',').enumerate().filter(|(i, _)| !(4..8).contains(i)).map(|(_, c)| c.to_owned()).collect::<Vec<_>>().join(",")
+            };
+            let nan = vec!["NaN"; first.split(',').count()].join(",");
+            let wanted = [format!("x,y,z,owner,{header}"), format!("0.25,0.25,0.25,0,{first}"), format!("5,5,5,4294967295,{nan}")];
+            assert_eq!(table.lines().map(without_coordinates).collect::<Vec<_>>(), wanted, "{more:?}");
+            assert_eq!(result["fields"].as_array().unwrap().len(), first.split(',').count());
+        }
+    }
+    fails(folder.path(), 2, &["locate", "one.vtk", "p.csv", "-o", "o.csv", "--field", "v", "--field", "w", "--device", "cpu"]);
+}
+
 /// `-` stands for standard input and output; they carry what the files would, and nothing else.
 #[test]
 fn results_go_to_standard_output() {

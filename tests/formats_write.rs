@@ -210,7 +210,7 @@ fn located_points() {
     let folder = tempfile::tempdir().unwrap();
     let points = [[0.5, 1.5, 2.5], [9.0, 9.0, 9.0]];
     let bary = [[0.25f32, 0.25, 0.25, 0.25], [f32::NAN; 4]];
-    let located = Located { points: &points, owner: &[7, u32::MAX], bary: &bary, value: Some(&[1.5, f32::NAN]) };
+    let located = Located { points: &points, owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![1.5, f32::NAN])] };
     for ending in ["npy", "npz", "csv", "vtu", "json"] {
         write_located(folder.path().join(format!("out.{ending}")), &located).unwrap();
     }
@@ -223,7 +223,7 @@ fn located_points() {
     assert_eq!((&data[..4], &data[20..24], &data[24..28]), (&7u32.to_le_bytes()[..], &1.5f32.to_le_bytes()[..], &[255u8; 4][..]));
     assert_eq!(
         String::from_utf8(read("csv")).unwrap(),
-        "owner,b0,b1,b2,b3,value\n7,0.25,0.25,0.25,0.25,1.5\n4294967295,NaN,NaN,NaN,NaN,NaN\n"
+        "x,y,z,owner,b0,b1,b2,b3,value\n0.5,1.5,2.5,7,0.25,0.25,0.25,0.25,1.5\n9,9,9,4294967295,NaN,NaN,NaN,NaN,NaN\n"
     );
     let json: serde_json::Value = serde_json::from_slice(&read("json")).unwrap();
     assert_eq!((&json["owner"][0], &json["value"][0], &json["value"][1]), (&7.into(), &1.5.into(), &serde_json::Value::Null));
@@ -248,12 +248,48 @@ fn located_points_as_json() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.json");
     let bary = [[0.4f32, 0.1, 1e-9, 0.5], [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0]];
-    let located = Located { points: &[[0.0; 3]; 2], owner: &[7, u32::MAX], bary: &bary, value: Some(&[16_777_216.0, 1.1]) };
+    let located =
+        Located { points: &[[0.0; 3]; 2], owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![16_777_216.0, 1.1])] };
     write_located(&path, &located).unwrap();
     let wanted = r#"{"owner":[7,4294967295],"bary":[[0.4,0.1,1e-9,0.5],[null,null,null,-0.0]],"value":[16777216.0,1.1]}"#;
     assert_eq!(std::fs::read_to_string(&path).unwrap(), format!("{wanted}\n"));
-    write_located(&path, &Located { value: None, ..located }).unwrap();
-    assert!(std::fs::read_to_string(&path).unwrap().ends_with(",\"value\":null}\n"));
+}
+
+/// Fields have columns with their names, whatever characters these have.
+#[test]
+fn located_values_of_several_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let names = ["Δ 'p'", "a,\"b\"\n", "c<d>"];
+    let values = names.map(|name| (name.to_owned(), vec![0.5]));
+    let located = Located { points: &[[1.0, 2.0, 3.0]], owner: &[7], bary: &[[0.25; 4]], values: &values };
+    let read = |ending: &str| {
+        let path = folder.path().join(format!("out.{ending}"));
+        write_located(&path, &located).unwrap();
+        std::fs::read(path).unwrap()
+    };
+    let table = String::from_utf8(read("csv")).unwrap();
+    assert_eq!(table, "x,y,z,owner,b0,b1,b2,b3,Δ 'p',\"a,\"\"b\"\"\n\",c<d>\n1,2,3,7,0.25,0.25,0.25,0.25,0.5,0.5,0.5\n");
+    let records = read("npy");
+    let (header, data) = split_npy(&records);
+    let wanted = r#"('\U00000394 \U00000027p\U00000027', '<f4'), ('a,"b"\U0000000a', '<f4'), ('c<d>', '<f4')]"#;
+    assert!(header.contains(wanted) && data.len() == 32, "{header}");
+    let json: serde_json::Value = serde_json::from_slice(&read("json")).unwrap();
+    assert!(names.iter().all(|name| json[name][0] == 0.5), "{json}");
+    let mut zip = zip::ZipArchive::new(std::io::Cursor::new(read("npz"))).unwrap();
+    assert!(names.iter().all(|name| zip.by_name(&format!("{name}.npy")).is_ok()));
+    assert!(String::from_utf8_lossy(&read("vtu")).contains("Name=\"c&lt;d&gt;\""));
+    for name in ["owner", names[0]] {
+        let twice = [values[0].clone(), (name.to_owned(), vec![0.5])];
+        let refused = write_located(folder.path().join("no.csv"), &Located { values: &twice, ..located });
+        assert!(matches!(refused, Err(Error::Invalid(m)) if m.contains(name)));
+    }
+    // Names too long for version 1 of the format.
+    let long = [("n".repeat(70_000), vec![0.5])];
+    let path = folder.path().join("long.npy");
+    write_located(&path, &Located { values: &long, ..located }).unwrap();
+    let bytes = std::fs::read(path).unwrap();
+    let length = u32::from_le_bytes(bytes[8..12].try_into().unwrap()) as usize;
+    assert!(bytes[6] == 2 && (12 + length).is_multiple_of(64) && bytes.len() == 12 + length + 24, "{length}");
 }
 
 const GRID: SliceGrid = SliceGrid {

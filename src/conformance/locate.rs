@@ -107,7 +107,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                 };
                 let found = locate(device, &tree, points, Some((&field.values, on)), &LocateOptions::default(), SILENT)?;
                 let near = |a: f32, b: f32| (a.is_nan() && b.is_nan()) || (a - b).abs() <= 4096.0 * 1e-6;
-                let values: Vec<f32> = twin.locations(&built).iter().map(|e| locator.value(&field, e)).collect();
+                let values: Vec<f32> = twin.locations(&built).iter().map(|e| e.value(mesh, &field)).collect();
                 if let Some(i) = (0..points.len()).find(|&i| !found.values.get(i).is_some_and(|v| near(*v, values[i]))) {
                     return Err(fail(
                         "query.interpolate",

@@ -13,16 +13,24 @@ pub(crate) fn header(descr: &str, shape: &[usize]) -> Vec<u8> {
     let shape: Vec<String> = shape.iter().map(usize::to_string).collect();
     let comma = if shape.len() == 1 { "," } else { "" };
     let mut text = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': ({}{comma}), }}", shape.join(", "));
-    let length = (10 + text.len() + 1).next_multiple_of(64) - 10;
-    while text.len() + 1 < length {
-        text.push(' ');
-    }
+    let whole = (12 + text.len() + 1).next_multiple_of(64);
+    // Version 2 differs by four bytes of length instead of two; readers that know only version 1 read all but the longest.
+    let start = if u16::try_from(whole - 10).is_ok() { 10 } else { 12 };
+    let length = whole - start;
+    text.extend(std::iter::repeat_n(' ', length - 1 - text.len()));
     text.push('\n');
     let mut out = MAGIC.to_vec();
-    out.extend([1, 0]);
-    out.extend((length as u16).to_le_bytes());
+    out.extend([if start == 10 { 1 } else { 2 }, 0]);
+    out.extend(&(length as u32).to_le_bytes()[..start - 8]);
     out.extend(text.as_bytes());
     out
+}
+
+/// A text as a Python literal, in ASCII.
+pub(crate) fn literal(text: &str) -> String {
+    let plain = |c: char| (c.is_ascii_graphic() || c == ' ') && !"'\\".contains(c);
+    let escaped = text.chars().map(|c| if plain(c) { c.to_string() } else { format!("\\U{:08x}", u32::from(c)) });
+    format!("'{}'", escaped.collect::<String>())
 }
 
 /// Reads points from an array of shape (n, 3), or of shape (3,) for a single point.

@@ -51,6 +51,17 @@ impl Location {
     pub fn found(&self) -> Option<u32> {
         (self.owner != NONE).then_some(self.owner)
     }
+
+    /// The value here of a field of `mesh`: interpolated by [`weighed`] over the owner's vertices in the caller's order,
+    /// or the owner's value if the field has values per tetrahedron. NaN without an owner, or if the field is too short.
+    pub fn value(&self, mesh: &Mesh, field: &Field) -> f32 {
+        let at = |i: u32| field.values.get(i as usize).copied().unwrap_or(f32::NAN);
+        match (field.on, mesh.tets.get(self.owner as usize)) {
+            (_, None) => f32::NAN,
+            (On::Points, Some(ids)) => weighed(self.barycentric, ids.map(at)),
+            (On::Cells, _) => at(self.owner),
+        }
+    }
 }
 
 /// The finest cell of a point and its normalised coordinates. `None` if no mesh can be there: a coordinate is NaN or
@@ -169,18 +180,6 @@ impl<'a> Locator<'a> {
     /// [`Locator::locate`] for many points, in parallel.
     pub fn locate_each(&self, points: &[[f32; 3]]) -> Vec<Location> {
         points.par_iter().map(|&p| self.locate(p)).collect()
-    }
-
-    /// The field's value at a location: interpolated by [`weighed`] over the owner's vertices in the caller's order, or
-    /// the owner's value if the field has values per tetrahedron. NaN without an owner, or if the field is too short.
-    pub fn value(&self, field: &Field, location: &Location) -> f32 {
-        let at = |i: u32| field.values.get(i as usize).copied().unwrap_or(f32::NAN);
-        let Some(&ids) = self.mesh.tets.get(location.owner as usize) else { return f32::NAN };
-        let (b, v) = (location.barycentric, ids.map(at));
-        match field.on {
-            On::Points => weighed(b, v),
-            On::Cells => at(location.owner),
-        }
     }
 
     fn weights(&self, tet: u32, x: Vec3) -> (Tet, Weights) {

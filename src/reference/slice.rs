@@ -161,7 +161,7 @@ impl<'a> Slicer<'a> {
             let Closest { weights, .. } = closest(&v);
             tet.rank.map(|r| weights[r])
         };
-        self.locator.value(field, &Location { owner: t, barycentric })
+        Location { owner: t, barycentric }.value(self.mesh, field)
     }
 }
 

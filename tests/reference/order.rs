@@ -109,7 +109,7 @@ fn answers_name_the_callers_cells() {
             // The vertices of a tetrahedron keep their order.
             assert!((0..4).all(|i| (a.barycentric[i] - b.barycentric[i]).abs() < 1e-4), "{a:?} {b:?}");
             for (i, built) in [&given, &sorted].into_iter().enumerate() {
-                let value = locators[i].value(&built.0.fields[1], &[a, b][i]);
+                let value = [a, b][i].value(&built.0, &built.0.fields[1]);
                 assert_eq!(value as u32 / 5, given.0.cell_id(a.owner));
             }
         }

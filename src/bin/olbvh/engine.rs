@@ -10,7 +10,7 @@ use crate::common::{Common, Failure, Outcome};
 use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::mesh::{Field, Mesh};
+use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
 use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, Fault};
@@ -34,8 +34,8 @@ pub trait Engine {
     fn target(&self) -> Option<&Shapes>;
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
-    /// Builds a tree over a mesh and finds the owner, barycentric coordinates and field value of each point.
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
+    /// Builds a tree over a mesh and finds the owner and barycentric coordinates of each point.
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over each of two meshes and finds where they overlap.

@@ -165,6 +165,15 @@ pub fn field<'a>(mesh: &'a Mesh, name: Option<&str>) -> Outcome<Option<&'a Field
     mesh.field(name).map(Some).ok_or_else(|| Failure::Usage(format!("no field `{name}`; {}", fields(mesh))))
 }
 
+/// The fields with these names; without names, the one that [`field`] selects.
+pub fn fields_named<'a>(mesh: &'a Mesh, names: &[String]) -> Outcome<Vec<&'a Field>> {
+    if names.is_empty() {
+        return Ok(field(mesh, None)?.into_iter().collect());
+    }
+    let all: Vec<_> = names.iter().map(|name| field(mesh, Some(name))).collect::<Outcome<_>>()?;
+    Ok(all.into_iter().flatten().collect())
+}
+
 /// The transfer function of a .json file, or the colour map of this name.
 pub fn transfer(name: &str) -> Outcome<TransferFunction> {
     if !name.to_ascii_lowercase().ends_with(".json") {

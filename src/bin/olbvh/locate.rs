@@ -7,10 +7,13 @@ use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{InBlocks, Points};
 use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
-use olbvh::mesh::Mesh;
+use olbvh::mesh::{Field, Mesh};
 use olbvh::options::Fineness;
-use olbvh::query::{LocateMethod, LocateOptions};
+use olbvh::query::{self, LocateMethod, LocateOptions};
+use olbvh::reference::locate::Location;
+use rayon::prelude::*;
 use serde_json::json;
+use std::collections::HashSet;
 use std::io::Write as _;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -20,7 +23,8 @@ use std::time::Instant;
 #[command(after_help = "\
 Examples:
   olbvh locate bracket.vtu points.csv -o values.csv
-  olbvh locate bracket.vtu points.npy -o values.npz --field von_mises
+  olbvh locate bracket.vtu points.npy -o values.npz --field temperature --field von_mises
+  olbvh locate bracket.vtu points.csv -o values.csv --all-fields
   olbvh locate bracket.vtu points.csv -o cells.csv --all   every cell that contains the point
   echo 40,30,20 | olbvh locate bracket.vtu - -o -   without files
 
@@ -29,7 +33,9 @@ along the curve). Where cells of the mesh overlap each other, another of the cel
 the options; --all then finds all of them only with --lists all. Ids count the cells of the file from 0; 4294967295 means that there is no owner. The \
 barycentric coordinates b0 to b3 belong to the vertices of the tetrahedron in file order. For a cell that was split into tetrahedra (hexahedron, voxel, \
 wedge or pyramid), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
-A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; .csv, .vtu and .json are other formats. \
+A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; a .csv has a line per point (x, y, z, owner, b0 to \
+b3, value); .vtu and .json are other formats. With --all-fields or more than one --field, each field has its own name instead of `value`. Values are \
+NaN (in JSON null) where there is no owner. \
 If there is at least one point for every four cells (for at most 4,194,304 cells), points are sorted along a Z curve before they are searched for. \
 --coherent saves the sorting. Results are always in the order of the points. \
 With --all, the result has one row per point and cell: .csv, .npy (n×2) or .json.")]
@@ -42,12 +48,15 @@ pub struct Args {
     /// `-`: a .csv on standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Name of the field to interpolate; a vector's name stands for its length, and name.x, name.y and name.z for its
-    /// components. Default: the first field of points, or else the first field of cells.
+    /// Name of a field to interpolate; can be given several times. A vector's name stands for its length, and name.x,
+    /// name.y and name.z for its components. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
-    field: Option<String>,
-    /// Find every cell that contains a point, not only its owner.
+    field: Vec<String>,
+    /// Interpolate every field of the mesh.
     #[arg(long, conflicts_with = "field")]
+    all_fields: bool,
+    /// Find every cell that contains a point, not only its owner.
+    #[arg(long, conflicts_with_all = ["field", "all_fields"])]
     all: bool,
     /// How far outside the surface a point may lie and still count as inside: its smallest barycentric coordinate may
     /// be down to -T. T is between 0 and 1, without unit. Whether such a point is found may depend on options of the
@@ -81,7 +90,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
-    let field = if args.all { None } else { input::field(mesh, args.field.as_deref())? };
+    let fields = match () {
+        () if args.all => Vec::new(),
+        () if args.all_fields => mesh.fields.iter().collect(),
+        () => input::fields_named(mesh, &args.field)?,
+    };
     let points = if args.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&args.points) };
     let points = points.map_err(Failure::input)?;
     if points.is_empty() {
@@ -100,11 +113,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         seconds = start.elapsed().as_secs_f64();
         Done { found: every_owner(&output, mesh, &owners)?, took }
     } else {
-        let (located, took) = engine.locate(&asked, args.memory.memory, field, &report)?.into_parts();
+        let (located, took) = engine.locate(&asked, args.memory.memory, &report)?.into_parts();
+        let values = columns(mesh, &fields, args.all_fields, &located);
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
-        let value = field.map(|_| &located.values[..]);
-        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &located.barycentrics, value })?;
+        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &located.barycentrics, values: &values })?;
         Done { found: located.owners.iter().filter(|&&tet| tet != u32::MAX).count(), took }
     };
     drop(progress);
@@ -114,7 +127,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
     let json = json!({
         "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": seconds,
-        "points_per_second": per_second, "field": field.map(|f| f.name.as_str()), "tolerance": single(args.tolerance),
+        "points_per_second": per_second, "field": fields.first().map(|f| &f.name), "fields": fields.iter().map(|f| &f.name).collect::<Vec<_>>(), "tolerance": single(args.tolerance),
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
         "device": engine.name(),
     });
@@ -130,6 +143,30 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         in_blocks(&took)
     );
     output.finish(common, &json, &text)
+}
+
+/// The columns of values: `value` for the one field (NaN without any), or each field by its name, with an underscore
+/// behind it where other columns have that name.
+fn columns(mesh: &Mesh, fields: &[&Field], named: bool, located: &query::Located) -> Vec<(String, Vec<f32>)> {
+    let at = |field: &Field| {
+        let points = located.owners.par_iter().zip(&located.barycentrics);
+        points.map(|(&owner, &barycentric)| Location { owner, barycentric }.value(mesh, field)).collect()
+    };
+    match fields {
+        [] => vec![("value".to_owned(), vec![f32::NAN; located.owners.len()])],
+        [field] if !named => vec![("value".to_owned(), at(field))],
+        _ => {
+            let mut taken: HashSet<String> = Located::TAKEN.map(str::to_owned).into();
+            let mut free = |name: &str| {
+                let mut name = name.to_owned();
+                while !taken.insert(name.clone()) {
+                    name.push('_');
+                }
+                name
+            };
+            fields.iter().map(|field| (free(&field.name), at(field))).collect()
+        }
+    }
 }
 
 /// Writes every owner of every point as rows (point, cell); returns how many points have an owner.

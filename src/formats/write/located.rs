@@ -1,9 +1,11 @@
 //! Writer for the results of point location.
 
+use std::borrow::Cow;
+use std::collections::HashSet;
 use std::io::Write;
 use std::path::Path;
 
-use serde::Serialize;
+use serde::ser::{Serialize, SerializeMap, Serializer};
 use zip::write::SimpleFileOptions;
 
 use super::vtu::{Block, Column, Grid};
@@ -20,62 +22,66 @@ pub struct Located<'a> {
     pub owner: &'a [u32],
     /// Barycentric coordinates in that cell.
     pub bary: &'a [[f32; 4]],
-    /// Value of the field, if there is one.
-    pub value: Option<&'a [f32]>,
+    /// Names of fields, each with its value at every point.
+    pub values: &'a [(String, Vec<f32>)],
 }
 
 impl Located<'_> {
     /// Formats that [`write_located`] supports.
     pub const FORMATS: [OutputFormat; 5] = [OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Npz, OutputFormat::Vtu, OutputFormat::Json];
-
-    fn value(&self, i: usize) -> f32 {
-        self.value.map_or(f32::NAN, |v| v[i])
-    }
+    /// What the other columns are called, in any of the formats.
+    pub const TAKEN: [&'static str; 9] = ["x", "y", "z", "owner", "bary", "b0", "b1", "b2", "b3"];
 }
 
 /// Writes owners, barycentric coordinates and values in the format that the extension of `path` selects: `.npy` (an
-/// array of records `owner` u4, `bary` 4×f4, `value` f4), `.npz` (arrays `owner`, `bary` and, with a field, `value`),
-/// `.csv` (columns owner, b0 to b3, value), `.vtu` (the points as vertices) or `.json`. Without a field, values are NaN
-/// (`null` in JSON).
+/// array of records `owner` u4, `bary` 4×f4, and an f4 per field), `.npz` (an array for each of these), `.csv` (columns
+/// x, y, z, owner, b0 to b3, and one per field), `.vtu` (the points as vertices) or `.json` (lists).
 ///
 /// # Errors
-/// [`Error::Invalid`] for another extension or for arrays of different lengths, [`Error::Io`] if the file cannot be
-/// written.
+/// [`Error::Invalid`] for another extension, for arrays of different lengths, or for a field whose name is that of
+/// another or one of [`Located::TAKEN`]; [`Error::Io`] if the file cannot be written.
 pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()> {
     let path = path.as_ref();
     let format = OutputFormat::of(path, &Located::FORMATS)?;
     let n = located.owner.len();
-    if located.points.len() != n || located.bary.len() != n || located.value.is_some_and(|v| v.len() != n) {
+    if located.points.len() != n || located.bary.len() != n || located.values.iter().any(|(_, v)| v.len() != n) {
         return Err(Error::Invalid(format!("{}: points, owners, coordinates and values of different number", path.display())));
+    }
+    let mut taken: HashSet<&str> = Located::TAKEN.into();
+    if let Some((name, _)) = located.values.iter().find(|(name, _)| !taken.insert(name)) {
+        return Err(Error::Invalid(format!("{}: two columns `{name}`", path.display())));
     }
     match format {
         OutputFormat::Npy => write_file(path, |file| records(file, located)),
         OutputFormat::Npz => write_file(path, |file| archive(file, located)),
         OutputFormat::Csv => write_file(path, |file| table(file, located)),
         OutputFormat::Vtu => write_file(path, |file| vertices(file, located)),
-        _ => write_json(path, &Json { owner: located.owner, bary: located.bary, value: located.value }),
+        _ => write_json(path, located),
     }
 }
 
 /// What JSON has: numbers as short as in the other texts, and `null` for those that are not finite.
-#[derive(Serialize)]
-struct Json<'a> {
-    owner: &'a [u32],
-    bary: &'a [[f32; 4]],
-    value: Option<&'a [f32]>,
+impl Serialize for Located<'_> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let mut map = serializer.serialize_map(None)?;
+        map.serialize_entry("owner", self.owner)?;
+        map.serialize_entry("bary", self.bary)?;
+        for (name, values) in self.values {
+            map.serialize_entry(name, values)?;
+        }
+        map.end()
+    }
 }
 
 fn records(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
-    let descr = "[('owner', '<u4'), ('bary', '<f4', (4,)), ('value', '<f4')]";
-    file.write_all(&npy::header(descr, &[located.owner.len()]))?;
+    let fields: String = located.values.iter().map(|(name, _)| [", (", &npy::literal(name), ", '<f4')"].concat()).collect();
+    let descr = format!("[('owner', '<u4'), ('bary', '<f4', (4,)){fields}]");
+    file.write_all(&npy::header(&descr, &[located.owner.len()]))?;
     for (i, (owner, bary)) in located.owner.iter().zip(located.bary).enumerate() {
-        let mut record = [0; 24];
-        record[..4].copy_from_slice(&owner.to_le_bytes());
-        for (slot, b) in record[4..20].chunks_exact_mut(4).zip(bary) {
-            slot.copy_from_slice(&b.to_le_bytes());
+        file.write_all(&owner.to_le_bytes())?;
+        for number in bary.iter().chain(located.values.iter().map(|(_, values)| &values[i])) {
+            file.write_all(&number.to_le_bytes())?;
         }
-        record[20..].copy_from_slice(&located.value(i).to_le_bytes());
-        file.write_all(&record)?;
     }
     Ok(())
 }
@@ -91,19 +97,32 @@ fn archive(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> 
     };
     member("owner.npy", u32::DESCR, &[n], bytemuck::cast_slice(located.owner))?;
     member("bary.npy", f32::DESCR, &[n, 4], bytemuck::cast_slice(located.bary))?;
-    if let Some(value) = located.value {
-        member("value.npy", f32::DESCR, &[n], bytemuck::cast_slice(value))?;
+    for (name, values) in located.values {
+        member(&format!("{name}.npy"), f32::DESCR, &[n], bytemuck::cast_slice(values))?;
     }
     zip.finish()?;
     file.flush()
 }
 
 fn table(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
-    writeln!(file, "owner,b0,b1,b2,b3,value")?;
-    for (i, (owner, [a, b, c, d])) in located.owner.iter().zip(located.bary).enumerate() {
-        writeln!(file, "{owner},{a},{b},{c},{d},{}", located.value(i))?;
+    write!(file, "x,y,z,owner,b0,b1,b2,b3")?;
+    for (name, _) in located.values {
+        write!(file, ",{}", csv_field(name))?;
+    }
+    writeln!(file)?;
+    for (i, (([x, y, z], owner), [a, b, c, d])) in located.points.iter().zip(located.owner).zip(located.bary).enumerate() {
+        write!(file, "{x},{y},{z},{owner},{a},{b},{c},{d}")?;
+        for (_, values) in located.values {
+            write!(file, ",{}", values[i])?;
+        }
+        writeln!(file)?;
     }
     Ok(())
+}
+
+/// A name in a table, in quotation marks where it would be taken for several fields or lines.
+fn csv_field(name: &str) -> Cow<'_, str> {
+    if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")).into() } else { name.into() }
 }
 
 fn vertices(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
@@ -114,9 +133,7 @@ fn vertices(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()>
         Column { name: "owner", components: 1, block: Block::U32(located.owner) },
         Column { name: "bary", components: 4, block: Block::F32(located.bary.as_flattened()) },
     ];
-    if let Some(value) = located.value {
-        arrays.push(Column { name: "value", components: 1, block: Block::F32(value) });
-    }
+    arrays.extend(located.values.iter().map(|(name, values)| Column { name, components: 1, block: Block::F32(values) }));
     let types = vec![1; n];
     let points = Column { name: "Points", components: 3, block: Block::F64(located.points.as_flattened()) };
     Grid { points, connectivity: &ids, ends: &ends, types: &types, point_data: &arrays, cell_data: &[] }.write(file)

@@ -63,8 +63,8 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| Ok(tree.locate(asked.points, field, &asked.how, report)))
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| Ok(tree.locate(asked.points, &asked.how, report)))
     }
 
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
@@ -146,7 +146,7 @@ impl<'a> CpuTree<'a> {
         Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
-    fn locate(&self, points: &[[f32; 3]], field: Option<&Field>, options: &LocateOptions, report: OnProgress<'_>) -> Located {
+    fn locate(&self, points: &[[f32; 3]], options: &LocateOptions, report: OnProgress<'_>) -> Located {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Located::default();
         // Chunks and runs are those of a device (sorted ones, those of a processor), so that owners are equal even where tetrahedra overlap.
@@ -158,9 +158,6 @@ impl<'a> CpuTree<'a> {
             };
             all.owners.extend(found.iter().map(|l| l.owner));
             all.barycentrics.extend(found.iter().map(|l| l.barycentric));
-            if let Some(field) = field {
-                all.values.extend(found.iter().map(|l| locator.value(field, l)));
-            }
             report(all.owners.len() as u64, points.len() as u64);
         }
         all

@@ -88,9 +88,8 @@ impl Engine for Device {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, field: Option<&Field>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        let values = field.map(|f| (f.values.as_slice(), f.on));
-        blocks::locate(&self.0, self.memory(memory), asked, values, report)
+    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+        blocks::locate(&self.0, self.memory(memory), asked, None, report)
     }
 
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
