@@ -104,12 +104,13 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
 // Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
 // owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
 // is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
-// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent.
+// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent, and
+// where `from` is OLBVH_NONE.
 uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
     weights_of_owner = vec4(0.0);
     left = uvec2(NONE);
     Grid g = grid.at[0];
-    if (!near_bounds(g, start) || !near_bounds(g, end)) return NONE;
+    if (from == NONE || !near_bounds(g, start) || !near_bounds(g, end)) return NONE;
     vec3 x = normalise(g, end);
     uint face;
     uint t = walk_leg(from, normalise(g, start), x, face);

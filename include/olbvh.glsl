@@ -95,7 +95,7 @@ struct olbvh_RenderView {
     vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
     vec4 direction_x;      // What one pixel to the right adds to the direction.
     vec4 direction_y;      // What one pixel down adds to the direction.
-    vec4 to_light;   // Unit vector to the light.
+    vec4 to_light;   // Unit vector to the light; strength of the viewer's light as a part of its.
     vec4 strength;   // Strength of ambient, diffuse and specular light; opacity of one step at a rim.
     float step_size; // Distance between two samples.
     float inverse_step; // Reciprocal of `step_size`, rounded on the host.
@@ -104,7 +104,7 @@ struct olbvh_RenderView {
     float termination; // A ray ends once it is this opaque.
     uint isos;       // Number of iso-surfaces.
     uint clips;      // Number of clips.
-    uint pad;        // Unused.
+    float cut_fade;  // Part of its light that a cut loses per step behind it.
     float iso[8];    // Values of the iso-surfaces, ascending.
     vec4 clip[4];    // Planes beyond which nothing is drawn: unit normal n, and d. Points p with n·p ≤ d are kept.
 };
@@ -127,7 +127,7 @@ struct olbvh_RayState {
     uint cursor;    // Not 0: how much of the leaf's list has been searched for the next sample; the search goes on.
     uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
-    uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
+    uint last;      // `NONE` if the last sample has no value. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
     float last_at;  // Distance of that place from the ray's origin in steps.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };
@@ -1141,12 +1141,13 @@ uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
 // Walks straight from a point `start` in the tetrahedron `from` to the point `end`, as a particle moves. Returns the
 // owner of the end, and its barycentric coordinates. If the way leads out of the mesh, it returns OLBVH_NONE, and `left`
 // is the last tetrahedron and the number of the vertex opposite to the face through which it leaves; otherwise `left` is
-// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent.
+// OLBVH_NONE twice. So are both for points farther outside the bounds of the mesh than half their largest extent, and
+// where `from` is OLBVH_NONE.
 uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out uvec2 left) {
     weights_of_owner = vec4(0.0);
     left = uvec2(olbvh_NONE);
     olbvh_Grid g = olbvh_grid.at[0];
-    if (!olbvh_near_bounds(g, start) || !olbvh_near_bounds(g, end)) return olbvh_NONE;
+    if (from == olbvh_NONE || !olbvh_near_bounds(g, start) || !olbvh_near_bounds(g, end)) return olbvh_NONE;
     vec3 x = olbvh_normalise(g, end);
     uint face;
     uint t = olbvh_walk_leg(from, olbvh_normalise(g, start), x, face);

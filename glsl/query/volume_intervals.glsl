@@ -213,7 +213,8 @@ void main() {
             precise float begin = floor(clamp(first * view.inverse_step - 1.5, 0.0, MAX_SAMPLES));
             precise float end = floor(clamp(last * view.inverse_step + 1.5, 0.0, MAX_SAMPLES));
             // Sample k lies k + 1/2 steps from the origin. Iso-surfaces also lie between samples, up to a clip.
-            vec2 kept = kept_stretch(origin, direction);
+            uint cut;
+            vec2 kept = kept_stretch(origin, direction, cut);
             float more = ISO != 0u ? 1.0 : 0.0;
             precise float first_kept = ceil(kept.x - 0.5) - more, behind_kept = floor(kept.y - 0.5) + 1.0 + more;
             state.next = uint(max(begin, first_kept));

@@ -41,7 +41,8 @@ const uint BURST = 32u; // passes along walks before rays that wait for the stru
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;
-vec2 unclipped; // the stretch without what clips leave out, for iso-surfaces; samples are those of the interval
+vec2 unclipped; // the stretch without what clips leave out; samples are those of the interval
+uint cut;       // the clip at which it begins, or NONE
 RayState state;
 vec4 sum;
 uint samples, found, skipped;
@@ -101,8 +102,9 @@ vec3 shade(vec3 n) {
     if (square < 1e-8) return vec3(1.0, 0.0, 0.0);
     float r = inverse_sqrt(square);
     precise float m = min(square * r, 1.0);
-    precise float c = abs(dot_product(n, view.to_light.xyz)) * r;
-    precise float g = 1.0 - min(abs(dot_product(n, direction)) * r, 1.0);
+    precise float facing = min(abs(dot_product(n, direction)) * r, 1.0);
+    precise float c = max(abs(dot_product(n, view.to_light.xyz)) * r, view.to_light.w * facing);
+    precise float g = 1.0 - facing;
     precise float h = min(abs(dot_product(n, halfway)) * r, 1.0);
     for (int i = 0; i < 5; ++i) {
         precise float hh = h * h;
@@ -114,10 +116,22 @@ vec3 shade(vec3 n) {
     return vec3(factor, added, rim);
 }
 
-// Adds a colour to the ray, at barycentric coordinates b of the stand.
-void add(vec4 color, vec4 b) {
+// The normal at barycentric coordinates b of the stand.
+vec3 normal_at(vec4 b) { return vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])); }
+
+// The normal at a place of the ray, whose own is n. Where a clip cuts the mesh open, it is that of the cut, and less so
+// with every step behind it. Twin of `Plan::beside_cut`.
+vec3 beside_cut(float at, vec3 n) {
+    if (cut == NONE) return n;
+    precise float part = 1.0 - (at - unclipped.x) * view.cut_fade;
+    precise vec3 bent = n + (frames.at[0].view.clip[cut].xyz - n) * part;
+    return part > 0.0 ? bent : n;
+}
+
+// Adds a colour to the ray, at a place with normal n.
+void add(vec4 color, vec3 n) {
     if (SHADING != 0u) {
-        vec3 lit = shade(vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])));
+        vec3 lit = shade(n);
         precise vec3 c = color.xyz * lit.x + lit.y;
         color.xyz = min(c, vec3(1.0));
         precise float a = color.w + (1.0 - color.w) * lit.z;
@@ -177,10 +191,32 @@ void find_ends(uint k, Sides here, float value, bool joins, out Place from, out 
     to = place_beside(to, way_within(here.w, next.w), rise);
 }
 
+// Barycentric coordinates in the stand of a place of the ray, which lies in it but for rounding.
+vec4 barycentric_at(float steps) {
+    precise float s = steps * view.step_size;
+    precise vec3 at = origin + direction * s;
+    vec4 b = max(barycentric(sides_of(stand, normalise(grid.at[0], at))), vec4(0.0));
+    precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
+    return within;
+}
+
+// The normal of sample k. The first one behind a surface has that of the place where the ray enters its tetrahedron, and
+// behind a clip that of the cut: at various depths, even surfaces would have rings. Twin of `Marcher::lit_at`.
+vec3 normal_of_sample(uint k, Sides here, bool joins) {
+    precise float at = float(k) + 0.5;
+    if (joins) return beside_cut(at, normal_at(barycentric(here)));
+    precise float from_cut = at - unclipped.x;
+    if (cut != NONE && from_cut < 1.0) return frames.at[0].view.clip[cut].xyz;
+    Sides next = sides_of(stand, normalise(grid.at[0], sample_at(view, origin, direction, k + 1u)));
+    precise vec4 change = next.w - here.w;
+    precise vec4 behind = here.w - change;
+    precise float entry = max(at - way_within(here.w, behind), unclipped.x);
+    return beside_cut(entry, normal_at(barycentric_at(entry)));
+}
+
 // Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip. Light
 // takes them to lie in the stand.
 void add_surfaces(Place from, Place to) {
-    Grid g = grid.at[0];
     bool rises = from.rank < to.rank;
     for (uint i = from.rank; i != to.rank && sum.w < view.termination; i += rises ? 1u : ~0u) {
         float iso = view.iso[rises ? i : i - 1u];
@@ -188,12 +224,8 @@ void add_surfaces(Place from, Place to) {
         precise float part = canonical(rise) == 0.0 ? 1.0 : clamp((iso - from.value) * reciprocal(rise), 0.0, 1.0);
         precise float steps = from.at + (to.at - from.at) * part;
         if (steps < unclipped.x || steps > unclipped.y) continue;
-        precise float s = steps * view.step_size;
-        precise vec3 at = origin + direction * s;
-        vec4 b = max(barycentric(sides_of(stand, normalise(g, at))), vec4(0.0));
-        precise vec4 within = b * reciprocal(max((b.x + b.y) + (b.z + b.w), 1.0));
         vec4 color = lookup(iso);
-        if (color.w > 0.0) add(color, within);
+        if (color.w > 0.0) add(color, normal_at(barycentric_at(steps)));
     }
 }
 
@@ -242,10 +274,11 @@ void take(Sides sides) {
         [[dont_unroll]] for (uint piece = 0u; piece < 2u; ++piece) add_surfaces(ends[piece], ends[piece + 1u]);
         return;
     }
+    state.last = 0u;
     vec4 color = lookup(value);
     if (color.w <= 0.0) return;
     if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
-    add(color, b);
+    add(color, SHADING != 0u ? normal_of_sample(k, sides, last != NONE) : vec3(0.0));
 }
 
 void main() {
@@ -270,7 +303,7 @@ void main() {
             halfway = unit;
         }
         inverse_direction = inverse_of(direction);
-        if (ISO != 0u) unclipped = kept_stretch(origin, direction);
+        if (ISO != 0u || SHADING != 0u) unclipped = kept_stretch(origin, direction, cut);
         // Each of the following has one place in the loop, since kernels with several copies take long to compile: the
         // ray enters a tetrahedron, takes a sample, searches the structure.
         uint target = state.cursor == 0u ? state.tet : NONE; // the tetrahedron to enter

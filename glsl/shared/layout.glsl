@@ -51,7 +51,7 @@ struct RenderView {
     vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
     vec4 direction_x;      // What one pixel to the right adds to the direction.
     vec4 direction_y;      // What one pixel down adds to the direction.
-    vec4 to_light;   // Unit vector to the light.
+    vec4 to_light;   // Unit vector to the light; strength of the viewer's light as a part of its.
     vec4 strength;   // Strength of ambient, diffuse and specular light; opacity of one step at a rim.
     float step_size; // Distance between two samples.
     float inverse_step; // Reciprocal of `step_size`, rounded on the host.
@@ -60,7 +60,7 @@ struct RenderView {
     float termination; // A ray ends once it is this opaque.
     uint isos;       // Number of iso-surfaces.
     uint clips;      // Number of clips.
-    uint pad;        // Unused.
+    float cut_fade;  // Part of its light that a cut loses per step behind it.
     float iso[8];    // Values of the iso-surfaces, ascending.
     vec4 clip[4];    // Planes beyond which nothing is drawn: unit normal n, and d. Points p with n·p ≤ d are kept.
 };
@@ -83,7 +83,7 @@ struct RayState {
     uint cursor;    // Not 0: how much of the leaf's list has been searched for the next sample; the search goes on.
     uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
-    uint last;      // Bits of the value where the ray leaves the last sample's tetrahedron, for iso-surfaces, or `NONE`.
+    uint last;      // `NONE` if the last sample has no value. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
     float last_at;  // Distance of that place from the ray's origin in steps.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };

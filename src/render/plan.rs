@@ -4,6 +4,7 @@
 use super::camera::LEAST;
 use super::clip::MAX_CLIPS;
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
+use super::shading::SKIN;
 use super::visible_values::visible_values;
 use super::{
     Background, Bounds, Camera, Lighting, OPACITY_UNIT, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity, gradient_normals,
@@ -34,6 +35,8 @@ pub struct Plan {
     pub rays: RayGrid,
     /// Distance Δ of two samples.
     pub step: f32,
+    /// Part of its light that a cut loses per step behind it: 1 in the depth of the lit skin of a surface.
+    pub cut_fade: f32,
     /// The field's value at place 0 of the table.
     pub value_lo: f32,
     /// Places per unit of value.
@@ -142,6 +145,7 @@ impl Plan {
             size: settings.size,
             rays,
             step: step as f32,
+            cut_fade: (step / (diagonal * SKIN)) as f32,
             value_lo,
             value_scale,
             visible_values: if surfaces { iso.iter().map(|&v| [v; 2]).collect() } else { visible_values(&table, value_lo, value_scale) },
@@ -167,8 +171,8 @@ impl Plan {
     /// The plan as the kernels take it, without the table.
     pub fn view(&self) -> RenderView {
         let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-        let Lighting { to_light, strength: [ambient, diffuse, specular], rim } =
-            self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], rim: 0.0 });
+        let Lighting { to_light: [x, y, z], strength: [ambient, diffuse, specular], fill, rim } =
+            self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], fill: 0.0, rim: 0.0 });
         let mut iso = [0.0; MAX_ISO];
         iso.iter_mut().zip(&self.iso).for_each(|(to, v)| *to = *v);
         let mut clip = [[0.0; 4]; MAX_CLIPS];
@@ -180,7 +184,7 @@ impl Plan {
             direction: wide(self.rays.direction),
             direction_x: wide(self.rays.direction_x),
             direction_y: wide(self.rays.direction_y),
-            to_light: wide(to_light),
+            to_light: [x, y, z, fill],
             strength: [ambient, diffuse, specular, rim],
             step_size: self.step,
             inverse_step: self.inverse_step(),
@@ -189,7 +193,7 @@ impl Plan {
             termination: self.termination,
             isos: self.iso.len().min(MAX_ISO) as u32,
             clips: self.clips.len().min(MAX_CLIPS) as u32,
-            pad: 0,
+            cut_fade: self.cut_fade,
             iso,
             clip,
         }
@@ -223,12 +227,12 @@ impl Plan {
         [0, 1, 2].map(|c| origin[c] + direction[c] * t)
     }
 
-    /// The stretch of a ray (origin, unit direction) that no clip leaves out, in steps from the origin. Clip (n, d)
-    /// meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if n·direction is below
-    /// [`LEAST`]. Nothing is left if the end is less than the start.
-    pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3])) -> [f32; 2] {
-        let mut kept = [0.0, MAX_SAMPLES as f32];
-        for &[x, y, z, d] in &self.clips {
+    /// The stretch of a ray (origin, unit direction) that no clip leaves out, in steps from the origin, and the clip at
+    /// which it begins. Clip (n, d) meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if
+    /// n·direction is below [`LEAST`]. Nothing is left if the end is less than the start.
+    pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3])) -> ([f32; 2], Option<usize>) {
+        let (mut kept, mut cut) = ([0.0, MAX_SAMPLES as f32], None);
+        for (i, &[x, y, z, d]) in self.clips.iter().enumerate() {
             let dot = |v: [f32; 3]| (x * v[0] + y * v[1]) + z * v[2];
             let (before, speed) = (d - dot(origin), dot(direction));
             if speed.abs() < LEAST {
@@ -238,11 +242,20 @@ impl Plan {
             let at = ((before * reciprocal(speed)) * self.inverse_step()).clamp(-1.0, MAX_SAMPLES as f32);
             if speed > 0.0 {
                 kept[1] = kept[1].min(at);
-            } else {
-                kept[0] = kept[0].max(at);
+            } else if at > kept[0] {
+                (kept[0], cut) = (at, Some(i));
             }
         }
-        kept
+        (kept, cut)
+    }
+
+    /// The normal at a place of a ray, `at` steps from its origin, whose own is `n`. A cut, where a clip opens the mesh
+    /// at `begin` steps, is lit like a surface: with w = 1 − (at − begin)·fade, if that is above 0, it is `n + (n_clip −
+    /// n)·w`.
+    pub fn beside_cut(&self, at: f32, n: [f32; 3], ([begin, _], cut): ([f32; 2], Option<usize>)) -> [f32; 3] {
+        let part = 1.0 - (at - begin) * self.cut_fade;
+        let Some(clip) = cut.and_then(|i| self.clips.get(i)).filter(|_| part > 0.0) else { return n };
+        [0, 1, 2].map(|c| n[c] + (clip[c] - n[c]) * part)
     }
 
     /// Colour, and opacity of one step, at a finite value. With `x = clamp((value − lo)·scale, 0, 1)·1023`, i =
@@ -298,12 +311,7 @@ impl Prepared {
         if settings.iso.is_empty() && !settings.transfer.has_opacity() {
             settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, valid, field, range))?;
         }
-        let mut used = vec![false; mesh.points.len()];
-        for id in valid.of(mesh).flat_map(|(_, ids)| ids) {
-            used[id] = true;
-        }
-        let points = mesh.points.iter().zip(used).filter(|(_, used)| *used);
-        let points: Vec<DVec3> = points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect();
+        let points = if settings.frames_bounds { valid.bounds.corners().to_vec() } else { used_points(mesh, valid) };
         let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
         let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
         let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
@@ -314,6 +322,16 @@ impl Prepared {
         };
         Ok(Self { plan, camera, normals, range })
     }
+}
+
+/// The vertices of valid tetrahedra.
+fn used_points(mesh: &Mesh, valid: &ValidTets<'_>) -> Vec<DVec3> {
+    let mut used = vec![false; mesh.points.len()];
+    for id in valid.of(mesh).flat_map(|(_, ids)| ids) {
+        used[id] = true;
+    }
+    let points = mesh.points.iter().zip(used).filter(|(_, used)| *used);
+    points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect()
 }
 
 /// The smallest and the largest finite value in valid tetrahedra.

@@ -31,6 +31,8 @@ pub struct RenderSettings {
     pub size: [u32; 2],
     /// The camera.
     pub camera: CameraSpec,
+    /// A camera that is not placed by hand frames the bounds of the mesh, not only the mesh.
+    pub frames_bounds: bool,
     /// Half-spaces that are left out, up to [`MAX_CLIPS`].
     pub clips: Vec<Clip>,
     /// Colours and opacities.
@@ -64,6 +66,7 @@ impl Default for RenderSettings {
         Self {
             size: [1024, 1024],
             camera: CameraSpec::default(),
+            frames_bounds: false,
             clips: Vec::new(),
             transfer: TransferFunction::default(),
             iso: Vec::new(),

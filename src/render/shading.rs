@@ -14,9 +14,12 @@ const AMBIENT: f32 = 0.42;
 const DIFFUSE: f32 = 0.72;
 /// Strength of highlights (their exponent is 32).
 const SPECULAR: f32 = 0.18;
+/// Strength of a second light, at the viewer's eye, as a part of the first. The stronger of both counts, so that what
+/// faces the viewer has nearly the colours of the legend, whatever the direction to the light.
+const FILL: f32 = 0.75;
 /// A normal of the surface has length 1 where the tetrahedra on it are at most this thick, in diagonals. So the lit
 /// skin is equally deep on coarse and on fine meshes.
-const SKIN: f64 = 0.02;
+pub(super) const SKIN: f64 = 0.02;
 /// A gradient makes a normal of length 1 if it would cross the field's range on this part of the diagonal.
 const STEEP: f64 = 0.12;
 
@@ -27,6 +30,8 @@ pub struct Lighting {
     pub to_light: [f32; 3],
     /// Ambient, diffuse, specular.
     pub strength: [f32; 3],
+    /// Strength of the light at the viewer's eye, as a part of the diffuse one.
+    pub fill: f32,
     /// Opacity of one step on a surface seen exactly from the side.
     pub rim: f32,
 }
@@ -45,7 +50,7 @@ pub struct Shade {
 impl Lighting {
     /// The default strengths, with the light in this direction (unit vector).
     pub fn new(to_light: Vec3, rim: f32) -> Self {
-        Self { to_light: to_light.to_array(), strength: [AMBIENT, DIFFUSE, SPECULAR], rim }
+        Self { to_light: to_light.to_array(), strength: [AMBIENT, DIFFUSE, SPECULAR], fill: FILL, rim }
     }
 
     /// The unit vector halfway between the directions to the light and to the viewer, for a ray with this unit
@@ -59,9 +64,9 @@ impl Lighting {
 
     /// The effect of light on a sample of a ray with this unit direction and its `half`.
     ///
-    /// `n` is the interpolated normal, of length up to 1. With m = min(|n|, 1), c = |n·light|/|n|, h =
-    /// min(|n·half|/|n|, 1) and g = 1 − min(|n·direction|/|n|, 1) (both sides of a surface look alike): factor = 1 +
-    /// m·((ambient + diffuse·c) − 1), added = m·(specular·h^32), rim = m·(g⁴·rim).
+    /// `n` is the interpolated normal, of length up to 1. With m = min(|n|, 1), f = min(|n·direction|/|n|, 1), c =
+    /// max(|n·light|/|n|, fill·f), h = min(|n·half|/|n|, 1) and g = 1 − f (both sides of a surface look alike): factor =
+    /// 1 + m·((ambient + diffuse·c) − 1), added = m·(specular·h^32), rim = m·(g⁴·rim).
     pub fn shade(&self, n: [f32; 3], direction: [f32; 3], half: [f32; 3]) -> Shade {
         let square = dot(n, n);
         if square < 1e-8 {
@@ -69,8 +74,9 @@ impl Lighting {
         }
         let r = inverse_sqrt(square);
         let m = (square * r).min(1.0);
-        let c = dot(n, self.to_light).abs() * r;
-        let g = 1.0 - (dot(n, direction).abs() * r).min(1.0);
+        let facing = (dot(n, direction).abs() * r).min(1.0);
+        let c = (dot(n, self.to_light).abs() * r).max(self.fill * facing);
+        let g = 1.0 - facing;
         let mut h = (dot(n, half).abs() * r).min(1.0);
         for _ in 0..5 {
             h *= h;
@@ -196,6 +202,9 @@ mod tests {
         let near = |a: f32, b: f32| (a - b).abs() < 1e-5;
         assert!(near(facing.factor, AMBIENT + DIFFUSE) && near(facing.added, SPECULAR) && near(facing.rim, 0.0), "{facing:?}");
         assert!(near(grazing.factor, AMBIENT) && grazing.added == 0.0 && near(grazing.rim, 0.25), "{grazing:?}");
+        let from_the_side = Lighting::new(Vec3::X, 0.25);
+        let seen = from_the_side.shade([0.0, 0.0, -1.0], down, from_the_side.half(down));
+        assert!(near(seen.factor, AMBIENT + DIFFUSE * FILL), "what faces the viewer is never dark: {seen:?}");
         assert_eq!(light.shade([0.0; 3], down, half), Shade { factor: 1.0, added: 0.0, rim: 0.0 });
     }
 }

@@ -67,10 +67,13 @@ impl Legend {
         }
         let [lo, hi] = of.range.map(f64::from);
         let most = (f64::from(bar) / (GAP * 2.0 * f64::from(line))) as usize;
-        let marks = if of.plan.iso.is_empty() { marks([lo, hi], most) } else { of.plan.iso.iter().map(|&v| f64::from(v)).collect() };
-        let digits = digits(&marks);
+        let ticks = if of.plan.iso.is_empty() {
+            ticks([lo, hi], most, f64::from(line) / f64::from(bar))
+        } else {
+            labelled(of.plan.iso.iter().map(|&v| f64::from(v)).collect())
+        };
         let mut free = f64::INFINITY; // above the label below
-        for value in marks {
+        for (value, label) in ticks {
             let place = if lo < hi { (value - lo) / (hi - lo) } else { 0.5 };
             if !(0.0..=1.0).contains(&place) {
                 continue;
@@ -79,7 +82,7 @@ impl Legend {
             let begin = if of.plan.iso.is_empty() { left + line } else { left };
             (begin..left + line + self.letter() / 2).for_each(|x| ink.set([x, y], ink.colour));
             if f64::from(y) + f64::from(line) <= free {
-                ink.text([left + line + self.letter(), y - line / 2], &label(value, digits));
+                ink.text([left + line + self.letter(), y - line / 2], &label);
                 free = f64::from(y);
             }
         }
@@ -142,9 +145,14 @@ fn short(name: &str, most: usize) -> String {
     if name.chars().count() <= most { name.into() } else { name.chars().take(most - 2).chain("..".chars()).collect() }
 }
 
+/// Whether the values of a range cannot be told apart.
+fn is_single([lo, hi]: [f64; 2]) -> bool {
+    hi - lo <= lo.abs().max(hi.abs()) * 1e-6
+}
+
 /// About `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten.
 fn marks([lo, hi]: [f64; 2], most: usize) -> Vec<f64> {
-    if hi - lo <= lo.abs().max(hi.abs()) * 1e-6 {
+    if is_single([lo, hi]) {
         return vec![lo];
     }
     let rough = (hi - lo) / most.max(2) as f64;
@@ -153,6 +161,30 @@ fn marks([lo, hi]: [f64; 2], most: usize) -> Vec<f64> {
     // A hair beyond the ends, since multiples are rounded.
     let [first, last] = [(lo / step - 1e-6).ceil(), (hi / step + 1e-6).floor()];
     (0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).collect()
+}
+
+/// The ends of a range and about `most` round values between, ascending, with their labels. Labels are at least `gap`
+/// apart from those of the ends, as a part of the range.
+fn ticks([lo, hi]: [f64; 2], most: usize, gap: f64) -> Vec<(f64, String)> {
+    let mut between = marks([lo, hi], most);
+    if is_single([lo, hi]) {
+        return labelled(between);
+    }
+    let near = (hi - lo) * gap;
+    between.retain(|v| v - lo >= near && hi - v >= near);
+    // Three digits of the range.
+    let unit = 10f64.powf((hi - lo).log10().floor() - 2.0);
+    let ends = digits(&[lo, hi].map(|v| (v / unit).round() * unit));
+    let mut all = labelled(between);
+    all.insert(0, (lo, label(lo, ends)));
+    all.push((hi, label(hi, ends)));
+    all
+}
+
+/// Values with labels that tell them apart.
+fn labelled(values: Vec<f64>) -> Vec<(f64, String)> {
+    let digits = digits(&values);
+    values.into_iter().map(|value| (value, label(value, digits))).collect()
 }
 
 /// How labels are written: in fixed notation with so many digits after the point, or in powers of ten with so many.
@@ -184,11 +216,12 @@ fn digits(values: &[f64]) -> Digits {
 }
 
 fn label(value: f64, digits: Digits) -> String {
-    let value = value + 0.0; // no -0
-    match digits {
+    let text = match digits {
         Digits::Fixed(n) => format!("{value:.n$}"),
         Digits::Powers(n) => format!("{value:.n$e}"),
-    }
+    };
+    let zero = !text.contains(|c: char| ('1'..='9').contains(&c));
+    text.strip_prefix('-').filter(|_| zero).map(str::to_owned).unwrap_or(text)
 }
 
 #[cfg(test)]
@@ -212,6 +245,17 @@ mod tests {
         for (lo, hi) in [(1e-30, 1e-29), (-3e37, 3e37), (1000.0, 1000.01), (0.0, 0.0), (-7.5, 123_456.0)] {
             assert!(labels([lo, hi]).iter().all(|l| !l.is_empty() && l.len() <= LABEL), "{:?}", labels([lo, hi]));
         }
+    }
+
+    #[test]
+    fn the_ends_of_the_range_are_labelled() {
+        let labels = |lo, hi| ticks([lo, hi], 6, 0.06).into_iter().map(|(_, label)| label).collect::<Vec<_>>();
+        assert_eq!(labels(20.0, 95.0), ["20", "40", "60", "80", "95"]);
+        assert_eq!(labels(0.0, 36.683_71), ["0.0", "10", "20", "30", "36.7"]);
+        assert_eq!(labels(-1.0, 1.0), ["-1", "-0.5", "0.0", "0.5", "1"]);
+        assert_eq!(labels(-1e-17, 1e-3), ["0.0000", "0.0002", "0.0004", "0.0006", "0.0008", "0.0010"]);
+        assert_eq!(labels(7.0, 7.0), ["7"]);
+        assert_eq!(ticks([20.0, 95.0], 1, 0.2).len(), 3);
     }
 
     #[test]

@@ -234,6 +234,7 @@ impl Args {
         Ok(RenderSettings {
             size,
             camera: self.camera,
+            frames_bounds: self.bounds,
             clips: self.clips.clone(),
             transfer,
             iso: self.iso.as_ref().map(|iso| iso.0.clone()).unwrap_or_default(),

@@ -1,8 +1,7 @@
 //! The part of a ray that can meet the mesh, from the boundary nodes of the tree.
 
 use super::skip::inverse_of;
-use crate::grid::Box6;
-use crate::grid::CellRange;
+use crate::grid::{Box6, CellRange};
 use crate::layout::bit;
 use crate::reference::leaves::cell_box;
 use crate::render::{MAX_SAMPLES, Plan, interval_slack};
@@ -69,7 +68,7 @@ impl<'a> Intervals<'a> {
         // Sample k lies at (k + ½)·Δ.
         let number = |x: f32| x.clamp(0.0, MAX_SAMPLES as f32).floor();
         let inverse_step = self.plan.inverse_step();
-        let kept = self.plan.kept_stretch(ray);
+        let (kept, _) = self.plan.kept_stretch(ray);
         let more = if self.plan.iso.is_empty() { 0.0 } else { 1.0 };
         let begin = number(first * inverse_step - 1.5).max((kept[0] - 0.5).ceil() - more) as u32;
         let end = number(last * inverse_step + 1.5).min((kept[1] - 0.5).floor() + 1.0 + more).max(0.0) as u32;

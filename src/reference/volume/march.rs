@@ -30,6 +30,8 @@ struct Gathered<'a> {
     direction: [f32; 3],
     light: Option<(Lighting, [f32; 3])>,
     normals: &'a [[f32; 3]],
+    /// The stretch that no clip leaves out, and the clip at which it begins.
+    kept: ([f32; 2], Option<usize>),
 }
 
 /// A place of a ray: its distance from the origin in steps, and the field's value there.
@@ -40,11 +42,15 @@ struct Place {
 }
 
 impl Gathered<'_> {
-    /// Adds a colour at barycentric coordinates `b` in a tetrahedron.
-    fn add(&mut self, [red, green, blue, mut a]: [f32; 4], stand: &Stand, b: [f32; 4]) {
+    /// The normal at barycentric coordinates `b` in a tetrahedron.
+    fn normal_at(&self, stand: &Stand, b: [f32; 4]) -> [f32; 3] {
+        per_axis(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])))
+    }
+
+    /// Adds a colour at a place with normal `n`.
+    fn add(&mut self, [red, green, blue, mut a]: [f32; 4], n: [f32; 3]) {
         let mut color = [red, green, blue];
         if let Some((light, half)) = &self.light {
-            let n = per_axis(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])));
             let shade = light.shade(n, self.direction, *half);
             color = color.map(|c| (c * shade.factor + shade.added).min(1.0));
             a += (1.0 - a) * shade.rim;
@@ -68,7 +74,9 @@ impl<'a> Marcher<'a> {
         let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
-        let mut gathered = Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals };
+        let mut gathered =
+            Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals, kept: plan.kept_stretch(ray) };
+        // Where the ray leaves the tetrahedron of the last sample, if that has a value.
         let mut last: Option<Place> = None;
         // Each ray starts without a hint, so that no pixel depends on another one.
         self.cell = None;
@@ -111,10 +119,13 @@ impl<'a> Marcher<'a> {
                 last = Some(to);
                 continue;
             }
+            last = Some(Place { at: k as f32 + 0.5, value });
             let color = plan.lookup(value);
             if color[3] > 0.0 {
                 check = check.max(next + 1);
-                gathered.add(color, &stand, b);
+                let normal =
+                    if gathered.light.is_some() { self.lit_at(&gathered, ray, k, (&stand, &sides), before.is_some()) } else { [0.0; 3] };
+                gathered.add(color, normal);
             }
         }
         gathered.sum
@@ -138,11 +149,37 @@ impl<'a> Marcher<'a> {
         [begin, place(way_within(here.w, next.w))]
     }
 
+    /// Barycentric coordinates in `stand` of a place of the ray, which lies in it but for rounding.
+    fn barycentric_at(&self, ray: ([f32; 3], [f32; 3]), stand: &Stand, steps: f32) -> [f32; 4] {
+        let s = steps * self.plan.step;
+        let at = per_axis(|c| ray.0[c] + ray.1[c] * s);
+        let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
+        let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));
+        b.map(|b| b * whole)
+    }
+
+    /// The normal of sample k, which lies in `stand`. The first one behind a surface has that of the place where the ray
+    /// enters its tetrahedron, and behind a clip that of the cut: at various depths, even surfaces would have rings.
+    fn lit_at(&self, gathered: &Gathered<'_>, ray: ([f32; 3], [f32; 3]), k: u32, (stand, here): (&Stand, &Sides), joins: bool) -> [f32; 3] {
+        let at = k as f32 + 0.5;
+        if joins {
+            return self.plan.beside_cut(at, gathered.normal_at(stand, here.barycentric()), gathered.kept);
+        }
+        let ([from, _], cut) = gathered.kept;
+        if let Some(&[x, y, z, _]) = cut.and_then(|i| self.plan.clips.get(i)).filter(|_| at - from < 1.0) {
+            return [x, y, z];
+        }
+        let next = stand.sides(self.scene.tree.grid.normalise(self.plan.sample(ray, k + 1)));
+        let behind = [0, 1, 2, 3].map(|f| here.w[f] - (next.w[f] - here.w[f]));
+        let entry = (at - way_within(here.w, behind)).max(from);
+        self.plan.beside_cut(entry, gathered.normal_at(stand, self.barycentric_at(ray, stand, entry)), gathered.kept)
+    }
+
     /// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip.
     /// Light takes them to lie in `stand`.
     fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), [from, to]: [Place; 2], stand: &Stand) {
         let plan = self.plan;
-        let kept = plan.kept_stretch(ray);
+        let (kept, _) = gathered.kept;
         let n = plan.iso.len();
         let in_order = (0..n).map(|i| plan.iso[if from.value < to.value { i } else { n - 1 - i }]);
         for iso in in_order.filter(|&iso| (from.value < iso) != (to.value < iso)) {
@@ -155,13 +192,11 @@ impl<'a> Marcher<'a> {
             if steps < kept[0] || steps > kept[1] {
                 continue;
             }
-            let s = steps * plan.step;
-            let at = per_axis(|c| ray.0[c] + ray.1[c] * s);
-            let b = stand.sides(self.scene.tree.grid.normalise(at)).barycentric().map(|b| b.max(0.0));
-            let whole = reciprocal(((b[0] + b[1]) + (b[2] + b[3])).max(1.0));
             let color = plan.lookup(iso);
             if color[3] > 0.0 {
-                gathered.add(color, stand, b.map(|b| b * whole));
+                let normal =
+                    if gathered.light.is_some() { gathered.normal_at(stand, self.barycentric_at(ray, stand, steps)) } else { [0.0; 3] };
+                gathered.add(color, normal);
             }
         }
     }

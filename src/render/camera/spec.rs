@@ -177,7 +177,9 @@ impl CameraSpec {
         } else {
             let (from, up) = self.side(bounds);
             let framed = Camera::frame_from(bounds, points, aspect, from, up, self.ortho.is_none().then_some(fov));
-            Camera { eye: framed.eye + (target - center), ..framed }
+            // A target that was asked for lies in the middle of the picture, where the mesh need not.
+            let depth = (center - framed.eye).dot(framed.forward);
+            Camera { eye: self.target.map_or(framed.eye, |_| target - framed.forward * depth), ..framed }
         };
         if let Some(Some(height)) = self.ortho {
             camera.projection = Projection::Orthographic(height);
