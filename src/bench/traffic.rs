@@ -13,24 +13,27 @@
 //! |---|---|
 //! | `mesh.clear` | the table of faces 20 t, mates 16 t |
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
-//! | `mesh.boundary` | cells 16 t, vertices 16 p; faces, mates and neighbours, each 16 t written and read |
+//! | `mesh.shapes` | cells 16 t, vertices 16 p |
+//! | `mesh.faces` | cells 16 t; faces written and read, mates written, each 16 t |
+//! | `mesh.boundary` | cells 16 t; mates read and neighbours written, each 16 t |
 //! | `build.depth` | cells 16 t, points 12 p |
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; only a number where every tetrahedron has one share |
 //! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and places of shares 8 s, codes and ids 8 n |
-//! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after odd passes 16 n |
+//! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after an odd number of serial passes 16 n |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
 //! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; quarters, if any: 12 n, cells 16 t, vertices 16 p |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value. "Digits" is the table of digit counts of the
-//! sort; an odd number of passes is followed by a copy of the pairs. Marks are used with boundary lists. Quarters read
+//! sort; an odd number of serial passes is followed by a copy of the pairs. Marks are used with boundary lists. Quarters read
 //! the codes (4 n) and read and write P (8 n).
 
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
 use crate::kernels::Target;
 use crate::options::Lists;
+use crate::reference::quarters::id_mask;
 
 /// Bytes that a scan moves per value.
 const SCAN: u64 = 12;
@@ -51,9 +54,10 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let (passes, digit_bits) = target.sort.passes(3 * level);
     let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
     let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
-    let sort = if level == 0 || n < 2 { 0 } else { u64::from(passes) * pass + if passes % 2 == 1 { 16 * n } else { 0 } };
+    let sort =
+        if level == 0 || n < 2 { 0 } else { u64::from(passes) * pass + if target.sort.serial && passes % 2 == 1 { 16 * n } else { 0 } };
     let runs = n.div_ceil(u64::from(target.run.rows)) * u64::from(level + 1);
-    let quarters = if options.lists == Lists::Boundary { cells_and_vertices + 12 * n } else { 0 };
+    let quarters = if id_mask(options.lists, input.tets as usize) == u32::MAX { 0 } else { cells_and_vertices + 12 * n };
     let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
     let stages = [
         ("mesh.clear", 36 * t),
