@@ -46,6 +46,17 @@ float steps(float x, float scale) {
     return many;
 }
 
+// A half axis, its longest component (the first of several) longer by `gap`.
+vec4 grown(vec4 axis, float gap) {
+    uint longest = 0u;
+    for (uint c = 1u; c < 3u; ++c) longest = abs(axis[c]) > abs(axis[longest]) ? c : longest;
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float more = axis[c] + (axis[c] < 0.0 ? -gap : gap);
+        if (c == longest) axis[c] = more;
+    }
+    return axis;
+}
+
 void main() {
     if (item_index() > 0u) return;
     Grid g = grid.at[0];
@@ -96,9 +107,17 @@ void main() {
         precise float reach = far + more;
         plan.reach[c] = reach;
     }
-    plan.half0 = normalised[0];
-    plan.half1 = normalised[1];
-    plan.half2 = normalised[2];
+    // A centre is rounded by up to 2^-22 of the coordinates of the mesh around it; every half axis is longer by so much, at
+    // least, so that boxes side by side leave no gap.
+    float far = 0.0;
+    for (uint c = 0u; c < 3u; ++c) {
+        precise float at = max(abs(g.lo[c]), abs(g.hi[c])) * g.scale;
+        far = max(far, canonical(at));
+    }
+    precise float gap = ceil(far * two_to(60)) * two_to(-42);
+    plan.half0 = grown(normalised[0], gap);
+    plan.half1 = grown(normalised[1], gap);
+    plan.half2 = grown(normalised[2], gap);
     plan.refused = large ? 2u : uint(flat_box);
     plans.at[0] = plan;
 }

@@ -161,6 +161,15 @@ impl VoxelGrid {
             let unit = if x.abs() > most { 0.0 } else { canonical(x * grid.scale) };
             (unit * two_to(82)).round() * two_to(-42)
         };
+        // A centre is rounded by up to 2^-22 of the coordinates of the mesh around it; every half axis is longer by so
+        // much, at least, so that boxes side by side leave no gap.
+        let far = (0..3).map(|c| canonical(grid.lo[c].abs().max(grid.hi[c].abs()) * grid.scale)).fold(0.0, f32::max);
+        let gap = (far * two_to(60)).ceil() * two_to(-42);
+        let grown = |axis: [f32; 3]| {
+            let longest = (1..3).fold(0, |best, c| if axis[c].abs() > axis[best].abs() { c } else { best });
+            let more = if axis[longest] < 0.0 { -gap } else { gap };
+            [0, 1, 2].map(|c| if c == longest { axis[c] + more } else { axis[c] })
+        };
         let normalised = self.half.map(|axis| axis.map(normalise));
         let sum = |axes: &[[f32; 3]; 3], c: usize| (axes[0][c].abs() + axes[1][c].abs()) + axes[2][c].abs();
         let flat = normalised.iter().any(|axis| axis.iter().all(|&x| x == 0.0));
@@ -173,9 +182,9 @@ impl VoxelGrid {
             next_voxel: pad(self.next_voxel),
             next_row: pad(self.next_row),
             next_layer: pad(self.next_layer),
-            half0: pad(normalised[0]),
-            half1: pad(normalised[1]),
-            half2: pad(normalised[2]),
+            half0: pad(grown(normalised[0])),
+            half1: pad(grown(normalised[1])),
+            half2: pad(grown(normalised[2])),
             reach: pad([0, 1, 2].map(reach)),
             width: self.size[0],
             height: self.size[1],
