@@ -158,6 +158,7 @@ fn info_tells_mesh_and_tree() {
             "tangled_cells",
         ],
     );
+    assert_eq!((&result["volume"], &result["parts"]), (&120.0.into(), &1.into()));
     assert_eq!(result["neighbour_bytes"], 16 * 720);
     has_keys(&result["tree"], &["l", "entries", "nodes", "leaves", "bytes", "paper_bytes", "build_ms"]);
     assert_eq!((result["cells"].as_u64(), result["points"].as_u64()), (Some(720), Some(210)));
@@ -170,7 +171,7 @@ fn info_tells_mesh_and_tree() {
         (Some(2), Some(4), Some(4))
     );
     let page = olbvh(folder.path(), &["info", "kuhn:6,5,4", "--device", "cpu"]);
-    for part in ["720", "jet", "level of the leaves", "as the paper counts"] {
+    for part in ["720", "jet", "volume", "level of the leaves", "as the paper counts"] {
         assert!(text(&page.stdout).contains(part), "no {part} in {}", text(&page.stdout));
     }
 }

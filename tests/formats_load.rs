@@ -355,3 +355,15 @@ fn cut_blocks_say_how_much_is_there() {
         println!("{error}");
     }
 }
+
+/// The XML parser quotes the file in its messages, which must not reach the terminal as they are.
+#[test]
+fn messages_about_xml_are_short_and_printable() {
+    for inside in ["\u{1b}[31m\u{7}\nx".to_owned(), "A".repeat(100_000)] {
+        for (begin, end) in [("<UnstructuredGrid></P", ">"), ("<P", ">"), ("<UnstructuredGrid a='&", ";'>")] {
+            let text = format!("<VTKFile type=\"UnstructuredGrid\">{begin}{inside}{end}");
+            let error = load_bytes("a.vtu", text.into_bytes(), &LoadOptions::default()).unwrap_err().to_string();
+            assert!(error.len() < 600 && !error.contains(char::is_control) && error.contains("line"), "{error}");
+        }
+    }
+}

@@ -9,7 +9,7 @@ use olbvh::formats::{
     LoadOptions, Located, OutputFormat, SliceGrid, SliceWriter, load, load_points, write_json, write_located, write_mesh, write_npy,
     write_png,
 };
-use olbvh::mesh::{Field, Mesh, On};
+use olbvh::mesh::{Field, Mesh, On, kuhn};
 
 fn names(folder: &Path) -> Vec<String> {
     let mut names: Vec<_> = std::fs::read_dir(folder).unwrap().map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
@@ -203,6 +203,34 @@ fn large_tables_of_points() {
         let error = load_points(&path).unwrap_err().to_string();
         assert!(error.contains("line 200001: 2 instead of 3 columns, separated by commas"), "{error}");
     }
+}
+
+/// Vectors and tensors are arrays of the file again, and become the same fields when it is read.
+#[test]
+fn components_are_gathered_in_arrays() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("out.vtu");
+    let mut mesh = kuhn([1, 1, 1]).unwrap();
+    let n = mesh.points.len();
+    let mut add = |on: On, n: usize, name: &str, value: f32| {
+        mesh.fields.push(Field { name: name.into(), on, values: (0..n).map(|i| value * i as f32).collect() });
+    };
+    for (name, value) in
+        [("v", 5.0), ("v.x", 3.0), ("v.y", 0.0), ("v.z", -4.0), ("odd", 5.0), ("odd.x", 1.0), ("odd.y", 1.0), ("odd.z", 1.0)]
+    {
+        add(On::Points, n, name, value);
+    }
+    for c in 0..6 {
+        add(On::Cells, 6, &format!("s.{c}"), c as f32);
+    }
+    write_mesh(&path, &mesh).unwrap();
+    let text = String::from_utf8_lossy(&std::fs::read(&path).unwrap()).into_owned();
+    for (name, components) in [("jet", 1), ("v", 3), ("odd", 1), ("odd.z", 1), ("s", 6)] {
+        assert!(text.contains(&format!("Name=\"{name}\" NumberOfComponents=\"{components}\"")), "{name}");
+    }
+    let read = load(&path, &LoadOptions::default()).unwrap().mesh;
+    let fields = |mesh: &Mesh| mesh.fields.iter().map(|f| (f.name.clone(), f.on, f.values.clone())).collect::<Vec<_>>();
+    assert_eq!(fields(&read), fields(&mesh));
 }
 
 #[test]

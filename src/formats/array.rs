@@ -3,7 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::budget::Budget;
-use crate::mesh::On;
+use crate::mesh::{Field, On};
 
 /// An array of a file: `components` values per point or per cell of the file.
 pub(crate) struct Array {
@@ -28,12 +28,46 @@ impl Array {
 
     /// Suffixes that are appended to the array's name to name its fields.
     pub fn suffixes(&self) -> &'static [&'static str] {
-        match self.components {
-            1 => &[""],
-            3 => &["", ".x", ".y", ".z"],
-            n => &[".0", ".1", ".2", ".3", ".4", ".5", ".6", ".7", ".8"][..n],
-        }
+        suffixes(self.components)
     }
+}
+
+/// Most components of an array that becomes fields.
+pub(crate) const MOST_COMPONENTS: usize = 9;
+
+/// Suffixes of the fields that an array becomes: its components, and before those of a vector, its length.
+pub(crate) fn suffixes(components: usize) -> &'static [&'static str] {
+    match components {
+        1 => &[""],
+        3 => &["", ".x", ".y", ".z"],
+        n => &[".0", ".1", ".2", ".3", ".4", ".5", ".6", ".7", ".8"][..n.min(MOST_COMPONENTS)],
+    }
+}
+
+/// Length of a vector.
+pub(crate) fn length(v: impl IntoIterator<Item = f32>) -> f32 {
+    v.into_iter().map(|x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt() as f32
+}
+
+/// The array whose fields begin at the first of `fields`: its name, and the fields of its components. Reverses how arrays
+/// become fields.
+pub(crate) fn gathered(fields: &[Field]) -> Option<(&str, &[Field])> {
+    let first = fields.first()?;
+    let named = |base: &str, suffixes: &[&str]| {
+        let mut pairs = fields.iter().zip(suffixes);
+        fields.len() >= suffixes.len() && pairs.all(|(f, suffix)| f.on == first.on && f.name.strip_prefix(base) == Some(suffix))
+    };
+    let of = |components: usize| {
+        let suffixes = suffixes(components);
+        let base = first.name.strip_suffix(suffixes[0]).filter(|base| named(base, suffixes))?;
+        let parts = &fields[suffixes.len() - components..suffixes.len()];
+        let is_length = |(i, &v): (usize, &f32)| {
+            let of_parts = length(parts.iter().map(|part| part.values.get(i).copied().unwrap_or(f32::NAN)));
+            v == of_parts || v.is_nan() && of_parts.is_nan()
+        };
+        (components != 3 || first.values.iter().enumerate().all(is_length)).then_some((base, parts))
+    };
+    (2..=MOST_COMPONENTS).rev().chain([1]).find_map(of)
 }
 
 /// The names that are taken by fields.

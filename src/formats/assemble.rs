@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::PathBuf;
 
-use super::array::{Array, Names};
+use super::array::{Array, MOST_COMPONENTS, Names, length};
 use super::budget::Budget;
 use super::cells::{CellType, Shape, ghost, split};
 use super::report::{CellCount, Fate, Report};
@@ -306,7 +306,7 @@ impl Assembly {
         for mut array in std::mem::take(&mut self.arrays).into_iter().filter(|array| ghost(&array.name).is_none()) {
             let count = if array.on == On::Points { n_points } else { self.n_cells };
             let shown = excerpt(array.name.as_bytes());
-            if array.components == 0 || array.components > 9 {
+            if array.components == 0 || array.components > MOST_COMPONENTS {
                 self.warnings.push(format!("array `{shown}` is left out: {} components", array.components));
                 continue;
             }
@@ -331,8 +331,7 @@ impl Assembly {
                 continue;
             }
             let tuples = || array.values.chunks_exact(array.components);
-            let length = |v: &[f32]| v.iter().map(|&x| f64::from(x) * f64::from(x)).sum::<f64>().sqrt() as f32;
-            let lengths = (array.components == 3).then(|| tuples().map(length).collect());
+            let lengths = (array.components == 3).then(|| tuples().map(|v| length(v.iter().copied())).collect());
             let parts = (0..array.components).map(|c| tuples().map(|v| v[c]).collect());
             for (suffix, values) in array.suffixes().iter().zip(lengths.into_iter().chain(parts)) {
                 fields.push(Field { name: format!("{name}{suffix}"), on: array.on, values: spread(values) });

@@ -21,6 +21,8 @@ pub(crate) enum Format {
 /// File name extensions of the formats that can be read.
 pub(crate) const READABLE: &str = ".vtu, .pvtu, .vtm, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
+/// For what meshio cannot read.
+const SAVE_AS: &str = "save it as .vtu, for example with ParaView (File, Save Data)";
 
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
 pub(crate) fn detect(source: &Source) -> Result<Format> {
@@ -96,7 +98,8 @@ fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {
     } else {
         return None;
     };
-    Some(format!("a file in {found}, which cannot be read; {CONVERT}"))
+    let advice = if found == "VTKHDF" { SAVE_AS } else { CONVERT };
+    Some(format!("a file in {found}, which cannot be read; {advice}"))
 }
 
 /// Names a foreign format of text. `is` tells whether the first line that is no comment starts like this, `has_dollar`

@@ -179,12 +179,20 @@ pub(crate) fn skip_comments(bytes: &[u8]) -> usize {
 
 /// A word of a file, made fit for a message: [`printable`], and only the start of a long one.
 pub(crate) fn excerpt(word: &[u8]) -> String {
-    const MOST: usize = 60;
-    let cut = &word[..word.len().min(MOST)];
+    shortened(word, 60)
+}
+
+/// A text that names words of a file, such as the message of a parser, made fit for a message as in [`excerpt`].
+pub(crate) fn passage(text: &str) -> String {
+    shortened(text.as_bytes(), 200)
+}
+
+fn shortened(word: &[u8], most: usize) -> String {
+    let cut = &word[..word.len().min(most)];
     let (mut text, mut is_whole) = (String::new(), cut.len() == word.len());
     for c in String::from_utf8_lossy(cut).chars() {
         let escaped = c.escape_default();
-        if text.chars().count() + if is_escaped(c) { escaped.len() } else { 1 } > MOST {
+        if text.chars().count() + if is_escaped(c) { escaped.len() } else { 1 } > most {
             is_whole = false;
             break;
         }

@@ -7,11 +7,11 @@ use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
 use super::scalar::Scalar;
-use super::source::{Source, excerpt};
+use super::source::{Source, excerpt, passage};
 use super::tokens::Tokens;
 use super::vtu_data::{Appended, Codec, Place, StoredArray};
 use super::vtu_outline::Outline;
-use crate::error::Result;
+use crate::error::{Error, Result};
 
 /// What a file contains.
 pub(crate) enum Document {
@@ -91,10 +91,10 @@ impl Parser<'_, '_> {
             match event {
                 Err(error) => {
                     let at = self.outline.in_file(self.reader.error_position() as usize);
-                    return Err(self.source.error_line(at, format!("not well-formed XML: {error}")));
+                    return Err(self.ill_formed(at, &error));
                 }
                 Ok(Event::Eof) if self.stack.is_empty() => break,
-                Ok(Event::Eof) => return fail(format!("the file ends inside <{}>", self.stack.join("><"))),
+                Ok(Event::Eof) => return fail(format!("the file ends inside <{}>", passage(&self.stack.join("><")))),
                 Ok(Event::DocType(e)) if e.trim_start().get(..4).is_some_and(|t| t.eq_ignore_ascii_case("html")) => {
                     return fail("an HTML page, not a mesh".into());
                 }
@@ -167,14 +167,19 @@ impl Parser<'_, '_> {
         Ok(Some(Appended { base64, range: start..stop }))
     }
 
+    /// The parser quotes the file in its messages.
+    fn ill_formed(&self, at: usize, error: &dyn std::fmt::Display) -> Error {
+        self.source.error_line(at, format!("not well-formed XML: {}", passage(&error.to_string())))
+    }
+
     fn attributes(&self, element: &BytesStart<'_>, at: usize) -> Result<Vec<(String, String)>> {
         let mut found = Vec::new();
         // The check for duplicates is quadratic, so it is disabled; no element of this format has more than 64
         // attributes.
         for attribute in element.attributes().with_checks(false).take(64) {
-            let attribute = attribute.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            let attribute = attribute.map_err(|e| self.ill_formed(at, &e))?;
             let value = quick_xml::escape::unescape(&attribute.value);
-            let value = value.map_err(|e| self.source.error_line(at, format!("not well-formed XML: {e}")))?;
+            let value = value.map_err(|e| self.ill_formed(at, &e))?;
             found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
         }
         Ok(found)

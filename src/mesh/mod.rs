@@ -2,6 +2,7 @@
 
 pub mod cases;
 mod kuhn;
+mod measure;
 mod procedural;
 pub(crate) use kuhn::hash;
 pub use kuhn::{kuhn, kuhn_jittered};
@@ -54,7 +55,8 @@ impl On {
 /// A named scalar field.
 #[derive(Clone, Debug)]
 pub struct Field {
-    /// Name, as in the source.
+    /// Name, as in the source. Readers make several fields of an array of several components: those of a vector `v` are
+    /// `v`, its length, and `v.x`, `v.y` and `v.z`; those of other arrays `a` are `a.0`, `a.1` and so on.
     pub name: String,
     /// Whether the values belong to points or tetrahedra.
     pub on: On,
@@ -82,12 +84,12 @@ impl Mesh {
 
     /// The id of the file cell that tetrahedron `tet` came from.
     pub fn cell_id(&self, tet: u32) -> u32 {
-        self.cell_ids.as_ref().map_or(tet, |ids| ids[tet as usize])
+        self.cell_ids.as_ref().and_then(|ids| ids.get(tet as usize).copied()).unwrap_or(tet)
     }
 
     /// The number of a point in the source.
     pub fn point_id(&self, point: u32) -> u32 {
-        self.point_ids.as_ref().map_or(point, |ids| ids[point as usize])
+        self.point_ids.as_ref().and_then(|ids| ids.get(point as usize).copied()).unwrap_or(point)
     }
 
     /// The field with this name.

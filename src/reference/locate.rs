@@ -108,8 +108,6 @@ impl<'a> Locator<'a> {
     /// a face near the point, that one is the result. In a mesh whose tetrahedra do not overlap it is the owner that
     /// [`Locator::locate`] finds.
     pub fn locate_near(&self, p: [f32; 3], hint: u32) -> Location {
-        let usable_ids = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.mesh.points.len() && !t[..i].contains(&v));
-        let hint = if self.mesh.tets.get(hint as usize).is_some_and(usable_ids) { hint } else { NONE };
         self.stride_to(p, hint, HINTED).unwrap_or_else(|| self.locate(p))
     }
 
@@ -203,8 +201,10 @@ impl<'a> Locator<'a> {
     }
 
     /// The owner of `p`, if it can be reached from `hint` in fewer than `most` steps across faces and `p` is not near
-    /// an edge; see [`Walker::stride_to`].
+    /// an edge; see [`Walker::stride_to`]. A bad tetrahedron is no hint.
     pub fn stride_to(&self, p: [f32; 3], hint: u32, most: u32) -> Option<Location> {
+        let usable = |t: &[u32; 4]| t.iter().enumerate().all(|(i, &v)| (v as usize) < self.mesh.points.len() && !t[..i].contains(&v));
+        self.mesh.tets.get(hint as usize).filter(|t| usable(t))?;
         let (_, x) = place(&self.tree.grid, p)?;
         Some(self.location(self.walker().stride_to(hint, x, most)?, x))
     }

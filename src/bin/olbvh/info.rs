@@ -9,7 +9,7 @@ use olbvh::formats::{Fate, Loaded, printable};
 use olbvh::grid::MAX_LEVEL;
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Fineness, Lists};
-use olbvh::reference::boundary::Fault;
+use olbvh::reference::boundary::{Fault, fault_of};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 
@@ -43,9 +43,23 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let progress = Progress::new(common, "building");
     let summary = engine.summary(&loaded.mesh, &options)?;
+    let solid = Solid::of(&loaded.mesh);
     drop(progress);
-    let json = json(args, engine.as_ref(), &loaded, &summary);
-    output::result(common, &json, &page(args, engine.as_ref(), &loaded, &summary, common.verbose).to_string())
+    let json = json(args, engine.as_ref(), &loaded, &solid, &summary);
+    output::result(common, &json, &page(args, engine.as_ref(), &loaded, &solid, &summary, common.verbose).to_string())
+}
+
+/// What the valid tetrahedra are together.
+struct Solid {
+    volume: f64,
+    parts: usize,
+}
+
+impl Solid {
+    fn of(mesh: &Mesh) -> Self {
+        let valid = |tet| fault_of(mesh, tet).is_none();
+        Self { volume: mesh.volume(valid), parts: mesh.parts(valid) }
+    }
 }
 
 /// Lower and upper corner in the coordinates of the source.
@@ -53,7 +67,7 @@ fn bounds(mesh: &Mesh, summary: &Summary) -> [[f64; 3]; 2] {
     [summary.bounds.lo, summary.bounds.hi].map(|corner| [0, 1, 2].map(|c| mesh.origin[c] + single(corner[c])))
 }
 
-fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value {
+fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, solid: &Solid, s: &Summary) -> Value {
     let (mesh, tree) = (&loaded.mesh, &args.tree);
     let [lo, hi] = bounds(mesh, s);
     let field = |f: &Field| {
@@ -79,6 +93,8 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
         "tangled_cells": loaded.report.tangled,
         "fields": mesh.fields.iter().map(field).collect::<Vec<_>>(),
         "bounds": { "min": lo, "max": hi },
+        "volume": solid.volume,
+        "parts": solid.parts,
         "warnings": loaded.report.warnings,
         "device": engine.name(),
         "target": engine.target().map(|shapes| shapes.target.name.clone()),
@@ -99,9 +115,9 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary) -> Value
     all
 }
 
-fn page(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary, verbose: bool) -> Page {
+fn page(args: &Args, engine: &dyn Engine, loaded: &Loaded, solid: &Solid, s: &Summary, verbose: bool) -> Page {
     let mut page = Page::default();
-    add_mesh(&mut page, args, loaded, s);
+    add_mesh(&mut page, args, loaded, solid, s);
     add_fields(&mut page, &loaded.mesh);
     add_tree(&mut page, args, &engine.name(), s);
     add_memory(&mut page, s);
@@ -114,7 +130,7 @@ fn page(args: &Args, engine: &dyn Engine, loaded: &Loaded, s: &Summary, verbose:
     page
 }
 
-fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, s: &Summary) {
+fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, solid: &Solid, s: &Summary) {
     let Loaded { mesh, report } = loaded;
     page.section(&format!("Mesh {}", args.mesh.display()));
     page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
@@ -147,6 +163,8 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, s: &Summary) {
     let [lo, hi] = bounds(mesh, s);
     page.row("bounds", format_args!("({}) to ({})", joined(&lo, ", "), joined(&hi, ", ")));
     page.row("extent", joined(&[0, 1, 2].map(|c| s.bounds.hi[c] - s.bounds.lo[c]), " × "));
+    page.row("volume", solid.volume as f32);
+    page.row("parts", format_args!("{}, each connected by points", grouped(solid.parts as u64)));
 }
 
 fn add_fields(page: &mut Page, mesh: &Mesh) {

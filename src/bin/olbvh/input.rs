@@ -36,8 +36,8 @@ pub struct TreeArgs {
     /// Answers do not depend on it where cells do not overlap.
     #[arg(long, default_value_t = BuildOptions::default().lists, value_parser = named::<Lists>, value_name = "all|boundary")]
     pub lists: Lists,
-    /// Maximum memory for the arrays of the tree, for example 64MiB (units B, KiB, MiB, GiB, kB, MB, GB; a plain number
-    /// is in bytes). The tree is made coarser than --alpha selects until it fits, judged by the most that it could need
+    /// Maximum memory for the arrays of the tree, for example 64MiB (units B, KiB, MiB, GiB, kB, MB, GB; K, M and G are
+    /// KiB, MiB and GiB; a plain number is in bytes). The tree is made coarser than --alpha selects until it fits, judged by the most that it could need
     /// with `--lists all --assign aabb`. Default: no limit. Answers do not depend on it where cells do not overlap.
     #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub budget: Option<u64>,
@@ -75,9 +75,10 @@ pub struct MemoryArgs {
 fn bytes(text: &str) -> Result<u64, String> {
     let digits = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
     let (number, unit) = (&text[..digits], text[digits..].trim());
-    let units =
-        [("", 1.0), ("B", 1.0), ("KiB", 1024.0), ("MiB", 1_048_576.0), ("GiB", 1_073_741_824.0), ("kB", 1e3), ("MB", 1e6), ("GB", 1e9)];
-    let factor = units.into_iter().find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|u| u.1);
+    let units = [("", 0), ("B", 0), ("KiB", 10), ("K", 10), ("MiB", 20), ("M", 20), ("GiB", 30), ("G", 30)]
+        .map(|(name, power)| (name, f64::from(1u32 << power)));
+    let decimal = [("kB", 1e3), ("MB", 1e6), ("GB", 1e9)];
+    let factor = units.into_iter().chain(decimal).find(|(name, _)| name.eq_ignore_ascii_case(unit)).map(|u| u.1);
     let bytes = number.parse::<f64>().ok().zip(factor).map(|(n, factor)| (n * factor).floor());
     // Any such number below 2^63 fits u64.
     bytes.filter(|b| (0.0..9e18).contains(b)).map(|b| b as u64).ok_or_else(|| "a number and a unit, such as 64MiB, 1.5GiB or 500000".into())

@@ -10,7 +10,9 @@ use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::Fineness;
 use olbvh::query::{self, LocateMethod, LocateOptions};
+use olbvh::reference::boundary::valid_grid;
 use olbvh::reference::locate::Location;
+use olbvh::render::Bounds;
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::HashSet;
@@ -122,6 +124,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     };
     drop(progress);
     let took = done.took;
+    if done.found == 0 && !points.is_empty() {
+        let (grid, [x, y, z]) = (valid_grid(mesh), mesh.origin);
+        let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
+        let Bounds { lo, hi } = Bounds::from(&grid);
+        common.remark(format_args!("no point lies in the mesh, which reaches from {} to {}", corner(lo), corner(hi)));
+    }
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     seconds -= took.build_seconds;
     let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };

@@ -9,7 +9,7 @@ use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
 use olbvh::blocks::{InBlocks, Meshes};
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
-use olbvh::mesh::{Mesh, On};
+use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::reference::boundary::{is_usable, valid_grid};
 use olbvh::reference::overlap::{Effort, Overlap};
@@ -208,17 +208,27 @@ impl Done {
     }
 }
 
-/// A mesh of some of the cells, in the order of their ids, with all points and fields.
+/// A mesh of some of the cells, in the order of their ids, with their points, and all fields.
 fn part(mesh: &Mesh, tets: &[u32]) -> Mesh {
-    let mut part = mesh.clone();
     let mut tets = tets.to_vec();
     tets.sort_by_key(|&t| mesh.cell_id(t));
-    part.tets = tets.iter().map(|&t| mesh.tets[t as usize]).collect();
-    part.cell_ids = Some(tets.iter().map(|&t| mesh.cell_id(t)).collect());
-    for field in part.fields.iter_mut().filter(|f| f.on == On::Cells) {
-        field.values = tets.iter().map(|&t| field.values[t as usize]).collect();
+    let mut points: Vec<u32> = tets.iter().flat_map(|&t| mesh.tets[t as usize]).collect();
+    points.sort_unstable();
+    points.dedup();
+    // Every vertex is among the points.
+    let place = |v: u32| points.binary_search(&v).unwrap_or_default() as u32;
+    let field = |field: &Field| {
+        let chosen = if field.on == On::Points { &points } else { &tets };
+        Field { values: chosen.iter().map(|&i| field.values[i as usize]).collect(), ..field.clone() }
+    };
+    Mesh {
+        points: points.iter().map(|&v| mesh.points[v as usize]).collect(),
+        tets: tets.iter().map(|&t| mesh.tets[t as usize].map(place)).collect(),
+        cell_ids: Some(tets.iter().map(|&t| mesh.cell_id(t)).collect()),
+        point_ids: Some(points.iter().map(|&v| mesh.point_id(v)).collect()),
+        fields: mesh.fields.iter().map(field).collect(),
+        ..*mesh
     }
-    part
 }
 
 /// Parses an axis and an angle such as `z,30` or `1,1,0,45`.

@@ -1,5 +1,6 @@
 //! Writer for VTK XML unstructured grids with appended raw data, compressed with zlib.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::io::Write;
 use std::path::Path;
@@ -9,7 +10,8 @@ use rayon::prelude::*;
 
 use super::{OutputFile, write_file, xml_attribute};
 use crate::error::Result;
-use crate::mesh::{Mesh, On};
+use crate::formats::array::{gathered, suffixes};
+use crate::mesh::{Field, Mesh, On};
 
 /// The numbers of an array.
 #[derive(Clone, Copy)]
@@ -114,7 +116,21 @@ fn pack(bytes: &[u8], data: &mut Vec<u8>) -> std::io::Result<()> {
     Ok(())
 }
 
-/// Writes a mesh with its fields as `.vtu`. If cells were split or reordered, their ids become the array `cell_id`; if
+/// Fields as arrays of a file: name, components, what the values belong to, and values. Components are arrays again.
+fn arrays(mut fields: &[Field]) -> Vec<(&str, usize, On, Cow<'_, [f32]>)> {
+    let mut arrays = Vec::new();
+    while let Some((name, parts)) = gathered(fields) {
+        let n = parts.len();
+        let tuples =
+            || (0..parts[0].values.len()).flat_map(|i| parts.iter().map(move |part| part.values.get(i).copied().unwrap_or(f32::NAN)));
+        let values = if n == 1 { Cow::Borrowed(&parts[0].values[..]) } else { tuples().collect() };
+        arrays.push((name, n, parts[0].on, values));
+        fields = &fields[suffixes(n).len()..];
+    }
+    arrays
+}
+
+/// Writes a mesh with its fields as `.vtu`; components of vectors and the like are one array again. If cells were split or reordered, their ids become the array `cell_id`; if
 /// points were reordered, theirs become `point_id`. These are ids of the file that the mesh was read from, so a field of
 /// that name, which an earlier such file may have left, gives way to them.
 ///
@@ -127,9 +143,10 @@ pub fn write_mesh(path: impl AsRef<Path>, mesh: &Mesh) -> Result<()> {
     let points = Column { name: "Points", components: 3, block };
     let ends: Vec<u32> = (1..=mesh.tets.len() as u32).map(|i| 4 * i).collect();
     let types = vec![10; mesh.tets.len()];
+    let arrays = arrays(&mesh.fields);
     let columns = |on: On| -> Vec<Column<'_>> {
-        let fields = mesh.fields.iter().filter(|f| f.on == on);
-        fields.map(|f| Column { name: &f.name, components: 1, block: Block::F32(&f.values) }).collect()
+        let arrays = arrays.iter().filter(|(_, _, of, _)| *of == on);
+        arrays.map(|(name, components, _, values)| Column { name, components: *components, block: Block::F32(values) }).collect()
     };
     let (mut point_data, mut cell_data) = (columns(On::Points), columns(On::Cells));
     for (name, ids, columns) in [("point_id", &mesh.point_ids, &mut point_data), ("cell_id", &mesh.cell_ids, &mut cell_data)] {

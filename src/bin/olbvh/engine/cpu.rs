@@ -3,7 +3,7 @@
 use super::{Engine, OnProgress, Sink, Summary};
 use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::{Error, Result};
-use olbvh::mesh::{Field, Mesh};
+use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateMethod, LocateOptions, Located, Rendered};
 use olbvh::reference::boundary::{Topology, topology};

@@ -6,7 +6,7 @@ use olbvh::blocks::{self, InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
-use olbvh::mesh::{Field, Mesh};
+use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
 use olbvh::query::Located;
 use olbvh::reference::boundary::{Counts, fault_of};

@@ -1,0 +1,73 @@
+//! Measures of a whole mesh.
+
+use super::Mesh;
+
+impl Mesh {
+    /// Volume of the tetrahedra that are `valid`, each of which counts as positive, in units of the mesh to the third
+    /// power. Tetrahedra that overlap count twice.
+    pub fn volume(&self, valid: impl Fn(u32) -> bool) -> f64 {
+        // Six times the volume, which is a whole number where coordinates are.
+        let of = |tet: &[u32; 4]| {
+            let [a, b, c, d] = tet.map(|v| self.points[v as usize].map(f64::from));
+            let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+            let cross = [v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]];
+            (u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2]).abs()
+        };
+        (0..).zip(&self.tets).filter(|&(t, _)| valid(t)).map(|(_, tet)| of(tet)).sum::<f64>() / 6.0
+    }
+
+    /// Number of parts into which the tetrahedra that are `valid` fall: two that have a point in common belong together.
+    pub fn parts(&self, valid: impl Fn(u32) -> bool) -> usize {
+        const UNUSED: u32 = u32::MAX;
+        // The parent of each point; the root of a part is its own.
+        let mut parents = vec![UNUSED; self.points.len()];
+        let mut parts = 0;
+        for (_, tet) in (0..).zip(&self.tets).filter(|&(t, _)| valid(t)) {
+            let mut part = UNUSED;
+            for &v in tet {
+                if parents[v as usize] == UNUSED {
+                    parents[v as usize] = v;
+                    parts += 1;
+                }
+                let root = root(&mut parents, v);
+                if part == UNUSED {
+                    part = root;
+                } else if part != root {
+                    parents[root as usize] = part;
+                    parts -= 1;
+                }
+            }
+        }
+        parts
+    }
+}
+
+/// The root of a point's part. Halves the way there for those that ask next.
+fn root(parents: &mut [u32], mut v: u32) -> u32 {
+    while parents[v as usize] != v {
+        let above = parents[parents[v as usize] as usize];
+        parents[v as usize] = above;
+        v = above;
+    }
+    v
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::mesh::kuhn;
+
+    #[test]
+    fn a_grid_and_a_copy_of_it() {
+        let mut mesh = kuhn([2, 3, 4]).unwrap();
+        assert_eq!((mesh.volume(|_| true), mesh.parts(|_| true)), (24.0, 1));
+        let (points, n) = (mesh.points.clone(), mesh.points.len() as u32);
+        mesh.points.extend(points.iter().map(|p| [p[0] + 9.0, p[1], p[2]]));
+        let copies: Vec<_> = mesh.tets.iter().map(|&[a, b, c, d]| [b, a, c, d].map(|v| v + n)).collect();
+        mesh.tets.extend(copies);
+        assert_eq!((mesh.volume(|_| true), mesh.parts(|_| true)), (48.0, 2));
+        assert_eq!((mesh.volume(|t| t < 144), mesh.parts(|t| t >= 144)), (24.0, 1));
+        assert_eq!((mesh.volume(|_| false), mesh.parts(|_| false)), (0.0, 0));
+        mesh.tets.push([0, 1, n, n + 1]);
+        assert_eq!(mesh.parts(|_| true), 1);
+    }
+}
