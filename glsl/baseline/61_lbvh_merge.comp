@@ -21,6 +21,7 @@ BUFFER(7, writeonly, uint, root)    // reference of the root
 BUFFER(8, readonly, MeshStatus, status)
 
 #include "shared/binary_tree.glsl"
+#include "shared/boundary_tet.glsl"
 
 // Whether places i and i + 1 are closer together than j and j + 1: the smaller difference of codes, then of places.
 bool closer(uint i, uint j) {
@@ -38,7 +39,7 @@ void main() {
     if (climbs) {
         box_of(me, lo, hi);
         uint t = ids.at[first];
-        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) me |= BINARY_BOUNDARY;
+        if (is_boundary_tet(t)) me |= BINARY_BOUNDARY;
     }
     for (uint depth = 0u; climbs && depth < BINARY_DEPTH; ++depth) {
         if (first == 0u && last == valid - 1u) {

@@ -24,6 +24,7 @@ BUFFER(8, READ_WRITE, uint, owners)
 BUFFER16(9, READ_WRITE, uvec4, barycentrics)
 BUFFER(10, READ_WRITE, uint, unfinished)
 #include "shared/binary_owner.glsl"
+#include "shared/points.glsl"
 
 void main() {
     uint i = item_index();
@@ -33,7 +34,7 @@ void main() {
     // No barycentric coordinate has the bits of NONE, which are a NaN that no operation produces.
     if (i < count && (fresh != 0u || state.x == NONE)) {
         Grid g = grid.at[0];
-        vec3 at = vec3(points.at[3u * i], points.at[3u * i + 1u], points.at[3u * i + 2u]);
+        vec3 at = point(i, 3u);
         vec3 x = normalise(g, at);
         OwnerSearch s = no_search();
         if (fresh == 0u) s = OwnerSearch(state.y, best_of(owners.at[i], state.z, uintBitsToFloat(state.w)));

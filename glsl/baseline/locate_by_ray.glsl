@@ -18,6 +18,7 @@ BUFFER(5, readonly, float, points)
 BUFFER(6, writeonly, uint, owners)
 BUFFER16(7, writeonly, vec4, barycentrics)
 #include "shared/candidates.glsl"
+#include "shared/points.glsl"
 
 const vec3 WAY = vec3(0.36, 0.48, 0.8); // of unit length, and in no plane of a regular grid
 const float SCALE = 9.094947017729282379150390625e-13; // 2^-40: the coordinates of the scene are in [0, 2)
@@ -28,7 +29,7 @@ uvec2 first_face(vec3 origin, float most);
 void locate(uint i) {
     if (i >= count) return;
     Grid g = grid.at[0];
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 at = point(i, stride);
     uint owner = NONE;
     vec4 b = vec4(0.0);
     if (near_bounds(g, at)) {

@@ -25,6 +25,7 @@ BUFFER(7, readonly, uint, boundary)
 #include "shared/touching.glsl"
 #include "shared/candidates.glsl"
 #include "shared/marks.glsl"
+#include "shared/boundary_tet.glsl"
 
 void mark_word(uint word, uint bits) {
     if ((bits & ~marks.at[word]) != 0u) atomicOr(marks.at[word], bits);
@@ -53,7 +54,7 @@ void main() {
     if (LATER != 0u) {
         Share share;
         if (!share_of(item_index(), tets, min(shares.at[0], capacity), share)) return;
-        if ((boundary.at[share.t >> 5u] >> (share.t & 31u) & 1u) != 0u) mark(g, share.t, share.first);
+        if (is_boundary_tet(share.t)) mark(g, share.t, share.first);
         return;
     }
     uint first = TETS * item_index();

@@ -32,6 +32,7 @@ BUFFER(11, READ_WRITE, uint, doubt_count) // zeroed
 #include "shared/touching.glsl"
 #include "shared/candidates.glsl"
 #include "shared/marks.glsl"
+#include "shared/boundary_tet.glsl"
 #include "shared/seeds.glsl"
 
 void main() {
@@ -53,7 +54,7 @@ void main() {
     uint bits = low_bits(n), centres = 0u;
     if (LISTS != 0u) {
         sift(g.level, box, at, n, centres_of(tet, h, box), bits, centres);
-        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) centres = 0u;
+        if (is_boundary_tet(t)) centres = 0u;
     }
     // Inside the mesh no candidate is marked, and no planes need to be made.
     if (ASSIGN != 0u && bits != 0u) bits = touching(make_filter(tet, g, g.level, ASSIGN), box, at, bits);

@@ -5,14 +5,13 @@
 ARGUMENTS(2)
     uint iterations;
 END_ARGUMENTS
-BUFFER(0, READ_WRITE, uint, lanes)    // 64 loop counts, 64 ballot counts, 64 sums; 64 results of each of five computations
+BUFFER(0, writeonly, uint, lanes)    // 64 loop counts, 64 ballot counts, 64 sums; 64 results of each of five computations
 BUFFER(1, readonly, float, operands) // three for each invocation
 
 void main() {
     uint i = local_index();
     uint n = 0u;
     // The limit is an argument, so that no compiler can evaluate the loop.
-    if (i < 64u) lanes.at[i] = 0u;
     for (uint k = 0u; k < iterations; ++k) {
         n += 1u + (n >> 31u);
         if (n == NONE) break;

@@ -35,6 +35,7 @@ RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
+#include "shared/points.glsl"
 
 const uint LEAST_PART = 16384u; // most entries of a list whose owner guides the next point, also where parts are longer
 const uint HINTS = 1u; // a tetrahedron per point, or NONE
@@ -50,7 +51,7 @@ struct Point {
 // The point at a place.
 Point point_at(Grid g, uint place) {
     uint i = GUIDE == ORDER ? guides.at[place] : place;
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 at = point(i, stride);
     return Point(i, at, normalise(g, at));
 }
 

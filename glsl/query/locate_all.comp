@@ -30,6 +30,7 @@ RECORDS(12, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
+#include "shared/points.glsl"
 
 // Writes those tetrahedra of the star of x in `owner` that contain x, from `place` on. Returns their number.
 uint list_star(uint owner, vec3 x, uint place) {
@@ -55,7 +56,7 @@ void main() {
     uint i = item_index();
     if (i >= count || owners.at[i] == NONE) return;
     Grid g = grid.at[0];
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 at = point(i, stride);
     vec3 x = normalise(g, at);
     uint leaf = find_leaf(g.level, quantize(g, at));
     Tet own = load_tet(words(cells.at[owners.at[i]]));

@@ -29,6 +29,7 @@ RECORDS(11, uvec4, neighbours)
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
 #include "shared/owner_walk.glsl"
+#include "shared/points.glsl"
 
 uint point_code;
 uint leaf_found;
@@ -45,7 +46,7 @@ void main() {
     uint i = item_index();
     if (i >= count) return;
     Grid g = grid.at[0];
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 at = point(i, stride);
     leaf_found = NONE;
     uint owner = NONE;
     vec4 b = vec4(0.0);

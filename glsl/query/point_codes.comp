@@ -13,12 +13,13 @@ BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, points)
 BUFFER(2, writeonly, uint, codes)
 BUFFER(3, writeonly, uint, order)
+#include "shared/points.glsl"
 
 void main() {
     uint i = item_index();
     if (i >= count) return;
     Grid g = grid.at[0];
-    vec3 at = vec3(points.at[i * stride], points.at[i * stride + 1u], points.at[i * stride + 2u]);
+    vec3 at = point(i, stride);
     codes.at[i] = (near_bounds(g, at) ? morton(quantize(g, at)) : NONE) >> (3u * MAX_LEVEL - CODE_BITS) & (1u << CODE_BITS) - 1u;
     order.at[i] = i;
 }

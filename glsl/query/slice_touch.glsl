@@ -30,6 +30,7 @@ STRUCTURE(7)
 BUFFER(7 + STRUCTURE_BUFFERS, readonly, uint, boundary)
 #endif
 #include "shared/vertices.glsl"
+#include "shared/boundary_tet.glsl"
 
 TouchState state;
 vec3 x;    // centre of the voxel in normalised coordinates
@@ -98,7 +99,7 @@ uint at_boundary(uint begin, uint left) {
     uint found = 0u;
     for (; left != 0u; left &= left - 1u) {
         uint t = listed_tet(begin + findLSB(left));
-        if ((boundary.at[t >> 5u] >> (t & 31u) & 1u) != 0u) found |= left & -left;
+        if (is_boundary_tet(t)) found |= left & -left;
     }
     return found;
 }

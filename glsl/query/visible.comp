@@ -30,8 +30,9 @@ bool is_visible(float lo, float hi) {
 }
 
 void main() {
-    uint word = item_index(), nodes = status.at[0].nodes;
-    if (32u * word >= nodes || status.at[0].overflow != 0u) return;
+    // A tree that found no room has nothing visible; its root is looked up all the same.
+    uint word = item_index(), nodes = status.at[0].overflow != 0u ? 0u : status.at[0].nodes;
+    if (32u * word >= max(nodes, 1u)) return;
     uint bits = 0u;
     for (uint i = 0u; i < min(32u, nodes - 32u * word); ++i) {
         uint node = 32u * word + i;

@@ -3,6 +3,7 @@
 #include "shared/binary_tree.glsl"
 #include "shared/candidates.glsl"
 #include "shared/owner_search.glsl"
+#include "shared/boundary_tet.glsl"
 
 // Boxes are grown by this share of their size, so that tetrahedra that contain a point only within the tolerance are
 // met, too.
@@ -55,7 +56,7 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     s = no_search();
     if (best.owner == NONE) return true;
     // A tetrahedron that is not on the boundary has neighbours on all sides, so what lies next to it lies in the mesh.
-    bool surrounded = (boundary.at[best.owner >> 5u] >> (best.owner & 31u) & 1u) == 0u;
+    bool surrounded = !is_boundary_tet(best.owner);
     if (best.inside || best.smallest >= -(surrounded ? max(tolerance, ROUNDING) : tolerance)) owner = best.owner;
     return true;
 }
