@@ -565,7 +565,7 @@ typedef struct olbvh_location {
  */
 typedef struct olbvh_location_parts_data {
   /*
-   Size of `olbvh_location.memory` in bytes: 0 except for path 2.
+   Size of `olbvh_location.memory` in bytes: 0 except for paths 2 and 3.
    */
   uint64_t bytes;
 } olbvh_location_parts_data;

@@ -30,7 +30,8 @@
 //! From C, `olbvh_scene_arrays` returns addresses and bindings, and `olbvh_tree_info` describes a tree in memory owned
 //! by the library.
 //!
-//! To use several trees, call `olbvh_open` again. Answers are the same bytes as those of [`crate::query::locate`]. A
+//! To use several trees by address, call `olbvh_open` again. Every function that you call is compiled into your shader
+//! as often as you call it, and they are long: call each at one place, in a loop. Answers are the same bytes as those of [`crate::query::locate`]. A
 //! leaf's list is searched in one go, so on drivers that limit the time of a draw prefer a small α, or
 //! `Lists::Boundary`.
 

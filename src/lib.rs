@@ -23,8 +23,8 @@
 //! calls, [`gpu::Gpu::with_pool`].
 //!
 //! # In your own renderer
-//! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], as exported
-//! here). At start-up, compute the sizes ([`primitives::Arena::measure`] runs a `carve` function without memory),
+//! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], exported
+//! here like [`glam`]). At start-up, compute the sizes ([`primitives::Arena::measure`] runs a `carve` function without memory),
 //! create one buffer, and run the same `carve` over it. Then record the commands in every frame.
 //! ```no_run
 //! use olbvh::{build::*, gpu::{Buffer, BufferRef, Gpu, Recorder}, options::BuildOptions, primitives::Arena, query::*, Result};
@@ -62,8 +62,9 @@
 //!   between frames. So do descriptor pools on devices without buffer addresses. Data that does not change (cells,
 //!   fields) can be shared.
 //! - **Queues**: a [`gpu::Gpu`] records for one queue family. Semaphores and timelines are yours: recording submits
-//!   nothing. Only the owning calls ([`build::DeviceMesh::upload`], [`build::Tree::build`], [`query::locate`] …)
-//!   submit, under the queue's lock, and wait for a fence.
+//!   nothing. Only the owning calls ([`build::DeviceMesh::upload`], [`build::Tree::build`], [`query::locate`] …) and
+//!   [`gpu::Gpu::run`], which runs what you record on a device that this crate has opened, submit, under the queue's
+//!   lock, and wait for a fence.
 //! - **Threads**: everything is [`Send`] and [`Sync`], except that a [`gpu::Recorder`] belongs to one thread.
 //! - **A lost device** is reported as an [`Error::Vulkan`] with its `vk::Result`, by the call that waited. Drop
 //!   everything and start again with a new device.
@@ -122,7 +123,7 @@ pub mod tree;
 pub mod tune;
 
 /// The versions whose types appear in the interface for host applications.
-pub use {ash, gpu_allocator};
+pub use {ash, glam, gpu_allocator};
 
 pub use error::{Error, Result};
 

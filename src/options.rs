@@ -1,6 +1,7 @@
 //! Options of a build, the same for the device and the CPU. They do not depend on Vulkan.
 
 use crate::error::{Error, Result};
+use crate::grid::MAX_LEVEL;
 use crate::named::named;
 
 /// Default tolerance: how far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf
@@ -143,6 +144,17 @@ impl BuildOptions {
             Ok((f64::from(self.alpha) * 65536.0).round() as u32)
         } else {
             Err(Error::Invalid(format!("alpha is {}, it must be from 0 to 10", self.alpha)))
+        }
+    }
+
+    /// The level that is asked for instead of the one that α gives.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if it is not in 0…10.
+    pub fn checked_level(&self) -> Result<Option<u32>> {
+        match self.level {
+            Some(level) if level > MAX_LEVEL => Err(Error::Invalid(format!("level is {level}, it must be from 0 to {MAX_LEVEL}"))),
+            level => Ok(level),
         }
     }
 }

@@ -3,8 +3,7 @@
 mod stats;
 pub use stats::{TreeBytes, TreeStats};
 
-use crate::grid::Box6;
-use crate::grid::{Grid, MAX_LEVEL, morton};
+use crate::grid::{Box6, Grid, MAX_LEVEL, morton};
 use crate::layout::bit;
 use crate::options::{Assign, Lists};
 use std::ops::Range;

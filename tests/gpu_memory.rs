@@ -63,15 +63,18 @@ fn a_build_allocates_what_it_needs() {
     for (assign, lists) in Assign::EVERY.into_iter().flat_map(|assign| Lists::EVERY.map(|lists| (assign, lists))) {
         let before = allocated(&gpu);
         let options = BuildOptions { assign, lists, ..BuildOptions::default() };
-        let tree = Tree::build(&gpu, &on_device, &options).unwrap();
+        let counting = gpu.with_memory(1 << 40);
+        let tree = Tree::build(&counting, &on_device, &options).unwrap();
         let status = *tree.status();
         let capacity = Capacity { candidates: status.candidates, entries: status.entries, nodes: status.nodes, level: status.level };
         let planned = Arena::measure(|a| BuildScratch::carve(&gpu, a, on_device.input().tets, &capacity, &options));
         // Allows for the head of 512 bytes and the rounding of each buffer.
         let slack = 8192;
-        assert!(tree.scratch_bytes() <= planned.unwrap() + slack, "{assign}: {} scratch bytes", tree.scratch_bytes());
+        let planned = planned.unwrap() + slack;
+        let (peak, kept) = (counting.memory_peak(), allocated(&gpu) - before);
+        assert!(tree.scratch_bytes() <= planned, "{assign}: {} scratch bytes", tree.scratch_bytes());
+        assert!((kept..=planned + kept).contains(&peak), "{assign}: {peak} bytes at most, {planned} planned beside the tree's {kept}");
         let host = tree.download().unwrap();
-        let kept = allocated(&gpu) - before;
         assert!(kept <= host.memory().total() + slack, "{assign}: {kept} bytes kept for a tree of {}", host.memory().total());
         drop(tree);
         assert_eq!(allocated(&gpu), before, "{assign}");

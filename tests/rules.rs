@@ -15,7 +15,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("layout", &[]),
     ("grid", &["layout"]),
     ("mesh", &["error"]),
-    ("options", &["error", "named"]),
+    ("options", &["error", "grid", "named"]),
     ("tree", &["grid", "layout", "options"]),
     ("slicing", &["error", "grid", "layout", "named"]),
     ("render", &["error", "grid", "layout", "mesh"]),

@@ -7,7 +7,7 @@ use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhM
 use crate::layout::LbvhNode;
 use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::sealed::Sealed;
-use crate::query::{BinaryTree, Built, LocateOutput, Located, Rounds, Structure, StructureView};
+use crate::query::{BinaryTree, Built, LocateOutput, Located, PointInput, Rounds, Structure, StructureView, numbered};
 
 /// Bits of a code: ten per axis, and one that sorts bad tetrahedra last.
 const CODE_BITS: u32 = 31;
@@ -89,10 +89,10 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     r.stage("lbvh.sort", |r| cmd_sort_pairs(r, codes, ids, CODE_BITS, Count::host(tets), &sort))?;
     r.barrier("lbvh.sort → lbvh.merge");
     r.stage("lbvh.merge", |r| {
-        // One subgroup per workgroup where a memory barrier may act as a control barrier of the workgroup; see the
-        // kernel.
+        // One subgroup (of the size that kernels of baselines have) per workgroup where a memory barrier may act as a
+        // control barrier of the workgroup; see the kernel.
         let alone = matches!(Row::of(r.gpu().report()), Row::Cpu | Row::Apple);
-        let workgroup = if alone { r.gpu().subgroup_size() } else { r.gpu().target().each };
+        let workgroup = if alone { r.gpu().report().query_subgroup } else { r.gpu().target().each };
         let spec = LbvhMergeSpec { workgroup, ..Default::default() };
         let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, status, tets };
         r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup)))
@@ -105,7 +105,8 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
 /// there is none at the end.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for no rounds, [`crate::Error::Vulkan`] if the pipeline cannot be made.
+/// [`crate::Error::Invalid`] for no rounds or for parts of fewer points, [`crate::Error::TooLarge`] for points of more
+/// than 2^31 floats, [`crate::Error::Vulkan`] if the pipeline cannot be made.
 pub fn cmd_locate_lbvh(
     r: &mut Recorder<'_>,
     (mesh, tree): (&MeshView, &BinaryTree),
@@ -116,6 +117,9 @@ pub fn cmd_locate_lbvh(
     rounds: Rounds,
 ) -> Result<()> {
     rounds.check()?;
+    PointInput { points, stride: 3, count, hints: None, order: None }.check()?;
+    output.check(count)?;
+    unfinished.check(4, "the word of unfinished points")?;
     let (MeshArrays { grid, boundary, vertices, .. }, cells) = (mesh.arrays, mesh.input.cells);
     let (BinaryTree { nodes, root, ids }, LocateOutput { owners, barycentrics }) = (*tree, *output);
     let workgroup = r.gpu().target().query;
@@ -197,12 +201,12 @@ impl Lbvh {
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
         mesh.check(&self.mesh)?;
         let gpu = &self.gpu;
-        let n = points.len() as u64;
+        let (n, count) = (points.len() as u64, numbered(points.len())?);
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
         let (memory, (owners, barycentrics, unfinished)) = Arena::reserve(gpu, "olbvh.lbvh.located", carve)?;
         let view = mesh.view();
-        let (asked, output) = ((uploaded.all(), points.len() as u32), LocateOutput { owners, barycentrics });
+        let (asked, output) = ((uploaded.all(), count), LocateOutput { owners, barycentrics });
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {
             let record = |r: &mut Recorder<'_>| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);

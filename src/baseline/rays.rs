@@ -6,13 +6,13 @@
 //! is not the first. Every answer is verified to contain its point; a point whose ray went wrong is lost. A point on a
 //! face gets any of the tetrahedra at that face.
 
-use crate::build::{DeviceMesh, KeptMesh, MeshInput};
+use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
 use crate::grid::two_to;
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::query::{LocateOutput, Located, PointInput};
+use crate::query::{LocateOutput, Located, PointInput, numbered};
 
 /// Factor from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
 const SCALE: f32 = two_to(-40);
@@ -119,7 +119,7 @@ impl Rays {
         &self.stages
     }
 
-    /// Records point location, without hints. The result is a tetrahedron that contains the point, or `u32::MAX` if the
+    /// Records point location in the mesh of the structure, without hints. The result is a tetrahedron that contains the point, or `u32::MAX` if the
     /// point is outside or lost. Reads mesh and points in compute shaders, and writes `output` in compute shaders,
     /// without a barrier before or after. A ray-tracing pipeline adds a barrier before, from compute shaders and
     /// transfers, and one after, to these and the host.
@@ -127,10 +127,10 @@ impl Rays {
     /// # Errors
     /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a
     /// ray-tracing pipeline can launch rays, and those of [`crate::query::cmd_locate`].
-    pub fn cmd_locate(&self, r: &mut Recorder<'_>, mesh: &DeviceMesh, input: &PointInput, output: &LocateOutput) -> Result<()> {
+    pub fn cmd_locate(&self, r: &mut Recorder<'_>, input: &PointInput, output: &LocateOutput) -> Result<()> {
         input.check()?;
         output.check(input.count)?;
-        let (grid, cells, vertices) = (mesh.arrays().grid, mesh.input().cells, mesh.arrays().vertices);
+        let MeshView { input: MeshInput { cells, .. }, arrays: MeshArrays { grid, vertices, .. } } = self.mesh.view;
         let (sides, longest, scene) = (self.sides.all(), self.longest, self.structure.address());
         let PointInput { points, stride, count, .. } = *input;
         let LocateOutput { owners, barycentrics } = *output;
@@ -154,13 +154,13 @@ impl Rays {
     /// [`crate::Error::Memory`], or a failed Vulkan call.
     pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
         mesh.check(&self.mesh)?;
-        let n = points.len() as u64;
+        let (n, count) = (points.len() as u64, numbered(points.len())?);
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));
         let (memory, (owners, barycentrics)) = Arena::reserve(&self.gpu, "olbvh.rays.located", carve)?;
-        let input = PointInput { points: uploaded.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
+        let input = PointInput { points: uploaded.all(), stride: 3, count, hints: None, order: None };
         let output = LocateOutput { owners, barycentrics };
-        let ((), time) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, mesh, &input, &output))?;
+        let ((), time) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, &input, &output))?;
         Ok(Located {
             owners: self.gpu.download(&memory, owners.part(0, 4 * n))?,
             barycentrics: self.gpu.download(&memory, barycentrics.part(0, 16 * n))?,

@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, On};
 use crate::options::BuildOptions;
-use crate::query::{self, LocateOptions, Located, Progress, SILENT};
+use crate::query::{self, LocateOptions, Located, Progress, SILENT, numbered};
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{CHUNK, place};
 use std::slice::from_ref;
@@ -78,11 +78,6 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'
 /// The work on some points (their numbers, then their coordinates) that lie in a block or the whole mesh. It may be
 /// repeated with a part of the points.
 type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
-
-/// The number of points, which 32 bits number.
-fn numbered(points: usize) -> Result<u32> {
-    u32::try_from(points).map_err(|_| Error::TooLarge(format!("{points} points; ask for {} at most at a time", u32::MAX)))
-}
 
 /// Queries the whole mesh, if it fits, or one block after another.
 fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {

@@ -46,6 +46,8 @@ use stages::Build;
 /// Scratch memory of a whole build.
 #[derive(Clone, Copy, Debug)]
 pub struct BuildScratch {
+    /// What it was carved for.
+    made_for: (u32, Capacity, BuildOptions),
     pub(crate) counts: CountScratch,
     pub(crate) filter: Option<FilterScratch>,
     pub(crate) sorted: SortedScratch,
@@ -69,10 +71,27 @@ impl BuildScratch {
             )));
         }
         Ok(Self {
+            made_for: (tets, *capacity, *options),
             counts: CountScratch::carve(gpu, arena, tets)?,
             filter: FilterScratch::carve(gpu, arena, tets, options, capacity)?,
             sorted: SortedScratch::carve(gpu, arena, capacity)?,
         })
+    }
+
+    /// Rejects a build of another kind or size than the one that the memory was carved for.
+    fn check(&self, tets: u32, tree: &TreeMemory, options: &BuildOptions) -> Result<()> {
+        let (room, capacity, carved) = &self.made_for;
+        let kind = |o: &BuildOptions| (o.assign, o.lists, o.boxes, o.capacity);
+        let wrong = if tets > *room {
+            format!("{tets} tetrahedra, in memory for {room}")
+        } else if kind(options) != kind(carved) || kind(options) != (tree.assign, tree.lists, tree.boxes.is_some(), options.capacity) {
+            "assign, lists, boxes or capacity other than those that tree and scratch were carved for".into()
+        } else if *capacity != tree.capacity {
+            "a tree and scratch that were carved for different capacities".into()
+        } else {
+            return Ok(());
+        };
+        Err(Error::Invalid(format!("a build of {wrong}")))
     }
 }
 
@@ -86,9 +105,11 @@ impl BuildScratch {
 /// barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for α outside 0…10.
+/// [`crate::Error::Invalid`] for α or a level outside 0…10, and for a mesh, a tree or options that `scratch` was not carved
+/// for.
 pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, options: &BuildOptions, scratch: &BuildScratch) -> Result<()> {
-    let BuildScratch { counts, filter, sorted } = scratch;
+    scratch.check(mesh.input.tets, tree, options)?;
+    let BuildScratch { counts, filter, sorted, .. } = scratch;
     let (capacity, filter) = (&tree.capacity, filter.as_ref());
     let build = Build { mesh, options, status: tree.status, grid: tree.grid, counts, filter };
     // Without a filter, every candidate is an entry.

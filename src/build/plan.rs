@@ -14,7 +14,7 @@ pub(crate) const MAX_ENTRIES: u32 = i32::MAX.cast_unsigned();
 
 /// Sizes that bound a build. A recorded build needs room for at least as many candidates as there are tetrahedra:
 /// [`super::BuildScratch::carve`] refuses less.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Capacity {
     /// Cells in the quantized boxes of all tetrahedra, which are the entries of `Aabb`. They take scratch memory only:
     /// where they are filtered, 12 bytes for every 32 candidates.

@@ -177,6 +177,12 @@ impl<'a> Stage0<'a> {
     pub fn new(input: &'a MeshInput, arrays: &'a MeshArrays, scratch: &'a MeshScratch) -> Result<Self> {
         check_tets(input.tets)?;
         check_points("positions", input.points, input.stride)?;
+        if let Some(others) = input.points.checked_sub(1) {
+            input.positions.check(4 * (u64::from(input.stride) * u64::from(others) + 3), "positions")?;
+        }
+        input.cells.check(16 * u64::from(input.tets), "cells")?;
+        arrays.vertices.check(16 * u64::from(input.points), "the mesh's vertices")?;
+        arrays.neighbours.check(16 * u64::from(input.tets), "the mesh's neighbours")?;
         Ok(Self { input, arrays, scratch })
     }
 

@@ -72,6 +72,8 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
 #[derive(Debug)]
 pub struct FieldRanges {
     gpu: Gpu,
+    /// The tree that they are of.
+    tree: TreeMemory,
     buffer: Buffer,
     stages: Vec<StageTime>,
 }
@@ -84,7 +86,7 @@ impl FieldRanges {
     pub fn new(mesh: &DeviceMesh, tree: &Tree, field: (&[f32], On)) -> Result<Self> {
         let gpu = tree.gpu();
         let buffer = gpu.buffer("olbvh.ranges.values", range_bytes(tree.status().nodes))?;
-        let mut made = Self { gpu: gpu.clone(), buffer, stages: Vec::new() };
+        let mut made = Self { gpu: gpu.clone(), tree: *tree.memory(), buffer, stages: Vec::new() };
         made.update(mesh, tree, field)?;
         Ok(made)
     }
@@ -98,7 +100,7 @@ impl FieldRanges {
         mesh.check(tree.mesh())?;
         mesh.check_device(&self.gpu)?;
         on.check(values, mesh.sizes())?;
-        if self.buffer.size() < range_bytes(tree.status().nodes) {
+        if self.tree.status != tree.memory().status {
             return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
         }
         let field = self.gpu.upload("olbvh.ranges.field", values)?;
@@ -120,8 +122,8 @@ impl FieldRanges {
     ///
     /// # Errors
     /// A failed transfer.
-    pub fn download(&self, tree: &Tree) -> Result<Vec<[f32; 2]>> {
-        self.gpu.download(&self.buffer, self.memory().part(0, range_bytes(tree.status().nodes)))
+    pub fn download(&self) -> Result<Vec<[f32; 2]>> {
+        self.gpu.download(&self.buffer, self.memory())
     }
 
     /// Device time of the last update.

@@ -36,7 +36,7 @@ impl Build<'_> {
         let Self { mesh, options, status, grid, counts, .. } = *self;
         let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
         let workgroup = r.gpu().target().each;
-        let (alpha, requested) = (options.alpha_fixed()?, options.level.unwrap_or(NONE));
+        let (alpha, requested) = (options.alpha_fixed()?, options.checked_level()?.unwrap_or(NONE));
         let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
         let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
         let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);

@@ -237,12 +237,19 @@ fn put<T>(out: *mut T, value: T) -> Result<()> {
     Ok(())
 }
 
+/// Rejects an array larger than any memory, which a wrong count gives.
+fn check_count<T>(count: usize, what: &str) -> Result<()> {
+    let fits = count.checked_mul(size_of::<T>()).is_some_and(|bytes| isize::try_from(bytes).is_ok());
+    if fits { Ok(()) } else { Err(Error::TooLarge(format!("{what}: {count} elements are more than memory can hold"))) }
+}
+
 /// The caller's array. A null pointer is allowed for an array without elements.
 fn array<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T]> {
+    check_count::<T>(count, what)?;
     match (pointer.is_null(), count) {
         (_, 0) => Ok(&[]),
         (true, _) => Err(missing(what)),
-        // SAFETY: the caller vouches for `count` elements (see each function).
+        // SAFETY: the caller vouches for `count` elements (see each function), whose bytes an `isize` counts.
         (false, _) => Ok(unsafe { std::slice::from_raw_parts(pointer, count) }),
     }
 }

@@ -173,6 +173,7 @@ impl HeldMesh {
 /// The caller's array that a call fills, and which may hold nothing yet. A null pointer is allowed for an array without
 /// elements.
 fn array_mut<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>]> {
+    super::check_count::<T>(count, what)?;
     match (pointer.is_null(), count) {
         (_, 0) => Ok(&mut []),
         (true, _) => Err(missing(what)),

@@ -190,7 +190,7 @@ pub extern "C" fn olbvh_recording_begin(recording: *mut OlbvhRecording, commands
 pub extern "C" fn olbvh_recording_end(recording: *mut OlbvhRecording) -> OlbvhStatus {
     border(|| {
         let recording = handle_mut(recording, "recording")?;
-        let mut recorder = recording.recorder.take().ok_or_else(not_begun)?;
+        let recorder = recording.recorder.take().ok_or_else(not_begun)?;
         let (rehearsed, room, ended) = (recorder.commands() == vk::CommandBuffer::null(), recorder.descriptor_room(), recorder.finish());
         recording.stages = recorder.timed_stages().to_vec();
         drop(recorder);

@@ -3,8 +3,7 @@
 use super::Group;
 use super::data::Random;
 use crate::error::Result;
-use crate::mesh::cases::axle;
-use crate::mesh::{Mesh, kuhn, kuhn_jittered};
+use crate::mesh::{Mesh, cases::axle, kuhn, kuhn_jittered};
 
 /// A named mesh.
 #[derive(Clone, Copy, Debug)]

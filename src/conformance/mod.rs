@@ -17,8 +17,8 @@
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
 //! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
 //! ranges/slivers/exact/alpha-1/cells       mesh, assignment [, lists], α, field
-//! render/one-tet/iso/points/shaded         mesh, camera, field [, light] [, transfer function] [, parts]
-//! slice/plate/aabb/alpha-2/oblique         mesh, assignment, α, stack of layers
+//! render/one-tet/iso/points/shaded         mesh, camera, field [, light] [, transfer function] [, clips] [, parts]
+//! slice/plate/aabb/alpha-2/oblique         mesh, assignment [, lists], α, stack of layers
 //! overlap/cloud/exact/alpha-1/grid         mesh, assignment [, lists], α, the other mesh
 //! ```
 

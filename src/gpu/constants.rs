@@ -23,9 +23,8 @@ impl Constants {
         let kind = Kind { usage: USAGE, location: MemoryLocation::CpuToGpu };
         let mut memory = Memory::new(heap, NAME, kind, BYTES, |_| Ok(()))?;
         debug::name(names, memory.handle, NAME);
-        let mapped = memory.allocation.as_mut().and_then(|a| a.mapped_slice_mut());
-        let word = mapped.and_then(|bytes| bytes.first_chunk_mut::<4>());
-        *word.ok_or_else(|| Error::NoDevice("no host-visible memory for buffers".into()))? = u32::MAX.to_ne_bytes();
+        let word = memory.mapped_mut().and_then(|bytes| bytes.first_chunk_mut::<4>());
+        *word.ok_or_else(|| Error::NoDevice("no host-visible, coherent memory for buffers".into()))? = u32::MAX.to_ne_bytes();
         Ok(Self(memory))
     }
 

@@ -47,7 +47,7 @@ impl DebugUtils {
             .message_type(vk::DebugUtilsMessageTypeFlagsEXT::VALIDATION | vk::DebugUtilsMessageTypeFlagsEXT::GENERAL)
             .pfn_user_callback(Some(collect))
             .user_data((&raw const *messages).cast_mut().cast());
-        // SAFETY: the instance has the extension; the messages outlive the messenger, which `Gpu` destroys first.
+        // SAFETY: the instance has the extension; the messages outlive the messenger, which `Foundation` destroys first.
         let messenger = unsafe { functions.create_debug_utils_messenger(&info, None) }.ok()?;
         Some(Self { instance: functions, messenger, messages })
     }

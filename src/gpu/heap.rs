@@ -126,8 +126,9 @@ impl Memory {
 
 impl Drop for Memory {
     fn drop(&mut self) {
-        // SAFETY: work on the buffer has ended, since owning calls wait for their submissions before anything is
-        // dropped, and the device outlives all memory (see `Gpu` and `Inner`).
+        // SAFETY: work on the buffer has ended: owning calls wait for their submissions before anything is dropped, and
+        // whoever records for themselves keeps memory until then (`Recorder::new`). The device outlives all memory (see
+        // `Gpu` and `Inner`).
         unsafe { self.heap.device.destroy_buffer(self.handle, None) };
         if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.heap.allocator.lock())
             && let Err(e) = allocator.free(allocation)

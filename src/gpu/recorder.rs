@@ -63,6 +63,11 @@ pub struct Recorder<'a> {
     drop_barrier: Option<u32>,
 }
 
+/// So that the compiler refuses a recorder that outlives its [`Gpu`]: its own pools use the device when they are dropped.
+impl Drop for Recorder<'_> {
+    fn drop(&mut self) {}
+}
+
 impl<'a> Recorder<'a> {
     /// A recorder for a command buffer in the recording state. `timestamps` is a reset query pool and its size; without
     /// effect if the queue family has no timestamps.
@@ -292,7 +297,8 @@ impl<'a> Recorder<'a> {
         if self.is_rehearsal() {
             return work(self);
         }
-        if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(format!("olbvh.{name}"))) {
+        let text = std::ffi::CString::new(format!("olbvh.{}", name.replace('\0', " "))).unwrap_or_default();
+        if let Some(debug) = self.gpu.debug_device() {
             // SAFETY: the label is ended below.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }
@@ -315,8 +321,8 @@ impl<'a> Recorder<'a> {
     /// # Errors
     /// [`Error::Invalid`] with two commands of this recorder that need a barrier between them, or with a fill or copy
     /// that cannot be recorded.
-    pub fn finish(&mut self) -> Result<()> {
-        self.fault.take().map_or(Ok(()), |fault| Err(Error::Invalid(fault)))
+    pub fn finish(&self) -> Result<()> {
+        self.fault.clone().map_or(Ok(()), |fault| Err(Error::Invalid(fault)))
     }
 
     fn timestamp(&mut self) -> Option<u32> {

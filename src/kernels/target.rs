@@ -95,7 +95,7 @@ impl SortTarget {
 
     /// Number of passes and bits per digit for keys of `bits` bits.
     pub fn passes(self, bits: u32) -> (u32, u32) {
-        let passes = bits.div_ceil(self.digit_bits).max(1);
+        let passes = bits.div_ceil(self.digit_bits.max(1)).max(1);
         (passes, bits.div_ceil(passes).max(1))
     }
 

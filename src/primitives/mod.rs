@@ -108,13 +108,14 @@ impl Arena {
     /// [`Error::Invalid`] if the memory is too small, or its offset in its buffer is not a multiple of [`ALIGNMENT`].
     pub fn take(&mut self, bytes: u64) -> Result<BufferRef> {
         let begin = self.used;
-        self.used = (begin + bytes.max(16)).next_multiple_of(ALIGNMENT);
+        let end = begin.saturating_add(bytes.max(16));
+        self.used = end.checked_next_multiple_of(ALIGNMENT).unwrap_or(u64::MAX / ALIGNMENT * ALIGNMENT);
         match self.memory {
             Some(memory) if !memory.offset.is_multiple_of(ALIGNMENT) => {
                 Err(Error::Invalid(format!("memory at byte {} of its buffer; it must begin at a multiple of {ALIGNMENT}", memory.offset)))
             }
             None => Ok(BufferRef { buffer: ash::vk::Buffer::null(), offset: begin, size: bytes.max(16), address: 0 }),
-            Some(memory) if begin + bytes.max(16) <= memory.size => Ok(memory.part(begin, bytes.max(16))),
+            Some(memory) if end <= memory.size => Ok(memory.part(begin, bytes.max(16))),
             Some(memory) => Err(Error::Invalid(format!("{} bytes of memory are too few: at least {} are needed", memory.size, self.used))),
         }
     }
@@ -124,6 +125,6 @@ impl Arena {
     /// # Errors
     /// Those of [`Arena::take`].
     pub fn words(&mut self, n: u64) -> Result<BufferRef> {
-        self.take(4 * n)
+        self.take(n.saturating_mul(4))
     }
 }

@@ -3,7 +3,7 @@
 use super::{Arena, Count};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
-use crate::kernels::{ScanApply, ScanApplySpec, ScanSpine, ScanSpineSpec, ScanTiles, ScanTilesSpec};
+use crate::kernels::{LONGEST_LOOP, ScanApply, ScanApplySpec, ScanSpine, ScanSpineSpec, ScanTiles, ScanTilesSpec};
 
 /// Scratch memory of a scan.
 #[derive(Clone, Copy, Debug)]
@@ -16,9 +16,13 @@ impl ScanScratch {
     /// Takes the scratch memory for up to `max` values.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] if the arena is too small.
+    /// [`crate::Error::Invalid`] if the arena is too small, or for more values than the device's target is made for.
     pub fn carve(gpu: &Gpu, arena: &mut Arena, max: u32) -> Result<Self> {
-        let tiles = max.div_ceil(gpu.target().scan.tile());
+        let target = gpu.target();
+        let tiles = max.div_ceil(target.scan.tile());
+        if tiles.div_ceil(target.spine) > LONGEST_LOOP {
+            target.check_scale()?;
+        }
         Ok(Self { sums: arena.words(u64::from(tiles))?, arguments: arena.words(3)? })
     }
 }

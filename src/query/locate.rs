@@ -15,7 +15,7 @@ use crate::reference::traverse::full_stack;
 
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
 const MAX_STACK: u32 = full_stack(MAX_LEVEL) as u32;
-/// Entries of a list that [`LocateMethod::Traversal`] searches: so many that no loop gets too long for a driver.
+/// Most entries of a list for [`LocateMethod::Traversal`]: so many that no loop gets too long for a driver.
 pub const MOST_TRAVERSED: u32 = 32_000;
 
 /// How the owner of a point is searched for.
@@ -34,8 +34,8 @@ pub enum LocateMethod {
     Sorted,
     /// As [`LocateMethod::Runs`], but along such an order. Suits many points in no particular order on a processor.
     SortedRuns,
-    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (at most 78 are used). Only the
-    /// first [`MOST_TRAVERSED`] entries of a list are searched.
+    /// Finds the leaf by the paper's traversal with a short stack of this many nodes (at most 78 are used). Lists of
+    /// more than [`MOST_TRAVERSED`] entries are refused.
     Traversal(u32),
 }
 
@@ -96,7 +96,7 @@ pub struct PointInput {
     /// Number of points.
     pub count: u32,
     /// For [`LocateMethod::Descent`]: one tetrahedron per point from which its search starts, such as its last owner,
-    /// or `u32::MAX` for none. Only valid tetrahedra of this mesh are allowed. It may be the same part as
+    /// or `u32::MAX` for none; points that have moved little are found in about half the time. Only valid tetrahedra of this mesh are allowed. It may be the same part as
     /// [`LocateOutput::owners`]: a point's hint is read before its owner is written, and no other point reads it.
     pub hints: Option<BufferRef>,
     /// For methods that sort ([`LocateMethod::is_sorted`]): one word per place, the point that is located there; every
@@ -147,7 +147,7 @@ enum Guide {
 ///
 /// # Errors
 /// [`Error::Invalid`] for a stride below 3, for parts of fewer points, or for a method that sorts without an order;
-/// [`Error::TooLarge`] for points of more than 2^31 floats.
+/// [`Error::TooLarge`] for points of more than 2^31 floats, or for lists too long for [`LocateMethod::Traversal`].
 pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, output: &LocateOutput, options: &LocateOptions) -> Result<()> {
     let PointInput { points, stride, count, hints, order } = *input;
     let LocateOutput { owners, barycentrics } = *output;
@@ -167,6 +167,12 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
         LocateMethod::Sorted => (1, Guide::Order, order),
         LocateMethod::SortedRuns => (POINT_RUN, Guide::Order, order),
     };
+    if matches!(options.method, LocateMethod::Traversal(_)) && scene.longest_leaf > MOST_TRAVERSED {
+        let longest = scene.longest_leaf;
+        return Err(Error::TooLarge(format!(
+            "lists of up to {longest} entries; the traversal searches {MOST_TRAVERSED} at most, so locate by LocateMethod::Descent"
+        )));
+    }
     r.stage("query.locate", |r| {
         if let LocateMethod::Traversal(stack) = options.method {
             let arguments = LocateByTraversal {
@@ -253,6 +259,11 @@ pub fn cmd_interpolate(
     let spec = InterpolateSpec { workgroup, on_cells: u32::from(on == On::Cells), ..Default::default() };
     let arguments = Interpolate { cells: scene.mesh.input.cells, field, owners, barycentrics, values, count };
     r.stage("query.interpolate", |r| r.dispatch(&arguments, spec, Groups::Count(count.div_ceil(workgroup))))
+}
+
+/// The number of points, which 32 bits number.
+pub(crate) fn numbered(points: usize) -> Result<u32> {
+    u32::try_from(points).map_err(|_| Error::TooLarge(format!("{points} points; ask for {} at most at a time", u32::MAX)))
 }
 
 /// Most entries that one submission tests even if every point searches the longest list, unless a thousand points test

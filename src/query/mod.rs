@@ -9,6 +9,7 @@ mod visible;
 mod volume;
 
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
+pub(crate) use locate::numbered;
 pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
 pub(crate) use order::code_bits;
 pub use order::{PointOrder, cmd_sort_points};

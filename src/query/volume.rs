@@ -134,8 +134,8 @@ impl RenderMemory {
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small, [`Error::TooLarge`] for 2^31 pixels and more.
     pub fn carve(arena: &mut Arena, size: [u32; 2], skipping: Option<&Capacity>) -> Result<Self> {
-        let pixels = u64::from(size[0]) * u64::from(size[1]);
         let rays = u64::from(rays(size)?);
+        let pixels = u64::from(size[0]) * u64::from(size[1]);
         let bits = skipping.map(|capacity| visible_bytes(capacity.nodes));
         Ok(Self {
             colors: arena.take(16 * pixels)?,
@@ -149,7 +149,8 @@ impl RenderMemory {
 
 /// Number of rays of a picture, in whole blocks.
 fn rays([width, height]: [u32; 2]) -> Result<u32> {
-    let rays = u64::from(width.div_ceil(BLOCK)) * u64::from(height.div_ceil(BLOCK)) * u64::from(BLOCK * BLOCK);
+    let blocks = u64::from(width.div_ceil(BLOCK)) * u64::from(height.div_ceil(BLOCK));
+    let rays = blocks.saturating_mul(u64::from(BLOCK * BLOCK));
     let rays = u32::try_from(rays).ok().filter(|&n| n < 1 << 31);
     rays.ok_or_else(|| Error::TooLarge(format!("a picture of {width}×{height} pixels; draw it in parts")))
 }

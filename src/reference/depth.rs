@@ -85,7 +85,7 @@ impl Sizes {
         let heuristic = self.heuristic(options.alpha_fixed()?);
         let valid = u32::try_from(self.histogram.iter().sum::<u64>()).unwrap_or(u32::MAX);
         // Without a valid tetrahedron, the tree is a root.
-        let wanted = if valid == 0 { 0 } else { options.level.map_or(heuristic, |level| level.min(MAX_LEVEL)) };
+        let wanted = if valid == 0 { 0 } else { options.checked_level()?.unwrap_or(heuristic) };
         let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {
             self.entries[l as usize] <= most

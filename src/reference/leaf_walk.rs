@@ -2,8 +2,7 @@
 //! interrupted and resumed at any Morton code. Twin of `glsl/shared/leaf_walk.glsl`.
 
 use super::traverse::Node;
-use crate::grid::CellRange;
-use crate::grid::{Grid, MAX_LEVEL, canonical, unmorton};
+use crate::grid::{CellRange, Grid, MAX_LEVEL, canonical, unmorton};
 use crate::tree::TreeArrays;
 
 /// Calls `leaf` for every leaf that `enters` accepts, in Morton order, until `leaf` returns true. `enters` decides for

@@ -15,8 +15,7 @@
 //! its finest cells apart, everything is near.
 
 use super::vertices::Vertices;
-use crate::grid::CellRange;
-use crate::grid::{Grid, MAX_LEVEL, per_axis, two_to, unmorton};
+use crate::grid::{CellRange, Grid, MAX_LEVEL, per_axis, two_to, unmorton};
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;

@@ -1,6 +1,6 @@
 //! Checks the rules that every tree must satisfy (SPEC 2.5).
 
-use super::boundary::Topology;
+use super::boundary::{NONE, Topology};
 use super::codes::Stage;
 use super::leaves::{cell_box, flag, octants};
 use super::levels::union;
@@ -33,6 +33,10 @@ impl TreeArrays {
         if topology.neighbours.len() != mesh.tets.len() {
             let (of, is) = (topology.neighbours.len(), mesh.tets.len());
             return Err(Error::Invalid(format!("the topology is of a mesh of {of} tetrahedra, this mesh has {is}")));
+        }
+        let exists = |n: &u32| *n == NONE || (*n as usize) < mesh.tets.len();
+        if !topology.neighbours.as_flattened().iter().all(exists) {
+            return Err(Error::Invalid("the topology names neighbours that this mesh does not have".into()));
         }
         let rules = || -> Rule {
             self.check_grid(topology)?;

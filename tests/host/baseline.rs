@@ -50,7 +50,7 @@ impl Baseline {
         let input = PointInput { points: self.points.all(), stride: 3, count: self.mesh.input().points, hints: None, order: None };
         for rays in &self.rays {
             r.barrier("located → rays.locate");
-            rays.cmd_locate(r, &self.mesh, &input, &self.output)?;
+            rays.cmd_locate(r, &input, &self.output)?;
         }
         Ok(())
     }

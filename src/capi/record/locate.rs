@@ -42,7 +42,7 @@ pub struct OlbvhLocation {
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default)]
 pub struct OlbvhLocationParts {
-    /// Size of `olbvh_location.memory` in bytes: 0 except for path 2.
+    /// Size of `olbvh_location.memory` in bytes: 0 except for paths 2 and 3.
     pub bytes: u64,
 }
 

@@ -218,6 +218,9 @@ pub fn render(
     let [width, height] = plan.size;
     let rays = u64::from(width) * u64::from(height);
     super::rays(plan.size)?;
+    if !plan.rays.is_finite(plan.size) {
+        return Err(Error::Invalid("rays that are no finite numbers; the camera's matrix may have no inverse".into()));
+    }
     let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(strip(mesh.gpu())))?;
     let mut colors = Vec::with_capacity(rays as usize);
     for row in (0..height).step_by(canvas.rows as usize) {
