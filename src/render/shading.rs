@@ -19,7 +19,7 @@ const SPECULAR: f32 = 0.18;
 const FILL: f32 = 0.75;
 /// A normal of the surface has length 1 where the tetrahedra on it are at most this thick, in diagonals. So the lit
 /// skin is equally deep on coarse and on fine meshes.
-pub(super) const SKIN: f64 = 0.02;
+pub(crate) const SKIN: f64 = 0.02;
 /// A gradient makes a normal of length 1 if it would cross the field's range on this part of the diagonal.
 const STEEP: f64 = 0.12;
 

@@ -3,6 +3,7 @@
 
 use super::Scene;
 use crate::mesh::On;
+use crate::render::shading::SKIN;
 use crate::render::{Bounds, OPACITY_UNIT, Projection, RenderSettings, Shade};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
@@ -39,19 +40,30 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
             }
         };
         let half = plan.lighting.map(|light| light.half(way.as_vec3().to_array()));
+        // The distance at which the ray enters through the last of the clips, and that clip's normal.
+        let entries = clips.iter().filter(|(n, _)| n.dot(way) < 0.0).map(|&(n, d)| ((d - n.dot(start)) / n.dot(way), n));
+        let cut = entries.filter(|&(from, _)| from > 0.0).max_by(|a, b| a.0.total_cmp(&b.0));
         let mut sum = [0.0f64; 4];
         let samples = ((start - corner(0)).length() + 2.0 * diagonal) / step;
         for k in 0..samples as u32 {
-            let p = start + way * ((f64::from(k) + 0.5) * step);
+            let along = (f64::from(k) + 0.5) * step;
+            let p = start + way * along;
             if clips.iter().any(|&(n, d)| n.dot(p) > d) {
                 continue;
             }
             let Some((value, normal)) = sample(scene, &cells, p) else { continue };
+            let normal = cut.map_or(normal, |(from, n)| {
+                let depth = along - from;
+                let part = if depth < step { 1.0 } else { (1.0 - depth / (SKIN * diagonal)).max(0.0) };
+                normal + (n - normal) * part
+            });
             let place = ((value - f64::from(range[0])) / span).clamp(0.0, 1.0);
             let [r, g, b, a] = settings.transfer.at(place as f32);
             let a = 1.0 - (1.0 - f64::from(a)).powf(f64::from(settings.opacity_scale) * step / (OPACITY_UNIT * diagonal));
             let shade = match (plan.lighting, half) {
-                (Some(light), Some(half)) if !scene.prepared.normals.is_empty() => light.shade(normal, way.as_vec3().to_array(), half),
+                (Some(light), Some(half)) if !scene.prepared.normals.is_empty() => {
+                    light.shade(normal.as_vec3().to_array(), way.as_vec3().to_array(), half)
+                }
                 _ => Shade { factor: 1.0, added: 0.0, rim: 0.0 },
             };
             if a <= 0.0 {
@@ -83,7 +95,7 @@ fn cells(scene: &Scene<'_>) -> Vec<Cell> {
 }
 
 /// Value and normal at a point; `None` outside the mesh or if the value is not finite.
-fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, [f32; 3])> {
+fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, DVec3)> {
     let (id, b) = cells.iter().find_map(|cell| {
         let b = cell.inverse * (p - cell.corner);
         (b.min_element() >= 0.0 && b.element_sum() <= 1.0).then(|| (cell.id, [1.0 - b.element_sum(), b.x, b.y, b.z]))
@@ -94,6 +106,6 @@ fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, [f32; 3])
         On::Points => mix(ids.map(|i| scene.field.values[i])),
         On::Cells => f64::from(scene.field.values[id]),
     };
-    let normal = [0, 1, 2].map(|c| mix(ids.map(|i| scene.prepared.normals.get(i).map_or(0.0, |n| n[c]))) as f32);
-    value.is_finite().then_some((value, normal))
+    let normal = [0, 1, 2].map(|c| mix(ids.map(|i| scene.prepared.normals.get(i).map_or(0.0, |n| n[c]))));
+    value.is_finite().then_some((value, DVec3::from_array(normal)))
 }
