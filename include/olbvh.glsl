@@ -127,7 +127,7 @@ struct olbvh_RayState {
     uint cursor;    // Not 0: how much of the leaf's list has been searched for the next sample; the search goes on.
     uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
-    uint last;      // `NONE` if the last sample has no value. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
+    uint last;      // `NONE` if the last sample shows nothing. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
     float last_at;  // Distance of that place from the ray's origin in steps.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };

@@ -200,7 +200,7 @@ vec4 barycentric_at(float steps) {
     return within;
 }
 
-// The normal of sample k. The first one behind a surface has that of the place where the ray enters its tetrahedron, and
+// The normal of sample k. The first one behind a surface, or behind what is transparent, has that of the place where the ray enters its tetrahedron, and
 // behind a clip that of the cut: at various depths, even surfaces would have rings. Twin of `Marcher::lit_at`.
 vec3 normal_of_sample(uint k, Sides here, bool joins) {
     precise float at = float(k) + 0.5;
@@ -274,9 +274,9 @@ void take(Sides sides) {
         [[dont_unroll]] for (uint piece = 0u; piece < 2u; ++piece) add_surfaces(ends[piece], ends[piece + 1u]);
         return;
     }
-    state.last = 0u;
     vec4 color = lookup(value);
     if (color.w <= 0.0) return;
+    state.last = 0u;
     if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
     add(color, SHADING != 0u ? normal_of_sample(k, sides, last != NONE) : vec3(0.0));
 }
@@ -351,6 +351,7 @@ void main() {
                     stands = stands && behind - state.next < WALK;
                     skipped += behind - state.next;
                     state.next = behind;
+                    state.last = NONE; // as after a transparent sample
                 }
             }
 #endif

@@ -43,7 +43,7 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
         // The distance at which the ray enters through the last of the clips, and that clip's normal.
         let entries = clips.iter().filter(|(n, _)| n.dot(way) < 0.0).map(|&(n, d)| ((d - n.dot(start)) / n.dot(way), n));
         let cut = entries.filter(|&(from, _)| from > 0.0).max_by(|a, b| a.0.total_cmp(&b.0));
-        let mut sum = [0.0f64; 4];
+        let (mut sum, mut joins_next) = ([0.0f64; 4], false);
         let samples = ((start - corner(0)).length() + 2.0 * diagonal) / step;
         for k in 0..samples as u32 {
             let along = (f64::from(k) + 0.5) * step;
@@ -51,7 +51,15 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
             if clips.iter().any(|&(n, d)| n.dot(p) > d) {
                 continue;
             }
-            let Some((value, normal)) = sample(scene, &cells, p) else { continue };
+            // The first sample that shows something after others that do not is lit where the ray enters its tetrahedron.
+            let joins = std::mem::take(&mut joins_next);
+            let Some((cell, b)) = cells.iter().find_map(|cell| Some((cell, cell.around(p)?))) else { continue };
+            let value = value_at(scene, cell, b);
+            if !value.is_finite() {
+                continue;
+            }
+            let back = if joins { 0.0 } else { cell.way_back(b, way * step).min(along / step) };
+            let normal = normal_at(scene, cell, cell.barycentric(p - way * (step * back)));
             let normal = cut.map_or(normal, |(from, n)| {
                 let depth = along - from;
                 let part = if depth < step { 1.0 } else { (1.0 - depth / (SKIN * diagonal)).max(0.0) };
@@ -69,6 +77,7 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
             if a <= 0.0 {
                 continue;
             }
+            joins_next = true;
             let a = a + (1.0 - a) * f64::from(shade.rim);
             let w = (1.0 - sum[3]) * a;
             for (sum, c) in sum.iter_mut().zip([r, g, b]) {
@@ -94,18 +103,39 @@ fn cells(scene: &Scene<'_>) -> Vec<Cell> {
     scene.mesh.tets.iter().enumerate().filter(|&(t, _)| scene.topology.is_valid(t as u32)).filter_map(cell).collect()
 }
 
-/// Value and normal at a point; `None` outside the mesh or if the value is not finite.
-fn sample(scene: &Scene<'_>, cells: &[Cell], p: DVec3) -> Option<(f64, DVec3)> {
-    let (id, b) = cells.iter().find_map(|cell| {
-        let b = cell.inverse * (p - cell.corner);
-        (b.min_element() >= 0.0 && b.element_sum() <= 1.0).then(|| (cell.id, [1.0 - b.element_sum(), b.x, b.y, b.z]))
-    })?;
-    let ids = scene.mesh.tets[id].map(|i| i as usize);
-    let mix = |v: [f32; 4]| (0..4).map(|i| b[i] * f64::from(v[i])).sum::<f64>();
-    let value = match scene.field.on {
-        On::Points => mix(ids.map(|i| scene.field.values[i])),
-        On::Cells => f64::from(scene.field.values[id]),
-    };
-    let normal = [0, 1, 2].map(|c| mix(ids.map(|i| scene.prepared.normals.get(i).map_or(0.0, |n| n[c]))));
-    value.is_finite().then_some((value, DVec3::from_array(normal)))
+impl Cell {
+    fn barycentric(&self, p: DVec3) -> [f64; 4] {
+        let b = self.inverse * (p - self.corner);
+        [1.0 - b.element_sum(), b.x, b.y, b.z]
+    }
+
+    /// Barycentric coordinates of a point in the tetrahedron.
+    fn around(&self, p: DVec3) -> Option<[f64; 4]> {
+        let b = self.barycentric(p);
+        b.iter().all(|&b| b >= 0.0).then_some(b)
+    }
+
+    /// How many steps, one at most, lead back from a place in the tetrahedron to where it begins.
+    fn way_back(&self, b: [f64; 4], step: DVec3) -> f64 {
+        let change = self.inverse * step;
+        let change = [-change.element_sum(), change.x, change.y, change.z];
+        (0..4).filter(|&i| b[i] < change[i]).map(|i| b[i] / change[i]).fold(1.0, f64::min)
+    }
+}
+
+/// The values of a tetrahedron's corners at barycentric coordinates `b`.
+fn mix(b: [f64; 4], v: [f32; 4]) -> f64 {
+    (0..4).map(|i| b[i] * f64::from(v[i])).sum()
+}
+
+fn value_at(scene: &Scene<'_>, cell: &Cell, b: [f64; 4]) -> f64 {
+    match scene.field.on {
+        On::Points => mix(b, scene.mesh.tets[cell.id].map(|i| scene.field.values[i as usize])),
+        On::Cells => f64::from(scene.field.values[cell.id]),
+    }
+}
+
+fn normal_at(scene: &Scene<'_>, cell: &Cell, b: [f64; 4]) -> DVec3 {
+    let of = |c: usize| scene.mesh.tets[cell.id].map(|i| scene.prepared.normals.get(i as usize).map_or(0.0, |n| n[c]));
+    DVec3::new(mix(b, of(0)), mix(b, of(1)), mix(b, of(2)))
 }

@@ -76,7 +76,7 @@ impl<'a> Marcher<'a> {
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
         let mut gathered =
             Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals, kept: plan.kept_stretch(ray) };
-        // Where the ray leaves the tetrahedron of the last sample, if that has a value.
+        // The last sample, if that showed something; for iso-surfaces, where the ray leaves its tetrahedron.
         let mut last: Option<Place> = None;
         // Each ray starts without a hint, so that no pixel depends on another one.
         self.cell = None;
@@ -94,6 +94,7 @@ impl<'a> Marcher<'a> {
                     self.cell = self.cell.filter(|_| behind - next < WALK);
                     self.skipped_samples += u64::from(behind - next);
                     next = behind;
+                    last = None; // as after a transparent sample
                     continue;
                 } else {
                     check = behind;
@@ -119,9 +120,9 @@ impl<'a> Marcher<'a> {
                 last = Some(to);
                 continue;
             }
-            last = Some(Place { at: k as f32 + 0.5, value });
             let color = plan.lookup(value);
             if color[3] > 0.0 {
+                last = Some(Place { at: k as f32 + 0.5, value });
                 check = check.max(next + 1);
                 let normal =
                     if gathered.light.is_some() { self.lit_at(&gathered, ray, k, (&stand, &sides), before.is_some()) } else { [0.0; 3] };
@@ -158,7 +159,7 @@ impl<'a> Marcher<'a> {
         b.map(|b| b * whole)
     }
 
-    /// The normal of sample k, which lies in `stand`. The first one behind a surface has that of the place where the ray
+    /// The normal of sample k, which lies in `stand`. The first one behind a surface, or behind what is transparent, has that of the place where the ray
     /// enters its tetrahedron, and behind a clip that of the cut: at various depths, even surfaces would have rings.
     fn lit_at(&self, gathered: &Gathered<'_>, ray: ([f32; 3], [f32; 3]), k: u32, (stand, here): (&Stand, &Sides), joins: bool) -> [f32; 3] {
         let at = k as f32 + 0.5;
