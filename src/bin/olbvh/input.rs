@@ -37,8 +37,9 @@ pub struct TreeArgs {
     #[arg(long, default_value_t = BuildOptions::default().lists, value_parser = named::<Lists>, value_name = "all|boundary")]
     pub lists: Lists,
     /// Maximum memory for the arrays of the tree, for example 64MiB (units B, KiB, MiB, GiB, kB, MB, GB; K, M and G are
-    /// KiB, MiB and GiB; a plain number is in bytes). The tree is made coarser than --alpha selects until it fits, judged by the most that it could need
-    /// with `--lists all --assign aabb`. Default: no limit. Answers do not depend on it where cells do not overlap.
+    /// KiB, MiB and GiB; a plain number is in bytes). The tree is made coarser than --alpha selects until it fits,
+    /// judged by the most that it could need with `--lists all --assign aabb`. Default: no limit. Answers do not depend
+    /// on it where cells do not overlap.
     #[arg(long, value_name = "BYTES", value_parser = bytes, allow_negative_numbers = true)]
     pub budget: Option<u64>,
     /// Sort cells and points along a Z-order curve first. This pays if the file has them in no spatial order and there
