@@ -116,7 +116,7 @@ void main() {
     vec4 b;
     uvec2 left = uvec2(OLBVH_NONE);
     uint from = olbvh_locate(start, 0.0, b), owner = OLBVH_NONE;
-    if (from != OLBVH_NONE) owner = olbvh_walk(from, start, end, b, left);
+    owner = olbvh_walk(from, start, end, b, left); // also from nowhere
     found[5 * i] = from;
     found[5 * i + 1] = owner;
     found[5 * i + 2] = left.x;
@@ -136,6 +136,9 @@ fn check_walks(mesh: &Mesh, device: &DeviceMesh, points: &[[f32; 3]], expected: 
         let (a, b) = (points[i], points[k]);
         let what = format!("from {a:?} in {from} to {b:?}: {owner}, left {last} by {vertex}");
         let deep = |p: [f32; 3]| (0..3).map(|c| p[c].min(size[c] - p[c])).fold(f32::MAX, f32::min);
+        if from == u32::MAX {
+            assert_eq!([owner, last, vertex], [u32::MAX; 3], "{what}");
+        }
         if from == u32::MAX || deep(a) < 1e-3 || deep(b).abs() < 1e-3 {
             continue;
         }

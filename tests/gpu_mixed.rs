@@ -5,14 +5,15 @@
 
 use olbvh::Error;
 use olbvh::baseline::{Lbvh, RayMethod, Rays};
-use olbvh::build::{BadCells, Capacity, DeviceMesh, FieldRanges, Tree, TreeMemory};
+use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, FieldRanges, Tree, TreeMemory, cmd_build};
 use olbvh::gpu::{DescriptorPools, Gpu, GpuOptions, Recorder};
 use olbvh::layout::Grid;
 use olbvh::mesh::{On, kuhn};
-use olbvh::options::BuildOptions;
+use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
-use olbvh::render::{Bounds, Plan, RenderSettings};
+use olbvh::render::camera::RayGrid;
+use olbvh::render::{Bounds, Plan, RenderSettings, TABLE_SIZE};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;
 use std::fmt::Debug;
@@ -72,6 +73,8 @@ fn another_device_is_refused() {
     let values = vec![0.0; mesh.points.len()];
     let mut ranges = FieldRanges::new(&here, a.tree, (&values, On::Points)).unwrap();
     refused("ranges", "on another device", ranges.update(&there, b.tree, (&values, On::Points)));
+    let again = Tree::build(&gpu, &here, &options).unwrap();
+    refused("ranges", "another tree", ranges.update(&here, &again, (&values, On::Points)));
     let buffer = elsewhere.buffer("olbvh.test.elsewhere", 64).unwrap();
     refused("download", "on another device", gpu.download::<u32>(&buffer, buffer.all()));
     let mut pools = DescriptorPools::new(&elsewhere);
@@ -91,6 +94,10 @@ fn wrong_sizes_are_refused() {
     let mut plan = Plan::new(&settings, &Bounds::from(device.grid()), mesh.origin, Some([0.0, 1.0])).unwrap();
     plan.table.truncate(2);
     refused("render", "2 colours", render(&device, &tree, &plan, (&values, On::Points), None, SILENT));
+    let unseen = Plan { rays: RayGrid { origin: [f32::NAN; 3], ..plan.rays }, table: vec![[0.0; 4]; TABLE_SIZE], ..plan };
+    refused("render", "no finite numbers", render(&device, &tree, &unseen, (&values, On::Points), None, SILENT));
+    let eleven = BuildOptions { level: Some(11), ..BuildOptions::default() };
+    refused("level", "level is 11", Tree::build(&gpu, &device, &eleven).map(|_| ()));
     let deep = Capacity { level: 13, ..Capacity::for_entries(1000, 22) };
     refused("level", "level 13", Arena::measure(|a| TreeMemory::carve(a, &deep, &BuildOptions::default())));
     let [small, large] = [64, 128].map(|bytes| gpu.buffer("olbvh.test.copied", bytes).unwrap());
@@ -107,6 +114,34 @@ fn wrong_sizes_are_refused() {
         locate(&device, &tree, &mesh.points, None, &options, SILENT).unwrap().owners
     };
     assert_eq!(located(u32::MAX), located(8));
+}
+
+/// Memory is carved for a size and for options; a build of another kind in it would lose points.
+#[test]
+fn builds_that_memory_was_not_carved_for_are_refused() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let [mesh, larger] = [[3; 3], [4; 3]].map(|n| DeviceMesh::upload(&gpu, &kuhn(n).unwrap(), BadCells::Skip).unwrap());
+    let tets = mesh.input().tets;
+    let carve = |entries: u32, options: BuildOptions| {
+        let capacity = Capacity::for_entries(entries, 4);
+        Arena::reserve(&gpu, "olbvh.test.build", |a| {
+            Ok((TreeMemory::carve(a, &capacity, &options)?, BuildScratch::carve(&gpu, a, tets, &capacity, &options)?))
+        })
+        .unwrap()
+    };
+    let usual = BuildOptions::default();
+    let full = BuildOptions { lists: Lists::All, assign: Assign::Aabb, ..usual };
+    let [(_one, one), (_two, two), (_three, three)] = [carve(9000, usual), carve(9000, full), carve(8000, usual)];
+    let build = |mesh: &DeviceMesh, tree: &TreeMemory, scratch: &BuildScratch, options: &BuildOptions| {
+        cmd_build(&mut Recorder::rehearse(&gpu), &mesh.view(), tree, options, scratch)
+    };
+    build(&mesh, &one.0, &one.1, &usual).unwrap();
+    build(&mesh, &one.0, &one.1, &BuildOptions { alpha: 2.0, ..usual }).unwrap();
+    refused("options", "assign, lists", build(&mesh, &one.0, &one.1, &full));
+    refused("tree", "assign, lists", build(&mesh, &two.0, &one.1, &usual));
+    refused("scratch", "assign, lists", build(&mesh, &one.0, &two.1, &usual));
+    refused("capacity", "different capacities", build(&mesh, &three.0, &one.1, &usual));
+    refused("mesh", "384 tetrahedra, in memory for 162", build(&larger, &one.0, &one.1, &usual));
 }
 
 /// A structure keeps the memory of its mesh: otherwise, a later mesh at the same place would be taken for the first.

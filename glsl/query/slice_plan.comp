@@ -100,21 +100,19 @@ void main() {
         precise float extent = g.hi[c] - g.lo[c];
         largest = max(largest, canonical(extent));
     }
+    // Centres are rounded. Half axes grow so that boxes side by side leave no gap; see the twin.
+    float far = 0.0;
+    for (uint c = 0u; c < 3u; ++c) far = max(far, canonical(max(abs(g.lo[c]), abs(g.hi[c]))));
+    precise float scaled = far * g.scale;
+    precise float gap = ceil(canonical(scaled) * two_to(62)) * two_to(-42);
     for (uint c = 0u; c < 3u; ++c) {
         precise float sum = (abs(axes[0][c]) + abs(axes[1][c])) + abs(axes[2][c]);
-        precise float far = sum * (1.0 + 1.0 / 1024.0);
-        precise float more = largest * (1.0 / 16384.0);
-        precise float reach = far + more;
+        precise float own = sum * (1.0 + 1.0 / 1024.0);
+        precise float away = far * (1.0 / 262144.0);
+        precise float more = largest * (1.0 / 16384.0) + canonical(away);
+        precise float reach = own + more;
         plan.reach[c] = reach;
     }
-    // A centre is rounded by up to 2^-22 of the coordinates of the mesh around it; every half axis is longer by so much, at
-    // least, so that boxes side by side leave no gap.
-    float far = 0.0;
-    for (uint c = 0u; c < 3u; ++c) {
-        precise float at = max(abs(g.lo[c]), abs(g.hi[c])) * g.scale;
-        far = max(far, canonical(at));
-    }
-    precise float gap = ceil(far * two_to(60)) * two_to(-42);
     plan.half0 = grown(normalised[0], gap);
     plan.half1 = grown(normalised[1], gap);
     plan.half2 = grown(normalised[2], gap);

@@ -99,8 +99,10 @@ impl VoxelGrid {
         // 2^-24 of it at most. A term may be much larger than the sum. The fifth part exceeds products of errors.
         let terms = origin.abs() + next_layer.abs() * top_layer + next_row.abs() * high + next_voxel.abs() * x;
         let rounding = terms * (5.0 / f64::from(1 << 24));
-        // The other allowance exceeds the rounding errors of boxes, and the distance that the tolerance adds to owners.
-        let more = rounding + DVec3::splat(largest / 1024.0);
+        // The other allowance exceeds the rounding errors of boxes, and the distance that the tolerance adds to owners;
+        // the last one, what half axes gain in `over`.
+        let farthest = (0..3).map(|c| f64::from(grid.lo[c].abs().max(grid.hi[c].abs()))).fold(0.0, f64::max);
+        let more = rounding + DVec3::splat(largest / 1024.0 + farthest / f64::from(1 << 18));
         let half = (hi - lo) * 0.5 + more + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
         let from_middle = corner - (lo + hi) * 0.5;
         let normals = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| self.half_normal(i, j));
@@ -161,10 +163,11 @@ impl VoxelGrid {
             let unit = if x.abs() > most { 0.0 } else { canonical(x * grid.scale) };
             (unit * two_to(82)).round() * two_to(-42)
         };
-        // A centre is rounded by up to 2^-22 of the coordinates of the mesh around it; every half axis is longer by so
-        // much, at least, so that boxes side by side leave no gap.
-        let far = (0..3).map(|c| canonical(grid.lo[c].abs().max(grid.hi[c].abs()) * grid.scale)).fold(0.0, f32::max);
-        let gap = (far * two_to(60)).ceil() * two_to(-42);
+        // A component of a centre passes through four roundings of values up to twice the largest coordinate of the mesh,
+        // in a stack that is not much larger. The longest component of each half axis grows by 2^-20 of that coordinate,
+        // more than half of which counts along an oblique axis, so that boxes side by side leave no gap.
+        let far = (0..3).map(|c| canonical(grid.lo[c].abs().max(grid.hi[c].abs()))).fold(0.0, f32::max);
+        let gap = (canonical(far * grid.scale) * two_to(62)).ceil() * two_to(-42);
         let grown = |axis: [f32; 3]| {
             let longest = (1..3).fold(0, |best, c| if axis[c].abs() > axis[best].abs() { c } else { best });
             let more = if axis[longest] < 0.0 { -gap } else { gap };
@@ -175,7 +178,7 @@ impl VoxelGrid {
         let flat = normalised.iter().any(|axis| axis.iter().all(|&x| x == 0.0));
         let large = beyond || (0..3).any(|c| sum(&normalised, c) > two_to(41));
         let largest = (0..3).map(|c| canonical(grid.hi[c] - grid.lo[c])).fold(0.0, f32::max);
-        let reach = |c: usize| sum(&self.half, c) * (1.0 + two_to(-10)) + largest * two_to(-14);
+        let reach = |c: usize| sum(&self.half, c) * (1.0 + two_to(-10)) + (largest * two_to(-14) + canonical(far * two_to(-18)));
         let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
         SlicePlan {
             origin: pad(self.origin),

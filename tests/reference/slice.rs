@@ -66,7 +66,7 @@ fn check(name: &str, tangled: bool, mesh: &Mesh, topology: &Topology, tree: &Tre
     let extent = voxels.half.iter().map(|h| h.iter().map(|&x| f64::from(x).abs()).sum::<f64>()).fold(0.0, f64::max);
     // Far from 0, the centre of a voxel is as coarse as the coordinates there, and its three half axes are longer.
     let far = lo.iter().chain(&hi).map(|x| f64::from(x.abs())).fold(0.0, f64::max);
-    let slack = 4e-6 * (size + extent) + 3.0 * far / f64::from(1 << 22);
+    let slack = 4e-6 * (size + extent) + 3.0 * far / f64::from(1 << 20);
     let half = voxels.half.map(wide);
     let locator = Locator::new(mesh, topology, tree);
     let [w, h] = voxels.size;

@@ -86,6 +86,20 @@ fn azimuth_counts_above_and_below() {
     assert!(low.y > 0.8 && low.x.abs() < 1e-12, "from the front: {low}");
 }
 
+/// What is looked at lies in the middle of the picture, whatever the projection.
+#[test]
+fn a_target_lies_in_the_middle() {
+    let target = DVec3::new(0.5, 0.25, 1.0);
+    for view in ["iso", "azimuth=20,elevation=70", "front,zoom=3", "iso,ortho"] {
+        let camera = format!("{view},target=0.5,0.25,1").parse::<CameraSpec>().unwrap().resolve(&BOX, [0.0; 3], 1.5).unwrap();
+        let way = target - camera.eye;
+        assert!(
+            way.dot(camera.right).abs() < 1e-12 && way.dot(camera.up).abs() < 1e-12 && way.dot(camera.forward) > 0.0,
+            "{view}: {camera:?}"
+        );
+    }
+}
+
 #[test]
 fn origin_of_the_source_is_subtracted() {
     let spec: CameraSpec = "eye=1e7,0,0,target=1e7,1,0".parse().unwrap();
