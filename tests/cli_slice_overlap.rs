@@ -277,3 +277,33 @@ fn names_are_shown_on_one_line() {
     let (_, json, text) = olbvh(folder, &["info", "points.vtk"]);
     assert_eq!(json["fields"][0]["name"], "a\nforged\u{1b}[2J", "{text}");
 }
+
+/// The cells that intersect, with their own points only, and vectors as vectors.
+#[test]
+fn overlaps_become_meshes() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    let mesh = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/data/bracket_50k.vtu");
+    let (code, found, text) = olbvh(folder, &["overlap", mesh, "kuhn:3,3,3", "-o", "part.vtu"]);
+    assert_eq!(code, 0, "{text}");
+    let (_, part, text) = olbvh(folder, &["info", "part.vtu"]);
+    assert_eq!(part["cells"], found["a"], "{text}");
+    let (_, whole, _) = olbvh(folder, &["info", mesh]);
+    let [few, many] = [&part, &whole].map(|info| info["points"].as_u64().unwrap());
+    assert!(few > 4 && few < many / 10 && part["volume"].as_f64() < whole["volume"].as_f64(), "{few} points of {many}");
+    let file = std::fs::read(folder.join("part.vtu")).unwrap();
+    let file = String::from_utf8_lossy(&file);
+    assert!(file.contains("Name=\"displacement\" NumberOfComponents=\"3\"") && !file.contains("displacement.x"));
+}
+
+/// Points in other units than the mesh are told where the mesh is.
+#[test]
+fn points_beside_the_mesh_learn_its_bounds() {
+    let folder = tempfile::tempdir().unwrap();
+    let folder = folder.path();
+    for (point, told) in [("50,50,50", true), ("0.5,0.5,0.5", false)] {
+        std::fs::write(folder.join("p.csv"), point).unwrap();
+        let (code, _, text) = olbvh(folder, &["locate", "kuhn:1,2,3", "p.csv", "-o", "o.csv"]);
+        assert_eq!((code, text.contains("from (0, 0, 0) to (1, 2, 3)")), (0, told), "{text}");
+    }
+}

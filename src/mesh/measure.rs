@@ -1,6 +1,7 @@
 //! Measures of a whole mesh.
 
 use super::Mesh;
+use glam::DVec3;
 
 impl Mesh {
     /// Volume of the tetrahedra that are `valid`, each of which counts as positive, in units of the mesh to the third
@@ -8,10 +9,8 @@ impl Mesh {
     pub fn volume(&self, valid: impl Fn(u32) -> bool) -> f64 {
         // Six times the volume, which is a whole number where coordinates are.
         let of = |tet: &[u32; 4]| {
-            let [a, b, c, d] = tet.map(|v| self.points[v as usize].map(f64::from));
-            let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-            let cross = [v[1] * w[2] - v[2] * w[1], v[2] * w[0] - v[0] * w[2], v[0] * w[1] - v[1] * w[0]];
-            (u[0] * cross[0] + u[1] * cross[1] + u[2] * cross[2]).abs()
+            let [a, b, c, d] = tet.map(|v| DVec3::from_array(self.points[v as usize].map(f64::from)));
+            (b - a).cross(c - a).dot(d - a).abs()
         };
         (0..).zip(&self.tets).filter(|&(t, _)| valid(t)).map(|(_, tet)| of(tet)).sum::<f64>() / 6.0
     }

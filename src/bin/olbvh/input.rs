@@ -161,19 +161,13 @@ pub fn remark_on_bad_cells(path: &Path, bad: u32, common: &Common) {
 
 /// The field with this name; without a name, the first field of points, or else the first field of cells.
 pub fn field<'a>(mesh: &'a Mesh, name: Option<&str>) -> Outcome<Option<&'a Field>> {
-    let Some(name) = name else {
-        return Ok(mesh.fields.iter().find(|f| f.on == On::Points).or(mesh.fields.first()));
-    };
-    mesh.field(name).map(Some).ok_or_else(|| Failure::Usage(format!("no field `{name}`; {}", fields(mesh))))
+    let first = || mesh.fields.iter().find(|f| f.on == On::Points).or(mesh.fields.first());
+    name.map_or_else(|| Ok(first()), |name| field_named(mesh, name).map(Some))
 }
 
-/// The fields with these names; without names, the one that [`field`] selects.
-pub fn fields_named<'a>(mesh: &'a Mesh, names: &[String]) -> Outcome<Vec<&'a Field>> {
-    if names.is_empty() {
-        return Ok(field(mesh, None)?.into_iter().collect());
-    }
-    let all: Vec<_> = names.iter().map(|name| field(mesh, Some(name))).collect::<Outcome<_>>()?;
-    Ok(all.into_iter().flatten().collect())
+/// The field with this name.
+pub fn field_named<'a>(mesh: &'a Mesh, name: &str) -> Outcome<&'a Field> {
+    mesh.field(name).ok_or_else(|| Failure::Usage(format!("no field `{name}`; {}", fields(mesh))))
 }
 
 /// The transfer function of a .json file, or the colour map of this name.
@@ -196,5 +190,20 @@ pub fn fields(mesh: &Mesh) -> String {
         (points, cells) if cells.is_empty() => format!("the mesh has {points}"),
         (points, cells) if points.is_empty() => format!("the mesh has {cells} (per cell)"),
         (points, cells) => format!("the mesh has {points} (per point) and {cells} (per cell)"),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::bytes;
+
+    #[test]
+    fn bytes_have_units() {
+        for (text, wanted) in
+            [("7", 7), ("1.5KiB", 1536), ("8G", 8 << 30), ("2m", 2 << 20), ("3 MB", 3_000_000), ("1kB", 1000), ("4K", 4096)]
+        {
+            assert_eq!(bytes(text), Ok(wanted), "{text}");
+        }
+        assert!(["", "G", "1T", "-1", "1e3"].iter().all(|text| bytes(text).is_err()));
     }
 }

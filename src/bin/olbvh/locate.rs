@@ -92,10 +92,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let engine = engine::open(common)?;
     let loaded = args.tree.mesh(&args.mesh, common)?;
     let mesh = &loaded.mesh;
-    let fields = match () {
-        () if args.all => Vec::new(),
-        () if args.all_fields => mesh.fields.iter().collect(),
-        () => input::fields_named(mesh, &args.field)?,
+    let fields: Vec<&Field> = if args.all {
+        Vec::new()
+    } else if args.all_fields {
+        mesh.fields.iter().collect()
+    } else if args.field.is_empty() {
+        input::field(mesh, None)?.into_iter().collect()
+    } else {
+        args.field.iter().map(|name| input::field_named(mesh, name)).collect::<Outcome<_>>()?
     };
     let points = if args.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&args.points) };
     let points = points.map_err(Failure::input)?;
