@@ -9,7 +9,7 @@
 #include "shared/corners.glsl"
 #include "shared/shapes.glsl"
 layout(constant_id = 2) const uint MATES = 1;
-ARGUMENTS(8)
+ARGUMENTS(9)
     uint tets;
     uint share; // tetrahedra per workgroup
 END_ARGUMENTS
@@ -21,6 +21,7 @@ BUFFER(4, READ_WRITE, MeshStatus, status)
 RECORDS(5, uvec4, cells)
 BUFFER(6, readonly, uint, thin) // thin corners at every vertex
 BUFFER(7, readonly, uint, branches) // see mates.glsl
+BUFFER(8, readonly, uint, table)    // of faces, see faces.glsl
 #include "shared/bad.glsl"
 
 bool any_branched = status.at[0].branched > 0u;
@@ -32,13 +33,19 @@ uint shape_of(uint t) { return shapes.at[t >> 4u] >> (2u * (t & 15u)) & 3u; }
 bool is_crowded(uvec4 v) { return max(max(thin.at[v.x], thin.at[v.y]), max(thin.at[v.z], thin.at[v.w])) > MOST_THIN; }
 
 uvec4 neighbours_of(uint t) {
-    uvec4 held = neighbours.at[t], across;
-    for (uint f = 0u; f < 4u; ++f) {
-        if (MATES != 0u) {
-            uint other = face_of_mate(held[f]);
-            across[f] = held[f] == ALONE || is_branched(4u * t + f) || is_branched(other) ? NONE : other >> 2;
-        } else {
-            across[f] = held[f] == NONE || is_bad(t) || is_bad(held[f]) ? NONE : held[f];
+    uvec4 held = neighbours.at[t], across = held;
+    if (MATES == 0u) {
+        for (uint f = 0u; f < 4u; ++f) {
+            if (held[f] == NONE || is_bad(t) || is_bad(held[f])) across[f] = NONE;
+        }
+    } else {
+        for (uint f = 0u; f < 4u; ++f) { // all loads first
+            if (held[f] != NONE && held[f] >= IN_SLOT) across[f] = table.at[held[f] & ~IN_SLOT] & ~MATED;
+        }
+        for (uint f = 0u; f < 4u; ++f) {
+            uint face = 4u * t + f, other = across[f];
+            bool alone = other == NONE || other == face || is_branched(face) || is_branched(other);
+            across[f] = alone ? NONE : other >> 2;
         }
     }
     if (MATES != 0u || across != held) neighbours.at[t] = across;

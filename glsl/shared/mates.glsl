@@ -1,8 +1,6 @@
-// What is known of each face (four per tetrahedron) while faces are matched: ALONE, or the number of another face with
-// the same vertices plus 1. Where more than two faces have the same vertices, this is known for two of them, of which
-// one is marked in `branches` (a bit per face).
-const uint ALONE = 0u;
-
-uint mate(uint face) { return face + 1u; }
-
-uint face_of_mate(uint mate) { return mate - 1u; }
+// What is known of a face (four per tetrahedron) once faces are matched: another face with the same vertices (faces are
+// numbered, from 0 to below 2^31); or the slot of the table that holds this face or another one; or NONE. Where more than
+// two faces have the same vertices, this may lead from one to another of them, but one of the two is marked in `branches`
+// (a bit per face).
+const uint MATED = 0x80000000u;   // above a face in the table: another face has its vertices
+const uint IN_SLOT = 0x80000000u; // above a slot

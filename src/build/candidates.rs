@@ -111,7 +111,7 @@ impl Build<'_> {
         if filter.seeds.is_some() {
             let mark = Mark { grid, vertices, cells, bad, offsets, shares, marks, boundary, tets, capacity };
             // A word of bits per invocation, or a part of one where invocations are plenty and should not wait for others.
-            let (each, slot) = if r.gpu().target().sort.serial { (32, 1) } else { (8, 2) };
+            let (each, slot) = if r.gpu().target().is_processor() { (32, 1) } else { (8, 2) };
             let spec = MarkSpec { workgroup, assign: options.assign as u32, tets: each, ..Default::default() };
             r.dispatch(&mark, spec, over.groups(slot, tets.div_ceil(each), workgroup))?;
             r.barrier("codes.mark → codes.mark_later");

@@ -4,8 +4,8 @@
 use crate::error::{Error, Result};
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
-    CheckCells, CheckCellsSpec, FindBoundary, FindBoundarySpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, MeasureCells,
-    MeasureCellsSpec, NormaliseVertices, NormaliseVerticesSpec,
+    CheckCells, CheckCellsSpec, FindBoundary, FindBoundarySpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, MatchFacesTiled,
+    MatchFacesTiledSpec, MeasureCells, MeasureCellsSpec, NormaliseVertices, NormaliseVerticesSpec,
 };
 use crate::layout::{Grid, MeshStatus};
 use crate::primitives::{Arena, cmd_fill};
@@ -24,6 +24,9 @@ const SUMMING_ROWS: u32 = 512;
 /// which start in order, are close together in the mesh and find in caches what others have used (H100: 3.1 → 1.8 ms for
 /// the faces of 12 million tetrahedra); more than one, since processors take time for every workgroup.
 const MATCHING_ROWS: u32 = 4;
+/// Most tetrahedra whose faces a workgroup pairs in shared memory, of which each takes 64 bytes (H100: 32 to 256 differ by
+/// 6%).
+const MATCHING_TILE: u32 = 128;
 
 /// A mesh in device memory, owned by the caller or by this crate.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -107,7 +110,7 @@ impl MeshScratch {
     pub fn carve(arena: &mut Arena, points: u32, tets: u32) -> Result<Self> {
         let tets = u64::from(tets);
         Ok(Self {
-            table: arena.words((5 * tets + 16).min(1 << 31))?,
+            table: arena.words((5 * tets + 16).min((1 << 31) - 1))?,
             shapes: arena.words(tets.div_ceil(16))?,
             thin: arena.words(u64::from(points))?,
             branches: arena.words(tets.div_ceil(8))?,
@@ -199,13 +202,12 @@ impl<'a> Stage0<'a> {
 
     /// Everything before the search for neighbours.
     pub fn begin(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
-        let &MeshArrays { status, neighbours, .. } = self.arrays;
+        let &MeshArrays { status, .. } = self.arrays;
         r.stage("mesh.clear", |r| {
             r.fill(status, 0);
             self.clear(r);
             r.fill(self.scratch.branches, 0);
-            cmd_fill(r, self.scratch.table, u32::MAX)?;
-            cmd_fill(r, neighbours, 0)
+            cmd_fill(r, self.scratch.table, u32::MAX)
         })?;
         self.measure(r, given)
     }
@@ -277,12 +279,15 @@ impl<'a> Stage0<'a> {
         r.stage("mesh.faces", |r| {
             let slots = (table.size / 4) as u32;
             let near_slots = (slots / points.max(1)).max(1);
-            let spec = MatchFacesSpec { workgroup, ..Default::default() };
-            r.dispatch(
-                &MatchFaces { cells, bad, table, mates: neighbours, status, branches, tets, slots, near_slots, share },
-                spec,
-                self.groups(share),
-            )
+            let mates = neighbours;
+            if r.gpu().target().is_processor() {
+                let kernel = MatchFaces { cells, bad, table, mates, status, branches, tets, slots, near_slots, share };
+                r.dispatch(&kernel, MatchFacesSpec { workgroup, ..Default::default() }, self.groups(share))
+            } else {
+                let workgroup = workgroup.min(MATCHING_TILE);
+                let kernel = MatchFacesTiled { cells, bad, table, mates, status, branches, tets, slots, near_slots };
+                r.dispatch(&kernel, MatchFacesTiledSpec { workgroup, ..Default::default() }, self.groups(workgroup))
+            }
         })
     }
 
@@ -290,14 +295,14 @@ impl<'a> Stage0<'a> {
     pub fn boundary(&self, r: &mut Recorder<'_>, mates: u32) -> Result<()> {
         let MeshInput { cells, tets, .. } = *self.input;
         let MeshArrays { status, bad, boundary, neighbours, .. } = *self.arrays;
-        let MeshScratch { shapes, thin, branches, .. } = *self.scratch;
+        let MeshScratch { table, shapes, thin, branches } = *self.scratch;
         let workgroup = r.gpu().target().each;
         let share = MATCHING_ROWS * workgroup;
         r.barrier("mesh.faces → mesh.find_boundary");
         r.stage("mesh.boundary", |r| {
             let spec = FindBoundarySpec { workgroup, mates, ..Default::default() };
             r.dispatch(
-                &FindBoundary { bad, shapes, neighbours, boundary, status, cells, thin, branches, tets, share },
+                &FindBoundary { bad, shapes, neighbours, boundary, status, cells, thin, branches, table, tets, share },
                 spec,
                 self.groups(share),
             )

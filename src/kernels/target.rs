@@ -155,6 +155,12 @@ impl Target {
         self
     }
 
+    /// Whether an invocation is better served by work of its own than by that of others nearby: on a processor, which runs
+    /// few of them at a time.
+    pub fn is_processor(&self) -> bool {
+        self.sort.serial
+    }
+
     /// Checks that kernels with these parameters run on a device.
     ///
     /// # Errors
