@@ -11,23 +11,23 @@
 //!
 //! | stage | reads and writes |
 //! |---|---|
-//! | `mesh.clear` | the table of faces 20 t, mates 16 t |
+//! | `mesh.clear` | the table of faces 20 t |
 //! | `mesh.bounds` | cells 16 t, points 12 p twice, vertices 16 p |
 //! | `mesh.shapes` | cells 16 t, vertices 16 p |
-//! | `mesh.faces` | cells 16 t; faces written and read, mates written, each 16 t |
-//! | `mesh.boundary` | cells 16 t; mates read and neighbours written, each 16 t |
+//! | `mesh.faces` | cells 16 t, the table of faces in and out 40 t, mates 16 t |
+//! | `mesh.boundary` | cells 16 t, the table of faces 20 t; mates read and neighbours written, each 16 t |
 //! | `build.depth` | cells 16 t, points 12 p |
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; only a number where every tetrahedron has one share |
 //! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and places of shares 8 s, codes and ids 8 n |
-//! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after an odd number of serial passes 16 n |
+//! | `build.sort` | serial: per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after an odd number of passes 16 n. Otherwise: keys 4 n; per pass pairs 8 n in and out, digits cleared, written and read |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
 //! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; quarters, if any: 12 n, cells 16 t, vertices 16 p |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value. "Digits" is the table of digit counts of the
-//! sort; an odd number of serial passes is followed by a copy of the pairs. Marks are used with boundary lists. Quarters read
+//! sort. Marks are used with boundary lists. Quarters read
 //! the codes (4 n) and read and write P (8 n).
 
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
@@ -53,18 +53,20 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let filter = cells_and_vertices + offsets + 8 * shares + SCAN * shares + 3 * marks;
     let (passes, digit_bits) = target.sort.passes(3 * level);
     let digits = (n.div_ceil(u64::from(target.sort.tile())) | 1) << digit_bits;
-    let pass = 4 * n + 16 * n + (8 + SCAN) * digits;
-    let sort =
-        if level == 0 || n < 2 { 0 } else { u64::from(passes) * pass + if target.sort.serial && passes % 2 == 1 { 16 * n } else { 0 } };
+    let sort = match (target.sort.serial, u64::from(passes)) {
+        _ if level == 0 || n < 2 => 0,
+        (true, passes) => passes * (4 * n + 16 * n + (8 + SCAN) * digits) + passes % 2 * 16 * n,
+        (false, passes) => 4 * n + passes * (16 * n + 12 * digits),
+    };
     let runs = n.div_ceil(u64::from(target.run.rows)) * u64::from(level + 1);
     let quarters = if id_mask(options.lists, input.tets as usize) == u32::MAX { 0 } else { cells_and_vertices + 12 * n };
     let boxes = |count: u64| if options.boxes { 24 * count } else { 0 };
     let stages = [
-        ("mesh.clear", 36 * t),
+        ("mesh.clear", 20 * t),
         ("mesh.bounds", 16 * t + 24 * p + 16 * p),
         ("mesh.shapes", cells_and_vertices),
-        ("mesh.faces", 4 * 16 * t),
-        ("mesh.boundary", 3 * 16 * t),
+        ("mesh.faces", (16 + 40 + 16) * t),
+        ("mesh.boundary", (20 + 3 * 16) * t),
         ("build.depth", 16 * t + 4 * u64::from(input.stride) * p),
         ("build.count", if counted { cells_and_vertices + 4 * t + SCAN * t } else { SCAN }),
         ("build.filter", if filtered { filter } else { 0 }),
