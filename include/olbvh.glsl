@@ -539,8 +539,12 @@ float olbvh_weighed(vec4 b, vec4 at_corners) {
 
 const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
 
-// Smallest barycentric coordinate; SMALLEST_FLOAT for a flat tetrahedron.
+// Smallest barycentric coordinate; SMALLEST_FLOAT for a flat tetrahedron. It is 0 where rounding may have put the point
+// outside: 2^-18 of the box is the most that it can change a weight by (at most 54 half units in the last place, of
+// products of three sides of the box). In tetrahedra that are thinner than a thousandth, this exceeds any tolerance.
 float olbvh_smallest(olbvh_Weights r) {
+    precise float rounding = r.margin * 0.25;
+    if (r.in_box && olbvh_least_of(r.w) >= -rounding) return 0.0;
     if (r.sum <= 0.0) return olbvh_SMALLEST_FLOAT;
     precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * olbvh_reciprocal(r.sum);
     return b;

@@ -5,7 +5,8 @@ use crate::grid::MAX_LEVEL;
 use crate::named::named;
 
 /// Default tolerance: how far below 0 the smallest barycentric coordinate of a point's owner may be in a boundary leaf
-/// (SPEC 3.1).
+/// (SPEC 3.1). Whatever the tolerance, it may also be as far as rounding can put a point that the owner contains, which is
+/// farther in thin tetrahedra.
 pub const TOLERANCE: f32 = 1e-5;
 
 /// Number of consecutive points that are located together as a run, each starting from the owner of the one before.

@@ -172,3 +172,67 @@ fn all_owners_of_points_on_a_crowded_edge() {
         assert!(if on_edge(i) { owners.iter().copied().eq(0..n) } else { owners.is_empty() }, "point {i}: {} owners", owners.len());
     }
 }
+
+/// Six times the signed volume of four points with integer coordinates, exactly.
+fn volume(v: [[i64; 3]; 4]) -> i128 {
+    let [a, b, c] = [1, 2, 3].map(|i| [0, 1, 2].map(|k| i128::from(v[i][k] - v[0][k])));
+    let minor = |i: usize, j: usize| b[i] * c[j] - b[j] * c[i];
+    a[0] * minor(1, 2) - a[1] * minor(0, 2) + a[2] * minor(0, 1)
+}
+
+/// Tetrahedra that share nothing, 1/`thinness` as thick as long, with points strictly inside them. Coordinates are
+/// multiples of 2^-22 below 4, so floats hold them, and integers tell exactly where a point is.
+#[test]
+fn no_point_strictly_inside_a_sliver_is_lost() {
+    const UNIT: i64 = 1 << 22;
+    let mut state = 7u32;
+    let mut next = |below: i64| {
+        state = mix(state.wrapping_add(0x9e37_79b9));
+        (i64::from(state >> 2) * below) >> 30
+    };
+    let float = |p: [i64; 3]| p.map(|x| x as f32 / UNIT as f32);
+    let (mut mesh, mut points, mut owners) = (Mesh::default(), Vec::new(), Vec::new());
+    for thinness in [300, 3_000, 30_000, 300_000] {
+        for place in 0..16i64 {
+            let corner = [place % 4 * UNIT, place / 4 * UNIT, mesh.tets.len() as i64 / 16 * UNIT];
+            let tet = loop {
+                let [a, b, c] = [0; 3].map(|_| corner.map(|x| x + next(UNIT)));
+                let (s, t) = (next(UNIT), next(UNIT));
+                // Near the plane of the others, but not beyond the cell of this tetrahedron.
+                let d = [0, 1, 2]
+                    .map(|k| a[k] + ((b[k] - a[k]) * s + (c[k] - a[k]) * t) / (2 * UNIT) + next(2 * UNIT / thinness + 2) - UNIT / thinness);
+                let within = (0..3).all(|k| (corner[k]..corner[k] + UNIT).contains(&d[k]));
+                if within && volume([a, b, c, d]) != 0 {
+                    break [a, b, c, d];
+                }
+            };
+            let (owner, whole) = (mesh.tets.len() as u32, volume(tet));
+            for _ in 0..400 {
+                let shares = [0; 4].map(|_| 1 + next(UNIT));
+                let sum: i64 = shares.iter().sum();
+                let p = [0, 1, 2].map(|k| (0..4).map(|i| tet[i][k] * shares[i]).sum::<i64>() / sum);
+                let inside = |i: usize| {
+                    let mut v = tet;
+                    v[i] = p;
+                    volume(v).signum() == whole.signum()
+                };
+                if (0..4).all(inside) {
+                    points.push(float(p));
+                    owners.push(owner);
+                }
+            }
+            let first = mesh.points.len() as u32;
+            mesh.points.extend(tet.map(float));
+            mesh.tets.push([0, 1, 2, 3].map(|i| first + i));
+        }
+    }
+    assert!(points.len() > 15_000, "{} points strictly inside", points.len());
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    for lists in [Lists::All, Lists::Boundary] {
+        let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
+        let found = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..LocateOptions::default() }, SILENT).unwrap();
+        let lost: Vec<usize> = (0..points.len()).filter(|&i| found.owners[i] != owners[i]).collect();
+        assert!(lost.is_empty(), "{lists:?}: {} of {} points are lost, first {:?}", lost.len(), points.len(), points[lost[0]]);
+    }
+}
