@@ -91,8 +91,8 @@ impl Unsorted {
 /// order. The contents after the true number of pairs, up to `count.max`, become undefined.
 ///
 /// Starts with a barrier, so `keys` and `values` need none before, unless there is nothing to sort (fewer than two
-/// pairs, or no bits). A count in device memory must be visible before. Ends without a barrier; the last writes are
-/// those of compute shaders or transfers.
+/// pairs, or no bits). A count in device memory must be visible before, and between two sorts with the same scratch memory
+/// there must be a barrier. Ends without a barrier; the last writes are those of compute shaders or transfers.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -213,7 +213,6 @@ impl PairSort<'_> {
         let totals = self.scratch.totals.part(0, u64::from(passes) << (digit_bits + 2));
         let (mut from, mut to) = ((pairs.keys, pairs.values), if passes % 2 == 1 { pairs.sorted } else { self.scratch.apart(count) });
         let (mut chain, mut next_chain) = (table, second);
-        r.barrier("keys → sort.clear");
         r.fill(totals, 0);
         r.barrier("sort.clear → sort.digits");
         let digits = SortDigitsBallot { live, keys: from.0, totals, chain, count, last_mask: self.digit(passes - 1).1 };
