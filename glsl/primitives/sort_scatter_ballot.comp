@@ -22,7 +22,7 @@ BUFFER(0, readonly, uint, live)
 BUFFER(1, readonly, uint, keys)
 BUFFER(2, readonly, uint, values)
 BUFFER(3, readonly, uint, totals)      // pairs of every digit of every pass
-BUFFER(4, coherent volatile, uint, chain)       // see sort_chain.glsl
+BUFFER(4, coherent, uint, chain)       // see sort_chain.glsl
 BUFFER(5, writeonly, uint, next_chain) // that of the next pass, cleared here
 BUFFER(6, writeonly, uint, sorted_keys)
 BUFFER(7, writeonly, uint, sorted_values)
@@ -137,15 +137,15 @@ void main() {
     uint from[DIGITS_EACH]; // 1 + the tile that is looked at next; 0: none
     [[unroll]] for (uint k = 0u; k < DIGITS_EACH; ++k) from[k] = k * WORKGROUP + local_index() < DIGITS ? tile : 0u;
     for (;;) {
+        uint polls = 0u; // of all digits, since some drivers end the loops of an invocation after 65,535 passes
         [[unroll]] for (uint k = 0u; k < DIGITS_EACH; ++k) {
             uint d = k * WORKGROUP + local_index();
-            for (uint polls = 0u; from[k] > 0u;) {
-                uint place = (from[k] - 1u) * DIGITS + d, word = chain.at[place];
-                // Now and then by an atomic operation, which sees what others have written in the end.
-                if (word == NOTHING && polls % 16u == 15u) word = atomicOr(chain.at[place], 0u);
+            while (from[k] > 0u) {
+                // An ordinary load may be done twice by a compiler, with two answers.
+                uint word = atomicOr(chain.at[(from[k] - 1u) * DIGITS + d], 0u);
                 if (word != NOTHING) {
                     step_back(word, from[k], to_digit[k]);
-                } else if (++polls == MOST_POLLS) {
+                } else if (++polls >= MOST_POLLS) {
                     atomicMax(missing, from[k]);
                     break;
                 }
