@@ -541,7 +541,7 @@ const float olbvh_SMALLEST_FLOAT = -3.40282347e38;
 
 // Smallest barycentric coordinate; SMALLEST_FLOAT for a flat tetrahedron. It is 0 where rounding may have put the point
 // outside: 2^-18 of the box is the most that it can change a weight by (at most 54 half units in the last place, of
-// products of three sides of the box). In tetrahedra that are thinner than a thousandth, this exceeds any tolerance.
+// products of three sides of the box). In thin tetrahedra, this exceeds the usual tolerance.
 float olbvh_smallest(olbvh_Weights r) {
     precise float rounding = r.margin * 0.25;
     if (r.in_box && olbvh_least_of(r.w) >= -rounding) return 0.0;

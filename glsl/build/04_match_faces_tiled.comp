@@ -19,12 +19,11 @@ BUFFER(5, READ_WRITE, uint, branches) // zeroed
 #include "shared/faces.glsl"
 
 const uint TILE_SLOTS = 8u * WORKGROUP;
-const uint PAIRED = 0x80000000u; // above a face of the tile: it has a mate
 
 // Faces of the tile are numbered from its first one.
 shared uvec4 tile_cells[WORKGROUP];
 // First a table of the tile's faces. Then the faces whose search in the table of all comes upon another face at once: two
-// words each, the face, and that other one.
+// words each, the face (with MATED if it has a mate in the tile), and that other one.
 shared uint tile_faces[TILE_SLOTS];
 shared uint tile_mates[4u * WORKGROUP]; // per face, its mate in the tile, or NONE; then what is known of it
 shared uint tile_listed;
@@ -71,7 +70,7 @@ void main() {
         bool paired = tile_mates[me] != NONE;
         if (held[f] != NONE) {
             uint place = atomicAdd(tile_listed, 2u);
-            tile_faces[place] = paired ? me | PAIRED : me;
+            tile_faces[place] = paired ? me | MATED : me;
             tile_faces[place + 1u] = held[f];
         } else if (!paired && valid) {
             tile_mates[me] = (slot[f] | IN_SLOT) - first;
@@ -80,7 +79,7 @@ void main() {
     barrier();
     uint listed = tile_listed;
     for (uint k = 2u * i, attempt = 0u; k < listed;) {
-        uint entry = tile_faces[k], other = tile_faces[k + 1u], me = entry & ~PAIRED;
+        uint entry = tile_faces[k], other = tile_faces[k + 1u], me = entry & ~MATED;
         bool paired = entry != me;
         uvec3 face = face_of(tile_cells[me >> 2u], me & 3u);
         bool same = has_vertices(other & ~MATED, face);

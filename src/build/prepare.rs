@@ -102,8 +102,8 @@ pub struct MeshScratch {
 
 impl MeshScratch {
     /// Takes the scratch memory from an arena. The table of faces is at most 4/5 full even if no two tetrahedra share a
-    /// face. Beyond 429 million tetrahedra this holds only if most faces are shared, since the table is limited to 2^31
-    /// words: an index is a signed word to shaders.
+    /// face. Beyond 429 million tetrahedra this holds only if most faces are shared, since the table has fewer than 2^31
+    /// words: an index is a signed word to shaders, and bit 31 above the number of a slot must not make NONE of it.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the arena is too small.

@@ -182,7 +182,7 @@ impl Weights {
 
     /// Smallest barycentric coordinate; `f32::MIN` for a flat tetrahedron. It is 0 where rounding may have put the point
     /// outside: 2^-18 of the box is the most that it can change a weight by (at most 54 half units in the last place, of
-    /// products of three sides of the box). In tetrahedra that are thinner than a thousandth, this exceeds any tolerance.
+    /// products of three sides of the box). In thin tetrahedra, this exceeds the usual tolerance.
     pub fn smallest(&self) -> f32 {
         if self.in_box && least_of(self.w) >= -(self.margin * 0.25) {
             return 0.0;
