@@ -546,7 +546,7 @@ float olbvh_smallest(olbvh_Weights r) {
     precise float rounding = r.margin * 0.25;
     if (r.in_box && olbvh_least_of(r.w) >= -rounding) return 0.0;
     if (r.sum <= 0.0) return olbvh_SMALLEST_FLOAT;
-    precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * olbvh_reciprocal(r.sum);
+    precise float b = olbvh_least_of(r.w) * olbvh_reciprocal(r.sum);
     return b;
 }
 

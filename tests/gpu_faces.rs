@@ -1,9 +1,10 @@
-//! Stage 0 on meshes whose faces crowd in the hash table of faces.
+//! Stage 0 on meshes whose faces crowd in the hash table of faces, or have more than two cells, by both kernels of faces.
 #![allow(clippy::unwrap_used)]
 
 use olbvh::build::{BadCells, DeviceMesh};
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::mesh::Mesh;
+use olbvh::kernels::Row;
+use olbvh::mesh::{Mesh, kuhn};
 use olbvh::reference::boundary::topology;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -42,13 +43,35 @@ fn stars(n: u32) -> Mesh {
     mesh
 }
 
+/// A block with copies of cells, vertices in another order: of every 7th right after itself, and of every 5th and 11th at
+/// the end, some twice. So a face has up to five cells, next to each other or far apart.
+fn copies() -> Mesh {
+    let block = kuhn([6, 6, 6]).unwrap();
+    let rotated = |tet: &[u32; 4], by: usize| std::array::from_fn(|v| tet[(v + by) % 4]);
+    let mut mesh = Mesh::new(block.points, Vec::new());
+    for (i, tet) in block.tets.iter().enumerate() {
+        mesh.tets.push(*tet);
+        if i % 7 == 0 {
+            mesh.tets.push(rotated(tet, 1));
+        }
+    }
+    let every = |n: usize, by: usize| block.tets.iter().step_by(n).map(move |tet| rotated(tet, by));
+    mesh.tets.extend(every(5, 2).chain(every(11, 3)).chain(every(11, 1)));
+    mesh
+}
+
 #[test]
-fn crowded_faces_find_each_other() {
+fn faces_find_each_other_however_many_cells_they_have() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
-    let mesh = stars(3000);
-    let expected = topology(&mesh).unwrap();
-    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
-    assert_eq!(expected.counts.boundary as usize, mesh.tets.len());
-    assert!(device.neighbours().unwrap() == expected.neighbours, "neighbours of crowded faces");
-    assert_eq!(device.status().branched, expected.counts.branched);
+    for row in [Row::Cpu, Row::Portable] {
+        let gpu = gpu.with_target(row.target(&gpu.report().room)).unwrap();
+        for (name, mesh) in [("stars", stars(3000)), ("copies", copies())] {
+            let expected = topology(&mesh).unwrap();
+            assert_eq!(expected.counts.branched > 0, name == "copies");
+            let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+            assert!(device.neighbours().unwrap() == expected.neighbours, "neighbours of {name}, {row}");
+            assert!(device.boundary_bits().unwrap() == expected.boundary, "boundary of {name}, {row}");
+            assert_eq!(device.status().branched, expected.counts.branched, "{name}, {row}");
+        }
+    }
 }

@@ -1,5 +1,5 @@
-// The table that the kernels of the sort share: counts[digit * stride + tile]. The stride is odd, so that the digits of
-// a tile do not all fall into the same cache set.
+// The table that the kernels of the serial sort share: counts[digit * stride + tile]. The stride is odd, so that the
+// digits of a tile do not all fall into the same cache set.
 layout(constant_id = 2) const uint DIGIT_BITS = 8;
 const uint DIGITS = 1u << DIGIT_BITS;
 

@@ -184,7 +184,7 @@ float smallest(Weights r) {
     precise float rounding = r.margin * 0.25;
     if (r.in_box && least_of(r.w) >= -rounding) return 0.0;
     if (r.sum <= 0.0) return SMALLEST_FLOAT;
-    precise float b = min(min(r.w.x, r.w.y), min(r.w.z, r.w.w)) * reciprocal(r.sum);
+    precise float b = least_of(r.w) * reciprocal(r.sum);
     return b;
 }
 

@@ -20,15 +20,16 @@
 //! | `build.count` | cells 16 t, vertices 16 p, counts 4 t, their scan; only a number where every tetrahedron has one share |
 //! | `build.filter` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and counts 8 s, their scan; marks 3 · 8^l / 8 |
 //! | `build.emit` | cells 16 t, vertices 16 p, offsets 4 t if counted, hits and places of shares 8 s, codes and ids 8 n |
-//! | `build.sort` | per pass keys 4 n, pairs 8 n in and out, digits twice, their scan; after an odd number of serial passes 16 n |
+//! | `build.sort` | keys 4 n; per pass pairs 8 n in and out, digits cleared, written and read; serial sorts: see below |
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
 //! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; quarters, if any: 12 n, cells 16 t, vertices 16 p |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value. "Digits" is the table of digit counts of the
-//! sort. Marks are used with boundary lists. Quarters read
-//! the codes (4 n) and read and write P (8 n).
+//! sort. In a serial sort, it is written, scanned and read in every pass, which reads the keys again for it, and an odd
+//! number of passes is followed by a copy of the pairs. Marks are used with boundary lists. Quarters read the codes (4 n)
+//! and read and write P (8 n).
 
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
 use crate::kernels::Target;
@@ -56,7 +57,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
     let sort = match (target.sort.serial, u64::from(passes)) {
         _ if level == 0 || n < 2 => 0,
         (true, passes) => passes * (4 * n + 16 * n + (8 + SCAN) * digits) + passes % 2 * 16 * n,
-        (false, passes) => passes * (4 * n + 16 * n + (8 + SCAN) * digits),
+        (false, passes) => 4 * n + passes * (16 * n + 12 * digits),
     };
     let runs = n.div_ceil(u64::from(target.run.rows)) * u64::from(level + 1);
     let quarters = if id_mask(options.lists, input.tets as usize) == u32::MAX { 0 } else { cells_and_vertices + 12 * n };

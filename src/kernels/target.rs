@@ -99,12 +99,12 @@ impl SortTarget {
         (passes, bits.div_ceil(passes).max(1))
     }
 
-    /// Bytes of shared memory: a table of digits per subgroup or, in the same place, the keys of the tile; its values;
-    /// and two more tables.
+    /// Bytes of shared memory: a table of digits per subgroup or, in the same place, the keys of the tile and then its
+    /// values; and two more tables.
     fn shared_bytes(self, subgroup: u32) -> u32 {
         const TOTALS: u32 = 512; // of subgroups, see workgroup.glsl
         let (tables, digits) = (self.workgroup / subgroup.max(1), 1 << self.digit_bits);
-        if self.serial { 0 } else { 4 * ((tables * digits).max(self.tile()) + self.tile() + 2 * digits) + TOTALS }
+        if self.serial { 0 } else { 4 * ((tables * digits).max(self.tile()) + 2 * digits) + TOTALS }
     }
 
     /// Loop iterations of an invocation that clears its digits and counts its pairs, if it does so serially.

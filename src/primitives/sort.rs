@@ -4,7 +4,7 @@ use super::{Arena, Count, ScanScratch, cmd_exclusive_scan};
 use crate::error::{Error, Result};
 use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{
-    SortHistogramBallot, SortHistogramBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
+    SortDigitsBallot, SortDigitsBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
     SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortSplitPairs, SortSplitPairsSpec, SortTarget,
 };
 
@@ -14,7 +14,12 @@ pub struct SortScratch {
     /// A copy of the pairs: serial tiles keep key and value side by side, others first all keys and then all values.
     pairs: BufferRef,
     values: BufferRef,
+    /// Counts per digit and tile: those of a pass of serial tiles, otherwise the chain of a pass.
     table: BufferRef,
+    /// The chain of every second pass.
+    second: BufferRef,
+    /// Pairs of every digit of every pass, and per pass how many tiles have begun.
+    totals: BufferRef,
     arguments: BufferRef,
     table_length: BufferRef,
     total: BufferRef,
@@ -31,7 +36,9 @@ impl SortScratch {
     pub fn carve(gpu: &Gpu, arena: &mut Arena, max: u32, bits: u32) -> Result<Self> {
         let target = gpu.target().sort;
         // Fewer bits may need wider digits, so every number of bits up to `bits` is considered.
-        let widest = (1..=bits.max(1)).map(|b| target.passes(b).1).max().unwrap_or(1);
+        let passes = || (1..=bits.max(1)).map(|b| target.passes(b));
+        let widest = passes().map(|(_, digit_bits)| digit_bits).max().unwrap_or(1);
+        let totals = passes().map(|(passes, digit_bits)| totals(passes, digit_bits)).max().unwrap_or(1);
         let table = (u64::from(max.div_ceil(target.tile())) | 1) << widest;
         if table > i32::MAX as u64 {
             let message =
@@ -44,10 +51,12 @@ impl SortScratch {
             pairs,
             values: pairs.part(half, half),
             table: arena.words(table)?,
+            second: arena.words(if target.serial { 0 } else { table })?,
+            totals: arena.words(if target.serial { 0 } else { totals })?,
             arguments: arena.words(3)?,
             table_length: arena.words(1)?,
             total: arena.words(1)?,
-            scan: ScanScratch::carve(gpu, arena, u32::try_from(table).unwrap_or(u32::MAX))?,
+            scan: ScanScratch::carve(gpu, arena, if target.serial { u32::try_from(table).unwrap_or(u32::MAX) } else { 0 })?,
         })
     }
 
@@ -55,6 +64,11 @@ impl SortScratch {
     fn apart(&self, max: u32) -> (BufferRef, BufferRef) {
         (self.pairs.part(0, 4 * u64::from(max)), self.values.part(0, 4 * u64::from(max)))
     }
+}
+
+/// Words of [`SortScratch::totals`].
+fn totals(passes: u32, digit_bits: u32) -> u64 {
+    u64::from((passes << digit_bits) + passes)
 }
 
 /// Pairs to sort by the low `bits` bits of their keys: where they will be, and where they are at first.
@@ -82,8 +96,8 @@ impl Unsorted {
 /// order. The contents after the true number of pairs, up to `count.max`, become undefined.
 ///
 /// Starts with a barrier, so `keys` and `values` need none before, unless there is nothing to sort (fewer than two
-/// pairs, or no bits). A count in device memory must be visible before. Ends without a barrier; the last writes are
-/// those of compute shaders or transfers.
+/// pairs, or no bits). A count in device memory must be visible before, and between two sorts with the same scratch memory
+/// there must be a barrier. Ends without a barrier; the last writes are those of compute shaders or transfers.
 ///
 /// # Errors
 /// [`crate::Error::Vulkan`] if a pipeline cannot be made.
@@ -107,6 +121,10 @@ pub fn cmd_sort_pairs(
 
 /// Sorts pairs that were written to their first place, as [`cmd_sort_pairs`] does.
 pub(crate) fn cmd_sort(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch) -> Result<()> {
+    cmd_sort_tiles(r, pairs, count, scratch, 0)
+}
+
+fn cmd_sort_tiles(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scratch: &SortScratch, backwards: u32) -> Result<()> {
     let bits = pairs.bits;
     if bits == 0 || count.max < 2 {
         return Ok(());
@@ -134,7 +152,7 @@ pub(crate) fn cmd_sort(r: &mut Recorder<'_>, pairs: &Unsorted, count: Count, scr
         None => Count::host(table_max),
     };
     let sort = PairSort { pairs, count, live, passes, digit_bits, bits, groups, table, scratch };
-    if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target) }
+    if target.serial { sort.cmd_serial(r, target) } else { sort.cmd_ballot(r, target, backwards) }
 }
 
 /// What all passes of a sort have in common.
@@ -190,27 +208,75 @@ impl PairSort<'_> {
         Ok(())
     }
 
-    /// Tiles of whole workgroups.
-    fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget) -> Result<()> {
+    /// Tiles of whole workgroups. Pairs are read and written once per pass, and their digits are counted once for all.
+    /// `backwards`: 1 if the last tile begins first, else 0.
+    fn cmd_ballot(&self, r: &mut Recorder<'_>, target: SortTarget, backwards: u32) -> Result<()> {
         let Self { pairs, live, passes, digit_bits, groups, .. } = *self;
         let (count, workgroup, rows) = (self.count.max, target.workgroup, target.rows);
         let max_subgroups = workgroup / r.gpu().subgroup_size().max(1);
-        let counts = self.scratch.table;
-        let mut from = (pairs.keys, pairs.values);
-        let mut to = if passes % 2 == 1 { pairs.sorted } else { self.scratch.apart(count) };
+        let SortScratch { table, second, .. } = *self.scratch;
+        let totals = self.scratch.totals.part(0, 4 * totals(passes, digit_bits));
+        let (mut from, mut to) = ((pairs.keys, pairs.values), if passes % 2 == 1 { pairs.sorted } else { self.scratch.apart(count) });
+        let (mut chain, mut next_chain) = (table, second);
+        r.fill(totals, 0);
+        r.barrier("sort.clear → sort.digits");
+        let digits = SortDigitsBallot { live, keys: from.0, totals, chain, count, last_mask: self.digit(passes - 1).1 };
+        r.dispatch(&digits, SortDigitsBallotSpec { workgroup, rows, digit_bits, passes }, groups)?;
         for pass in 0..passes {
             let (shift, mask) = self.digit(pass);
-            r.barrier("keys → sort.histogram");
-            let histogram = SortHistogramBallot { live, keys: from.0, counts, count, shift, mask };
-            r.dispatch(&histogram, SortHistogramBallotSpec { workgroup, rows, digit_bits }, groups)?;
-            self.cmd_scan(r)?;
-            let (sorted_keys, sorted_values) = to;
-            let spec = SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups };
-            let scatter =
-                SortScatterBallot { live, keys: from.0, values: from.1, places: counts, sorted_keys, sorted_values, count, shift, mask };
-            r.dispatch(&scatter, spec, groups)?;
+            let ((keys, values), (sorted_keys, sorted_values)) = (from, to);
+            r.barrier("sort.digits → sort.scatter");
+            let ticket = (passes << digit_bits) + pass;
+            let scatter = SortScatterBallot {
+                live,
+                keys,
+                values,
+                totals,
+                chain,
+                next_chain,
+                sorted_keys,
+                sorted_values,
+                count,
+                pass,
+                ticket,
+                shift,
+                mask,
+            };
+            r.dispatch(&scatter, SortScatterBallotSpec { workgroup, rows, digit_bits, max_subgroups, backwards }, groups)?;
             std::mem::swap(&mut from, &mut to);
+            std::mem::swap(&mut chain, &mut next_chain);
         }
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::GpuOptions;
+    use crate::kernels::{Row, WorkgroupLimits};
+
+    /// Tiles that begin in reverse order wait for what no workgroup has counted yet, more of them than a device runs at a
+    /// time, and must count it themselves.
+    #[test]
+    fn tiles_count_for_tiles_that_do_not_begin() {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        let mut target = Row::Portable.target(&WorkgroupLimits::least(gpu.subgroup_size()));
+        (target.sort.workgroup, target.sort.rows, target.sort.digit_bits) = (gpu.subgroup_size(), 16, 7);
+        let gpu = gpu.with_target(target).unwrap();
+        let (n, bits) = (64 * gpu.target().sort.tile() + 5, 13);
+        let keys: Vec<u32> = (0..n).map(|i| i.wrapping_mul(2_654_435_761) >> 19).collect();
+        let ids: Vec<u32> = (0..n).collect();
+        let mut expected = ids.clone();
+        expected.sort_by_key(|&i| keys[i as usize]);
+        let carve = |a: &mut Arena| SortScratch::carve(&gpu, a, n, bits);
+        let (_memory, scratch) = Arena::reserve(&gpu, "olbvh.test.scratch", carve).unwrap();
+        for backwards in [0, 1] {
+            let (keys, values) = (gpu.upload("olbvh.test.keys", &keys).unwrap(), gpu.upload("olbvh.test.values", &ids).unwrap());
+            let pairs = Unsorted::place(&gpu, (keys.all(), values.all()), bits, n, &scratch);
+            assert!(pairs.keys == keys.all(), "an even number of passes");
+            gpu.submit("olbvh.test.sort", |r| cmd_sort_tiles(r, &pairs, Count::host(n), &scratch, backwards)).unwrap();
+            assert!(gpu.download::<u32>(&values, values.all()).unwrap() == expected, "backwards: {backwards}");
+        }
     }
 }
