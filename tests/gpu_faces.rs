@@ -44,7 +44,7 @@ fn stars(n: u32) -> Mesh {
 }
 
 /// A block with copies of cells, vertices in another order: of every 7th right after itself, and of every 5th and 11th at
-/// the end, some twice. So a face has up to five cells, next to each other or far apart.
+/// the end, the latter twice. So many faces have three cells or more, next to each other or far apart.
 fn copies() -> Mesh {
     let block = kuhn([6, 6, 6]).unwrap();
     let rotated = |tet: &[u32; 4], by: usize| std::array::from_fn(|v| tet[(v + by) % 4]);

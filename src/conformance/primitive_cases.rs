@@ -62,7 +62,9 @@ pub(super) fn add(cases: &mut Vec<Case>) {
             sort(cases, Group::Full, SortCase { bits, n: 4097, live: Live::Host, keys: Keys::Dirty, target });
         }
         for n in lengths() {
-            sort(cases, group(n, is_few(n)), SortCase { bits: 21, n, live: Live::Host, keys: Keys::Random, target });
+            // Thousands of tiles that wait for each other are sorted on every driver: Mesa 22.3 failed here, and not below.
+            let few = if n == LONG[0] && target == TargetKind::Narrow { Group::Quick } else { group(n, is_few(n)) };
+            sort(cases, few, SortCase { bits: 21, n, live: Live::Host, keys: Keys::Random, target });
             sort(cases, Group::Full, SortCase { bits: 30, n, live: Live::All, keys: Keys::Random, target });
         }
         for live in COUNTS {
