@@ -1,7 +1,7 @@
 // What the tiles of a sort tell those after them: a word per tile and digit, chain[tile * DIGITS + digit]. It is NOTHING
 // first, then the pairs of the digit in the tile itself, and finally those in all tiles up to it, smaller digits included.
-// Volatile, since a compiler might do an ordinary load twice, and get two answers.
-#define CHAINED coherent volatile
+// Volatile, and so coherent, since a compiler might do an ordinary load twice, and get two answers.
+#define CHAINED volatile
 const uint NOTHING = 0u;
 const uint FINAL = 0x80000000u;
 const uint MOST_POLLS = 512u; // of words that are NOTHING, before who waits counts the missing tiles instead
