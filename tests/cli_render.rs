@@ -4,27 +4,10 @@
 
 mod program;
 
-use program::{json, olbvh, text};
-use serde_json::Value;
+use program::{fails, has_keys, json, olbvh, text};
 use std::path::Path;
 use std::process::Command;
 use tempfile::TempDir;
-
-/// Runs the program, which must fail with `code`; returns its message.
-fn fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
-    let out = olbvh(folder, arguments);
-    let message = text(&out.stderr);
-    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {message}");
-    assert!(!message.contains("panicked") && !message.is_empty(), "{arguments:?}: {message}");
-    assert!(out.stdout.is_empty(), "{arguments:?} must not print results");
-    message
-}
-
-fn has_keys(value: &Value, keys: &[&str]) {
-    for key in keys {
-        assert!(value.get(key).is_some(), "no {key} in {value:#}");
-    }
-}
 
 const RENDER: &[&str] = &["render", "kuhn:5,4,3", "-o", "a.png", "--size", "40x30", "--device", "cpu"];
 
@@ -191,62 +174,6 @@ fn info_counts_faces_of_more_than_two_cells() {
     }
 }
 
-#[test]
-fn locate_finds_points_and_values() {
-    let folder = TempDir::new().unwrap();
-    std::fs::write(folder.path().join("p.csv"), "x,y,z\n0.5,0.25,0.125\n9,9,9\n1,1,1\n").unwrap();
-    let result = json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "o.csv", "--device", "cpu"]);
-    has_keys(&result, &["points", "found", "seconds", "points_per_second"]);
-    assert_eq!((result["points"].as_u64(), result["found"].as_u64()), (Some(3), Some(2)));
-    let table = std::fs::read_to_string(folder.path().join("o.csv")).unwrap();
-    assert_eq!(table.lines().count(), 4, "{table}");
-    json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "all.csv", "--all", "--device", "cpu"]);
-    let table = std::fs::read_to_string(folder.path().join("all.csv")).unwrap();
-    let of = |point: &str| table.lines().filter(|l| l.starts_with(point)).count();
-    assert_eq!((of("0,"), of("1,"), of("2,")), (1, 0, 24), "one cell, none, all round an inner vertex: {table}");
-    json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", "again.csv", "--all", "--reorder", "--device", "cpu"]);
-    assert_eq!(table, std::fs::read_to_string(folder.path().join("again.csv")).unwrap());
-    for ending in ["npy", "npz", "vtu", "json"] {
-        json(folder.path(), &["locate", "kuhn:3,3,3", "p.csv", "-o", &format!("o.{ending}"), "--device", "cpu"]);
-    }
-    // So many points for the mesh that they are sorted or, with `--coherent`, located in runs.
-    let table = |name: &str, more: &[&str]| {
-        json(folder.path(), &[&["locate", "kuhn:1,1,1", "p.csv", "-o", name, "--device", "cpu"], more].concat());
-        std::fs::read_to_string(folder.path().join(name)).unwrap()
-    };
-    assert_eq!(table("a.csv", &[]), table("b.csv", &["--coherent"]));
-}
-
-/// Fields by name, all of them, or the first one, which is called `value`.
-#[test]
-fn locate_interpolates_any_number_of_fields() {
-    let folder = TempDir::new().unwrap();
-    let mesh = "# vtk DataFile Version 3.0\none\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 4 float\n0 0 0 1 0 0 0 1 0 0 0 1\nCELLS 1 5\n\
-                4 0 1 2 3\nCELL_TYPES 1\n10\nPOINT_DATA 4\nVECTORS v float\n0 3 4 0 3 4 0 3 4 0 3 4\nSCALARS owner float 1\nLOOKUP_TABLE default\n\
-                2 2 2 2\nCELL_DATA 1\nSCALARS region float 1\nLOOKUP_TABLE default\n7\n";
-    std::fs::write(folder.path().join("one.vtk"), mesh).unwrap();
-    std::fs::write(folder.path().join("p.csv"), "0.25,0.25,0.25\n5,5,5\n").unwrap();
-    for device in [&["--device", "cpu"][..], &[]] {
-        for (more, header, first) in [
-            (&[][..], "value", "5"),
-            (&["--field", "v.z"], "value", "4"),
-            (&["--field", "region", "--field", "v"], "region,v", "7,5"),
-            (&["--all-fields"], "v,v.x,v.y,v.z,owner_,region", "5,0,3,4,2,7"),
-        ] {
-            let result = json(folder.path(), &[&["locate", "one.vtk", "p.csv", "-o", "o.csv"], device, more].concat());
-            let table = std::fs::read_to_string(folder.path().join("o.csv")).unwrap();
-            let without_coordinates = |line: &str| {
-                line.split(',').enumerate().filter(|(i, _)| !(4..8).contains(i)).map(|(_, c)| c.to_owned()).collect::<Vec<_>>().join(",")
-            };
-            let nan = vec!["NaN"; first.split(',').count()].join(",");
-            let wanted = [format!("x,y,z,owner,{header}"), format!("0.25,0.25,0.25,0,{first}"), format!("5,5,5,4294967295,{nan}")];
-            assert_eq!(table.lines().map(without_coordinates).collect::<Vec<_>>(), wanted, "{more:?}");
-            assert_eq!(result["fields"].as_array().unwrap().len(), first.split(',').count());
-        }
-    }
-    fails(folder.path(), 2, &["locate", "one.vtk", "p.csv", "-o", "o.csv", "--field", "v", "--field", "w", "--device", "cpu"]);
-}
-
 /// `-` stands for standard input and output; they carry what the files would, and nothing else.
 #[test]
 fn results_go_to_standard_output() {
@@ -390,18 +317,6 @@ fn unknown_devices_end_with_4_and_failures_with_1() {
     let message = fails(folder.path(), 4, &["info", "kuhn:2,2,2", "--device", "no such device"]);
     assert!(message.contains("no Vulkan") || message.contains("no device `no such device`; there are: 0 "), "{message}");
     fails(folder.path(), 1, &["render", "kuhn:2,2,2", "-o", "no/such/folder/a.png", "--device", "cpu"]);
-}
-
-#[test]
-fn points_may_be_missing() {
-    let folder = TempDir::new().unwrap();
-    for (name, content) in [("empty.csv", ""), ("header.csv", "x,y,z\n")] {
-        std::fs::write(folder.path().join(name), content).unwrap();
-        let out = olbvh(folder.path(), &["locate", "kuhn:2,2,2", name, "-o", "o.csv", "--device", "cpu", "--json"]);
-        let message = text(&out.stderr);
-        assert_eq!((out.status.code(), message.contains(&format!("{name}: no points"))), (Some(0), true), "{message}");
-        assert_eq!(serde_json::from_slice::<Value>(&out.stdout).unwrap()["points"], 0);
-    }
 }
 
 /// What an existing path is decides whether it can be a result; links are kept.

@@ -238,7 +238,8 @@ fn located_points() {
     let folder = tempfile::tempdir().unwrap();
     let points = [[0.5, 1.5, 2.5], [9.0, 9.0, 9.0]];
     let bary = [[0.25f32, 0.25, 0.25, 0.25], [f32::NAN; 4]];
-    let located = Located { points: &points, owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![1.5, f32::NAN])] };
+    let located =
+        Located { points: &points, of: None, owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![1.5, f32::NAN])] };
     for ending in ["npy", "npz", "csv", "vtu", "json"] {
         write_located(folder.path().join(format!("out.{ending}")), &located).unwrap();
     }
@@ -276,8 +277,13 @@ fn located_points_as_json() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("out.json");
     let bary = [[0.4f32, 0.1, 1e-9, 0.5], [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, -0.0]];
-    let located =
-        Located { points: &[[0.0; 3]; 2], owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![16_777_216.0, 1.1])] };
+    let located = Located {
+        points: &[[0.0; 3]; 2],
+        of: None,
+        owner: &[7, u32::MAX],
+        bary: &bary,
+        values: &[("value".into(), vec![16_777_216.0, 1.1])],
+    };
     write_located(&path, &located).unwrap();
     let wanted = r#"{"owner":[7,4294967295],"bary":[[0.4,0.1,1e-9,0.5],[null,null,null,-0.0]],"value":[16777216.0,1.1]}"#;
     assert_eq!(std::fs::read_to_string(&path).unwrap(), format!("{wanted}\n"));
@@ -289,7 +295,7 @@ fn located_values_of_several_fields() {
     let folder = tempfile::tempdir().unwrap();
     let names = ["Δ 'p'", "a,\"b\"\n", "c<d>"];
     let values = names.map(|name| (name.to_owned(), vec![0.5]));
-    let located = Located { points: &[[1.0, 2.0, 3.0]], owner: &[7], bary: &[[0.25; 4]], values: &values };
+    let located = Located { points: &[[1.0, 2.0, 3.0]], of: None, owner: &[7], bary: &[[0.25; 4]], values: &values };
     let read = |ending: &str| {
         let path = folder.path().join(format!("out.{ending}"));
         write_located(&path, &located).unwrap();

@@ -70,6 +70,16 @@ pub(crate) fn gathered(fields: &[Field]) -> Option<(&str, &[Field])> {
     (2..=MOST_COMPONENTS).rev().chain([1]).find_map(of)
 }
 
+/// The fields of a mesh but for those that follow from others: the lengths of vectors.
+pub fn without_lengths(mut fields: &[Field]) -> Vec<&Field> {
+    let mut kept = Vec::new();
+    while let Some((_, parts)) = gathered(fields) {
+        kept.extend(parts);
+        fields = &fields[suffixes(parts.len()).len()..];
+    }
+    kept
+}
+
 /// The names that are taken by fields.
 #[derive(Default)]
 pub(crate) struct Names {

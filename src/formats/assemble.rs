@@ -90,6 +90,11 @@ impl Assembly {
         self.points.len()
     }
 
+    /// The points of the file.
+    pub fn into_points(self) -> Vec<[f64; 3]> {
+        self.points
+    }
+
     /// Number of cells pushed so far.
     pub fn cells(&self) -> usize {
         self.n_cells

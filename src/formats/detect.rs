@@ -24,6 +24,17 @@ const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio conv
 /// For what meshio cannot read.
 const SAVE_AS: &str = "save it as .vtu, for example with ParaView (File, Save Data)";
 
+/// Whether a file with points is a mesh, or named like one, rather than an array or a table.
+pub(crate) fn is_mesh(source: &Source) -> bool {
+    const ENDINGS: [&str; 13] = ["vtu", "pvtu", "vtm", "vtpd", "vtpc", "pvd", "vtk", "msh", "mesh", "meshb", "node", "ele", "tet"];
+    let bytes = source.start();
+    let start = &bytes[skip_comments(bytes)..];
+    let marks: [&[u8]; 3] = [b"<", b"$", b"MeshVersionFormatted"];
+    bytes.trim_ascii_start().starts_with(b"# vtk DataFile")
+        || marks.iter().any(|mark| start.starts_with(mark))
+        || ENDINGS.contains(&ending(&source.path).as_str())
+}
+
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
 pub(crate) fn detect(source: &Source) -> Result<Format> {
     let bytes = source.start();

@@ -52,6 +52,8 @@ use std::time::Instant;
 use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::named::named;
+pub use array::without_lengths;
+use assemble::Assembly;
 use detect::Format;
 pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
@@ -131,20 +133,24 @@ pub fn load_bytes(name: impl AsRef<Path>, bytes: Vec<u8>, options: &LoadOptions)
 }
 
 fn read(source: &Source, options: &LoadOptions, start: Instant) -> Result<Loaded> {
-    let companion;
-    let assembly = match detect::detect(source)? {
-        Format::VtkXml => vtu::read(source, options)?,
-        Format::VtkLegacy => vtk::read(source, options)?,
-        Format::Gmsh => gmsh::read(source, options)?,
-        Format::Medit => medit::read(source, options)?,
-        Format::MeditBinary => meditb::read(source, options)?,
-        Format::TetGen => {
-            companion = tetgen::companion(source)?;
-            tetgen::read(source, &companion, options)?
-        }
-        Format::Isaac => isaac::read(source, options)?,
-    };
-    let (mesh, mut report) = assembly.finish()?;
+    let (mesh, mut report) = assembled(source, options)?.finish()?;
     report.seconds = start.elapsed().as_secs_f64();
     Ok(Loaded { mesh, report })
+}
+
+/// What a file contains, before it is checked as a mesh.
+fn assembled(source: &Source, options: &LoadOptions) -> Result<Assembly> {
+    let companion;
+    match detect::detect(source)? {
+        Format::VtkXml => vtu::read(source, options),
+        Format::VtkLegacy => vtk::read(source, options),
+        Format::Gmsh => gmsh::read(source, options),
+        Format::Medit => medit::read(source, options),
+        Format::MeditBinary => meditb::read(source, options),
+        Format::TetGen => {
+            companion = tetgen::companion(source)?;
+            tetgen::read(source, &companion, options)
+        }
+        Format::Isaac => isaac::read(source, options),
+    }
 }

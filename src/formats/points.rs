@@ -1,14 +1,15 @@
-//! Readers for points to locate: NumPy arrays and text tables.
+//! Readers for points to locate: NumPy arrays, text tables, and the points of meshes.
 
 use rayon::prelude::*;
 use std::io::Read;
 use std::ops::Range;
 use std::path::Path;
 
-use super::detect::ending;
-use super::npy;
+use super::assemble::Assembly;
+use super::detect::{self, ending};
 use super::source::{Source, excerpt};
 use super::tokens::parse_float;
+use super::{LoadOptions, Merge, assembled, npy, procedural};
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
@@ -17,10 +18,19 @@ use crate::error::{Error, Result};
 /// may name the columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns.
 /// Lines that start with `#` are comments. A table without points is valid, even an empty file.
 ///
+/// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
+/// that no cell uses; it may consist of surfaces only.
+///
 /// # Errors
-/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the line if it is broken.
+/// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken, and as
+/// [`super::load`] for a mesh.
 pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
-    points(&Source::read(path.as_ref(), ".npy or a table of text")?)
+    let path = path.as_ref();
+    if let Some(made) = path.to_str().and_then(procedural::make) {
+        return made.map(|(_, mesh)| mesh.points.iter().map(|p| p.map(f64::from)).collect());
+    }
+    let source = Source::open(path, ".npy, a table of text, or a mesh")?;
+    if detect::is_mesh(&source) { of_mesh(&source) } else { points(&source.whole()?) }
 }
 
 /// Reads points from a stream, such as standard input, in the formats of [`load_points`].
@@ -30,7 +40,12 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
 pub fn read_points(mut stream: impl Read) -> Result<Vec<[f64; 3]>> {
     let (path, mut bytes) = (Path::new("-"), Vec::new());
     stream.read_to_end(&mut bytes).map_err(|source| Error::Io { path: path.into(), source })?;
-    points(&Source::new(path, bytes))
+    let source = Source::new(path, bytes);
+    if detect::is_mesh(&source) { of_mesh(&source) } else { points(&source) }
+}
+
+fn of_mesh(source: &Source) -> Result<Vec<[f64; 3]>> {
+    assembled(source, &LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() }).map(Assembly::into_points)
 }
 
 fn points(source: &Source) -> Result<Vec<[f64; 3]>> {

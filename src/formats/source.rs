@@ -40,32 +40,17 @@ impl Source {
     /// Opens a file; `kinds` names the readable formats for messages. As many chunks are read as hold what tells its
     /// format.
     pub fn open(path: &Path, kinds: &str) -> Result<Self> {
-        Self::opened(path, kinds, |file, bytes, length| {
-            let tells = |bytes: &[u8]| bytes.len() >= skip_comments(bytes) + TOLD_BY;
-            // Twice as much each time, as comments are then searched from the start again.
-            while Read::take(&mut *file, bytes.len().max(CHUNK) as u64).read_to_end(bytes)? > 0 && !tells(bytes) {}
-            if bytes.len() >= length {
-                file.read_to_end(bytes)?; // of a pipe
-            }
-            Ok(bytes.len() < length)
-        })
-    }
-
-    /// Reads a file as a whole; `kinds` names the readable formats for messages.
-    pub fn read(path: &Path, kinds: &str) -> Result<Self> {
-        Self::opened(path, kinds, |file, bytes, length| {
-            bytes.try_reserve_exact(length)?;
-            file.read_to_end(bytes).map(|_| false)
-        })
-    }
-
-    /// Opens a file, of which `read` reads the start and returns whether a rest remains.
-    fn opened(path: &Path, kinds: &str, read: impl FnOnce(&mut File, &mut Vec<u8>, usize) -> std::io::Result<bool>) -> Result<Self> {
+        let tells = |bytes: &[u8]| bytes.len() >= skip_comments(bytes) + TOLD_BY;
         let open = || {
             let mut file = File::open(path)?;
             let length = usize::try_from(file.metadata()?.len()).unwrap_or(usize::MAX);
             let mut bytes = Vec::new();
-            let remains = read(&mut file, &mut bytes, length)?;
+            // Twice as much each time, as comments are then searched from the start again.
+            while Read::take(&mut file, bytes.len().max(CHUNK) as u64).read_to_end(&mut bytes)? > 0 && !tells(&bytes) {}
+            let remains = bytes.len() < length;
+            if !remains {
+                file.read_to_end(&mut bytes)?; // of a pipe
+            }
             bytes.shrink_to_fit();
             let (read, source) = (bytes.len(), Self::new(path, bytes));
             let mark = read - source.start.len();
@@ -76,6 +61,13 @@ impl Source {
             Err(_) if path.is_dir() => Err(Self::new(path, Vec::new()).error(format!("a folder; name a file in it ({kinds})"))),
             Err(source) => Err(Error::Io { path: path.into(), source }),
         }
+    }
+
+    /// Reads what remains on disk.
+    pub fn whole(self) -> Result<Self> {
+        let Some(Rest { length, .. }) = self.rest else { return Ok(self) };
+        let bytes = self.window(0..length).map_err(|why| self.error(why))?.into_owned();
+        Ok(Self { path: self.path, start: Arc::new(bytes), rest: None })
     }
 
     /// The contents of a file that are already in memory.

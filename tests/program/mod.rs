@@ -1,6 +1,6 @@
 //! Runs of the program.
 
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, dead_code, reason = "helpers of tests, of which each uses some")]
 
 use serde_json::Value;
 use std::path::Path;
@@ -13,6 +13,22 @@ pub fn olbvh(folder: &Path, arguments: &[&str]) -> Output {
 
 pub fn text(bytes: &[u8]) -> String {
     String::from_utf8(bytes.to_vec()).unwrap()
+}
+
+/// Runs the program, which must fail with `code`; returns its message.
+pub fn fails(folder: &Path, code: i32, arguments: &[&str]) -> String {
+    let out = olbvh(folder, arguments);
+    let message = text(&out.stderr);
+    assert_eq!(out.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(!message.contains("panicked") && !message.is_empty(), "{arguments:?}: {message}");
+    assert!(out.stdout.is_empty(), "{arguments:?} must not print results");
+    message
+}
+
+pub fn has_keys(value: &Value, keys: &[&str]) {
+    for key in keys {
+        assert!(value.get(key).is_some(), "no {key} in {value:#}");
+    }
 }
 
 /// The JSON object of a run that must succeed.

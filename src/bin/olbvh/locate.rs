@@ -6,7 +6,10 @@ use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{InBlocks, Points};
-use olbvh::formats::{Located, OutputFile, OutputFormat, load_points, read_points, write_json, write_located, write_npy};
+use olbvh::formats::{
+    LoadOptions, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json, write_located,
+    write_npy,
+};
 use olbvh::mesh::{Field, Mesh};
 use olbvh::options::Fineness;
 use olbvh::query::{self, LocateMethod, LocateOptions};
@@ -28,6 +31,7 @@ Examples:
   olbvh locate bracket.vtu points.npy -o values.npz --field temperature --field von_mises
   olbvh locate bracket.vtu points.csv -o values.csv --all-fields
   olbvh locate bracket.vtu points.csv -o cells.csv --all   every cell that contains the point
+  olbvh locate coarse.vtu fine.vtu -o fine-with-fields.vtu --all-fields   fields of one mesh at the points of another
   echo 40,30,20 | olbvh locate bracket.vtu - -o -   without files
 
 Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder, the first \
@@ -36,7 +40,8 @@ the options; --all then finds all of them only with --lists all. Ids count the c
 barycentric coordinates b0 to b3 belong to the vertices of the tetrahedron in file order. For a cell that was split into tetrahedra (hexahedron, voxel, \
 wedge or pyramid), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
 A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; a .csv has a line per point (x, y, z, owner, b0 to \
-b3, value); .vtu and .json are other formats. With --all-fields or more than one --field, each field has its own name instead of `value`. Values are \
+b3, value); .vtu and .json are other formats. If the points are those of a mesh, a .vtu has that mesh (split into tetrahedra, if it has volume cells) with the \
+results at its points, and with --all-fields vectors are vectors again. With --all-fields or more than one --field, each field has its own name instead of `value`. Values are \
 NaN (in JSON null) where there is no owner. \
 If there is at least one point for every four cells (for at most 4,194,304 cells), points are sorted along a Z curve before they are searched for. \
 --coherent saves the sorting. Results are always in the order of the points. \
@@ -44,7 +49,8 @@ With --all, the result has one row per point and cell: .csv, .npy (n×2) or .jso
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers) or .csv (x,y,z). `-`: standard input.
+    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers), .csv (x,y,z), or another mesh, whose
+    /// points are taken in the order of its file. `-`: standard input.
     points: PathBuf,
     /// Output file; its extension selects the format: .csv, .npy, .npz, .vtu or .json (with --all .csv, .npy or .json).
     /// `-`: a .csv on standard output, while the summary goes to standard error.
@@ -94,6 +100,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mesh = &loaded.mesh;
     let fields: Vec<&Field> = if args.all {
         Vec::new()
+    } else if args.all_fields && output.format == OutputFormat::Vtu {
+        without_lengths(&mesh.fields)
     } else if args.all_fields {
         mesh.fields.iter().collect()
     } else if args.field.is_empty() {
@@ -123,7 +131,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let values = columns(mesh, &fields, args.all_fields, &located);
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
-        write_located(output.path(), &Located { points: &points, owner: &owner, bary: &located.barycentrics, values: &values })?;
+        let of = if output.format == OutputFormat::Vtu { probed(&args.points, points.len()) } else { None };
+        write_located(
+            output.path(),
+            &Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values },
+        )?;
         Done { found: located.owners.iter().filter(|&&tet| tet != u32::MAX).count(), took }
     };
     drop(progress);
@@ -155,6 +167,12 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         in_blocks(&took)
     );
     output.finish(common, &json, &text)
+}
+
+/// The mesh whose points were located, if it has volume cells.
+fn probed(path: &Path, points: usize) -> Option<Mesh> {
+    let options = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
+    load(path, &options).ok().map(|loaded| loaded.mesh).filter(|mesh| mesh.points.len() == points)
 }
 
 /// The columns of values: `value` for the one field (NaN without any), or each field by its name, with an underscore

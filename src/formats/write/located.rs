@@ -11,13 +11,17 @@ use zip::write::SimpleFileOptions;
 use super::vtu::{Block, Column, Grid};
 use super::{NpyNumber, OutputFile, OutputFormat, write_file, write_json};
 use crate::error::{Error, Result};
+use crate::formats::array::{MOST_COMPONENTS, suffixes};
 use crate::formats::npy;
+use crate::mesh::Mesh;
 
 /// Owners, barycentric coordinates and values of points.
 #[derive(Clone, Copy, Debug)]
 pub struct Located<'a> {
     /// The points, in the coordinates of the mesh file.
     pub points: &'a [[f64; 3]],
+    /// Given if these are the points of another mesh, which a `.vtu` then shows.
+    pub of: Option<&'a Mesh>,
     /// Id of the cell that owns each point; `u32::MAX`: none.
     pub owner: &'a [u32],
     /// Barycentric coordinates in that cell.
@@ -35,10 +39,11 @@ impl Located<'_> {
 
 /// Writes owners, barycentric coordinates and values in the format that the extension of `path` selects: `.npy` (an
 /// array of records `owner` u4, `bary` 4×f4, and an f4 per field), `.npz` (an array for each of these), `.csv` (columns
-/// x, y, z, owner, b0 to b3, and one per field), `.vtu` (the points as vertices) or `.json` (lists).
+/// x, y, z, owner, b0 to b3, and one per field), `.vtu` (the points as vertices, or the mesh whose points they are; fields
+/// `v.x`, `v.y` and `v.z` without a field `v`, and `s.0`, `s.1` and so on, are one array) or `.json` (lists).
 ///
 /// # Errors
-/// [`Error::Invalid`] for another extension, for arrays of different lengths, or for a field whose name is that of
+/// [`Error::Invalid`] for another extension, for arrays of different lengths, for a mesh of other points, or for a field whose name is that of
 /// another or one of [`Located::TAKEN`]; [`Error::Io`] if the file cannot be written.
 pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()> {
     let path = path.as_ref();
@@ -46,6 +51,9 @@ pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()
     let n = located.owner.len();
     if located.points.len() != n || located.bary.len() != n || located.values.iter().any(|(_, v)| v.len() != n) {
         return Err(Error::Invalid(format!("{}: points, owners, coordinates and values of different number", path.display())));
+    }
+    if located.of.is_some_and(|mesh| mesh.points.len() != n) {
+        return Err(Error::Invalid(format!("{}: {n} points of a mesh with another number of them", path.display())));
     }
     let mut taken: HashSet<&str> = Located::TAKEN.into();
     if let Some((name, _)) = located.values.iter().find(|(name, _)| !taken.insert(name)) {
@@ -55,7 +63,7 @@ pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()
         OutputFormat::Npy => write_file(path, |file| records(file, located)),
         OutputFormat::Npz => write_file(path, |file| archive(file, located)),
         OutputFormat::Csv => write_file(path, |file| table(file, located)),
-        OutputFormat::Vtu => write_file(path, |file| vertices(file, located)),
+        OutputFormat::Vtu => write_file(path, |file| grid(file, located)),
         _ => write_json(path, located),
     }
 }
@@ -125,16 +133,47 @@ fn csv_field(name: &str) -> Cow<'_, str> {
     if name.contains([',', '"', '\n', '\r']) { format!("\"{}\"", name.replace('"', "\"\"")).into() } else { name.into() }
 }
 
-fn vertices(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
-    let n = located.owner.len();
-    let ids: Vec<u32> = (0..n as u32).collect();
-    let ends: Vec<u32> = (1..=n as u32).collect();
-    let mut arrays = vec![
+/// Columns as arrays: name, number of components, and values, tuple by tuple.
+fn arrays(mut columns: &[(String, Vec<f32>)]) -> Vec<(&str, usize, Cow<'_, [f32]>)> {
+    let names: HashSet<&str> = columns.iter().map(|(name, _)| name.as_str()).collect();
+    let mut arrays = Vec::new();
+    while let [(first, values), ..] = columns {
+        // The suffixes of components are the last ones: a vector's first is that of its length.
+        let of = |n: usize| {
+            let suffixes = &suffixes(n)[suffixes(n).len() - n..];
+            let base = first.strip_suffix(suffixes[0]).filter(|base| !names.contains(base))?;
+            let parts = columns.get(..n)?;
+            parts.iter().zip(suffixes).all(|((name, _), suffix)| name.strip_prefix(base) == Some(suffix)).then_some((base, parts))
+        };
+        let (name, n, values) = match (2..=MOST_COMPONENTS).rev().find_map(of) {
+            Some((base, parts)) => {
+                let tuples = (0..values.len()).flat_map(|i| parts.iter().map(move |(_, values)| values[i]));
+                (base, parts.len(), tuples.collect())
+            }
+            None => (first.as_str(), 1, Cow::Borrowed(&values[..])),
+        };
+        arrays.push((name, n, values));
+        columns = &columns[n..];
+    }
+    arrays
+}
+
+fn grid(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
+    let values = arrays(located.values);
+    let mut point_data = vec![
         Column { name: "owner", components: 1, block: Block::U32(located.owner) },
         Column { name: "bary", components: 4, block: Block::F32(located.bary.as_flattened()) },
     ];
-    arrays.extend(located.values.iter().map(|(name, values)| Column { name, components: 1, block: Block::F32(values) }));
-    let types = vec![1; n];
+    point_data.extend(values.iter().map(|(name, components, values)| Column { name, components: *components, block: Block::F32(values) }));
     let points = Column { name: "Points", components: 3, block: Block::F64(located.points.as_flattened()) };
-    Grid { points, connectivity: &ids, ends: &ends, types: &types, point_data: &arrays, cell_data: &[] }.write(file)
+    let n = located.owner.len();
+    let (connectivity, corners, kind) = match located.of {
+        Some(mesh) => (Cow::Borrowed(mesh.tets.as_flattened()), 4, 10),
+        None => ((0..n as u32).collect(), 1, 1),
+    };
+    let ends: Vec<u32> = (1..=(connectivity.len() / corners) as u32).map(|i| i * corners as u32).collect();
+    let types = vec![kind; ends.len()];
+    let ids = located.of.and_then(|mesh| mesh.cell_ids.as_deref());
+    let cell_data: Vec<_> = ids.iter().map(|ids| Column { name: "cell_id", components: 1, block: Block::U32(ids) }).collect();
+    Grid { points, connectivity: &connectivity, ends: &ends, types: &types, point_data: &point_data, cell_data: &cell_data }.write(file)
 }
