@@ -692,6 +692,12 @@ typedef struct olbvh_picture {
    */
   struct olbvh_buffer ranges;
   /*
+   Optional (size 0: everything is drawn): a depth buffer, behind which nothing is drawn. One float per pixel, upper row
+   first, such as a copy of a depth attachment (`D32_SFLOAT`) has; with a view of `olbvh_view_make` the distance from
+   the eye along the axis of the view, with one of `olbvh_view_make_projected` what Vulkan wrote there.
+   */
+  struct olbvh_buffer depth;
+  /*
    Memory of the size that `olbvh_picture_parts` reports.
    */
   struct olbvh_buffer memory;
@@ -1222,6 +1228,19 @@ enum olbvh_status olbvh_view_make(const struct olbvh_picture_settings *settings,
                                   const float *lo,
                                   const float *hi,
                                   struct olbvh_view *out);
+
+/*
+ As `olbvh_view_make`, but the mesh appears where a renderer sees it, and not in the view of the settings' camera.
+ `to_clip` has 16 numbers, column by column: the matrix (projection · view · model) that takes points of the mesh to
+ Vulkan's clip space, whose y points down; negate the second row of a matrix that is used with a viewport of negative
+ height. If `reversed` is not 0, the near plane has depth 1 and what is far depth 0, otherwise it is the other way round.
+ */
+enum olbvh_status olbvh_view_make_projected(const struct olbvh_picture_settings *settings,
+                                            const float *lo,
+                                            const float *hi,
+                                            const double *to_clip,
+                                            uint32_t reversed,
+                                            struct olbvh_view *out);
 
 /*
  Reports how many bytes the ranges of a field take.

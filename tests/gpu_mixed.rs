@@ -12,7 +12,7 @@ use olbvh::mesh::{On, kuhn};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::primitives::Arena;
 use olbvh::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
-use olbvh::render::camera::RayGrid;
+use olbvh::render::RayGrid;
 use olbvh::render::{Bounds, Plan, RenderSettings, TABLE_SIZE};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;

@@ -143,14 +143,15 @@ fn pictures_and_slices() {
     let field = (lab.part(4 * points), On::Points);
     let short = (less(field.0), On::Points);
     let (view, table) = (lab.part(size_of::<RenderView>() as u64), lab.part(16 * TABLE_SIZE as u64));
-    let normals = Some(lab.part(12 * points));
-    let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, visibility: None, part: None };
+    let (normals, depth) = (Some(lab.part(12 * points)), Some(lab.part(4 * 16 * 16)));
+    let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, depth, visibility: None, part: None };
     let draw = |input: RenderInput| lab.rehearse(|r| cmd_render(r, &searched, &input, &memory, Rounds::begin(1)));
     draw(input).unwrap();
     refused(draw(RenderInput { view: less(view), ..input }), "a view");
     refused(draw(RenderInput { table: less(table), ..input }), "a transfer function");
     refused(draw(RenderInput { field: short, ..input }), "a field");
     refused(draw(RenderInput { normals: normals.map(less), ..input }), "normals");
+    refused(draw(RenderInput { depth: depth.map(less), ..input }), "a depth buffer");
 
     let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
     let half = [axis(0), axis(1), axis(2)];

@@ -286,7 +286,17 @@ fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso
     let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     let field = (field.all(), On::Points);
-    let input = RenderInput { size: [4, 3], view: view.all(), iso, table: table.all(), field, normals: None, visibility: None, part: None };
+    let input = RenderInput {
+        size: [4, 3],
+        view: view.all(),
+        iso,
+        table: table.all(),
+        field,
+        normals: None,
+        depth: None,
+        visibility: None,
+        part: None,
+    };
     let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();

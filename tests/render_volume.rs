@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+use glam::DVec3;
 use olbvh::grid::CellRange;
 use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
@@ -9,7 +10,7 @@ use olbvh::query::SILENT;
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
-use olbvh::render::{Background, Bounds, RenderSettings, RenderStats, TransferFunction};
+use olbvh::render::{Background, Bounds, Clip, ClipPlace, RenderSettings, RenderStats, TransferFunction};
 
 /// A jittered grid with the analytic field, moved away from the origin.
 fn grid(cells: [u32; 3]) -> Mesh {
@@ -122,6 +123,45 @@ fn pictures_agree_with_brute_force() {
         assert_as_brute_force("clipped", &mesh, &RenderSettings { clips, ..settings("iso") });
     }
     assert_as_brute_force("coarse step", &mesh, &RenderSettings { step: Some(0.21), termination: 0.7, ..settings("iso") });
+}
+
+/// A depth buffer hides what a clip along the view leaves out, in the volume and of iso-surfaces.
+#[test]
+fn a_depth_ends_rays_as_a_clip_does() {
+    let mesh = grid([6, 5, 4]);
+    let topology = topology(&mesh).unwrap();
+    let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let eye = DVec3::new(-9.0, 30.0, 21.0);
+    let forward = (DVec3::new(-1.0, 13.0, 3.0) - eye).normalize();
+    for camera in ["eye=-9,30,21,target=-1,13,3,fov=30", "eye=-9,30,21,target=-1,13,3,ortho"] {
+        for iso in [vec![], vec![0.2, 0.7]] {
+            let settings = RenderSettings { iso, ..settings(camera) };
+            let scene = |settings: &RenderSettings| Scene::new(&mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
+            let whole = scene(&settings);
+            let depth = 25.0;
+            let cut = Clip { direction: Some(forward), place: ClipPlace::At(forward.dot(eye) + depth) };
+            let cut = Drawn::of(&scene(&RenderSettings { clips: vec![cut], ..settings.clone() }));
+            let depths = vec![depth as f32; 36 * 30];
+            let hidden = Drawn::of(&scene(&settings).before(&depths));
+            let whole = Drawn::of(&whole);
+            // A sample that lies on the plane may count either way.
+            let differ = cut.pixels.chunks(4).zip(hidden.pixels.chunks(4)).filter(|(a, b)| distance(a, b) > 1).count();
+            assert!(differ <= 2 && cut.stats.found_samples.abs_diff(hidden.stats.found_samples) <= 2, "{camera}: {differ} pixels");
+            assert!(
+                hidden.stats.found_samples * 5 < whole.stats.found_samples * 4 && hidden.stats.found_samples > 2000,
+                "{:?}",
+                hidden.stats
+            );
+            // What is not a number, or infinite, hides nothing.
+            let far = [f32::NAN, f32::INFINITY, 1e30, -0.0, -3.0];
+            let depths: Vec<f32> = (0..36 * 30).map(|i| far[usize::from(i >= 540) * 3 + i % if i < 540 { 3 } else { 2 }]).collect();
+            let half = Drawn::of(&scene(&settings).before(&depths));
+            let (shown, blank) = (half.pixels.split_at(540 * 4), whole.pixels.split_at(540 * 4));
+            assert!(shown.0 == blank.0, "nothing is hidden");
+            let nothing = Drawn::of(&scene(&RenderSettings { clips: vec!["view=0%".parse().unwrap()], ..settings.clone() }));
+            assert!(shown.1 == nothing.pixels.split_at(540 * 4).1, "everything is hidden");
+        }
+    }
 }
 
 #[test]

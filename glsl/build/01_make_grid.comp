@@ -5,9 +5,7 @@
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/ordered.glsl"
-ARGUMENTS(2)
-    uint unused;
-END_ARGUMENTS
+NO_SCALARS(2)
 BUFFER(0, readonly, MeshStatus, status)
 BUFFER16(1, writeonly, Grid, grid)
 

@@ -11,9 +11,7 @@
 #include "shared/separate.glsl"
 layout(constant_id = 2) const uint BOXES = 0;
 layout(constant_id = 3) const uint MARKED = 0;
-ARGUMENTS(11)
-    uint unused;
-END_ARGUMENTS
+NO_SCALARS(11)
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, uint, codes)
 BUFFER(2, readonly, uint, po)

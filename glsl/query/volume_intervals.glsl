@@ -14,7 +14,8 @@
 layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint PART = 0;
 layout(constant_id = 4) const uint ISO = 0;
-ARGUMENTS(6 + STRUCTURE_BUFFERS)
+layout(constant_id = 5) const uint DEPTH = 0;
+ARGUMENTS(7 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
@@ -23,7 +24,8 @@ RECORDS(2, vec4, vertices)  // for the binary tree only
 BUFFER16(3, readonly, Frame, frames)
 BUFFER16(4, READ_WRITE, RayState, states)
 BUFFER16(5, READ_WRITE, vec4, colors)
-STRUCTURE(6)
+BUFFER(6, readonly, float, depths) // row by row, as the colours
+STRUCTURE(7)
 
 Grid g;
 RenderView view;
@@ -201,7 +203,8 @@ void main() {
         if (PART == 0u) colors.at[place] = vec4(0.0);
         g = grid.at[0];
         vec3 direction;
-        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, direction);
+        uvec2 at = uvec2(pixel.x, plan.row + pixel.y);
+        make_ray(view, at, origin, direction);
         inverse_direction = inverse_of(direction);
         first = 3.40282347e38;
         last = -1.0;
@@ -214,7 +217,7 @@ void main() {
             precise float end = floor(clamp(last * view.inverse_step + 1.5, 0.0, MAX_SAMPLES));
             // Sample k lies k + 1/2 steps from the origin. Iso-surfaces also lie between samples, up to a clip.
             uint cut;
-            vec2 kept = kept_stretch(origin, direction, cut);
+            vec2 kept = kept_stretch(origin, direction, limit_of(at, place), cut);
             float more = ISO != 0u ? 1.0 : 0.0;
             precise float first_kept = ceil(kept.x - 0.5) - more, behind_kept = floor(kept.y - 0.5) + 1.0 + more;
             state.next = uint(max(begin, first_kept));

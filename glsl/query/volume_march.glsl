@@ -13,10 +13,9 @@
 layout(constant_id = 2) const uint SHADING = 0;
 layout(constant_id = 3) const uint ON_CELLS = 0;
 layout(constant_id = 6) const uint ISO = 0;
-ARGUMENTS(10 + STRUCTURE_BUFFERS)
-    uint items;  // pixels in whole blocks
-    uint budget; // tetrahedra tested per ray and dispatch, roughly
-END_ARGUMENTS
+layout(constant_id = 7) const uint DEPTH = 0;
+layout(constant_id = 8) const uint BUDGET = 1024; // tetrahedra tested per ray and dispatch, roughly
+NO_SCALARS(11 + STRUCTURE_BUFFERS) // the most that there is room for
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
@@ -27,7 +26,8 @@ BUFFER16(6, readonly, Frame, frames)
 BUFFER16(7, READ_WRITE, RayState, states)
 BUFFER16(8, READ_WRITE, vec4, colors) // premultiplied colour and opacity, row by row
 BUFFER(9, READ_WRITE, RenderStatus, status)
-STRUCTURE(10)
+BUFFER(10, readonly, float, depths) // row by row, as the colours
+STRUCTURE(11)
 #include "shared/structure_owner.glsl"
 
 RenderView view;
@@ -41,7 +41,7 @@ const uint BURST = 32u; // passes along walks before rays that wait for the stru
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;
-vec2 unclipped; // the stretch without what clips leave out; samples are those of the interval
+vec2 unclipped; // the stretch without what clips and depth leave out; samples are those of the interval
 uint cut;       // the clip at which it begins, or NONE
 RayState state;
 vec4 sum;
@@ -214,7 +214,7 @@ vec3 normal_of_sample(uint k, Sides here, bool joins) {
     return beside_cut(entry, normal_at(barycentric_at(entry)));
 }
 
-// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip. Light
+// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip or a depth. Light
 // takes them to lie in the stand.
 void add_surfaces(Place from, Place to) {
     bool rises = from.rank < to.rank;
@@ -244,7 +244,7 @@ void pass_by() {
 // Passes samples that no tetrahedron is near, all those of one octree cell together, so that rays beside the mesh catch
 // up with rays in it.
 void pass_empty(Grid g, inout uint work) {
-    for (; state.next < state.end && !is_to_look() && work < budget; ++work) {
+    for (; state.next < state.end && !is_to_look() && work < BUDGET; ++work) {
         uvec3 finest = quantize(g, sample_at(view, origin, direction, state.next));
         uint level = empty_level(g.level, morton(finest));
         if (level == 0u) return;
@@ -285,16 +285,16 @@ void main() {
     uint i = item_index();
     uint unfinished = 0u;
     samples = found = skipped = 0u;
-    if (i < items && states.at[i].next < states.at[i].end) {
+    plan = frames.at[0].plan;
+    uvec2 pixel;
+    if (pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel) && states.at[i].next < states.at[i].end) {
         view = frames.at[0].view;
-        plan = frames.at[0].plan;
         Grid g = grid.at[0];
         state = states.at[i];
-        uvec2 pixel;
-        pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel);
         uint place = pixel.y * plan.size[0] + pixel.x;
         sum = colors.at[place];
-        make_ray(view, uvec2(pixel.x, plan.row + pixel.y), origin, direction);
+        uvec2 in_view = uvec2(pixel.x, plan.row + pixel.y);
+        make_ray(view, in_view, origin, direction);
         halfway = vec3(0.0);
         if (SHADING != 0u) {
             precise vec3 h = view.to_light.xyz - direction;
@@ -303,7 +303,7 @@ void main() {
             halfway = unit;
         }
         inverse_direction = inverse_of(direction);
-        if (ISO != 0u || SHADING != 0u) unclipped = kept_stretch(origin, direction, cut);
+        if (ISO != 0u || SHADING != 0u) unclipped = kept_stretch(origin, direction, limit_of(in_view, place), cut);
         // Each of the following has one place in the loop, since kernels with several copies take long to compile: the
         // ray enters a tetrahedron, takes a sample, searches the structure.
         uint target = state.cursor == 0u ? state.tet : NONE; // the tetrahedron to enter
@@ -312,7 +312,7 @@ void main() {
         ahead = 1u;
         uint known = state.check >> 30u; // flags of the best candidate
         state.check &= 0x3fffffffu;
-        for (uint work = 0u; state.next < state.end && (work < budget || is_owner); ++work) {
+        for (uint work = 0u; state.next < state.end && (work < BUDGET || is_owner); ++work) {
             if (target != NONE) {
                 enter(target);
                 target = NONE;
@@ -355,7 +355,7 @@ void main() {
                 }
             }
 #endif
-            if (stands || state.next >= state.end || is_to_look() || work >= budget) continue;
+            if (stands || state.next >= state.end || is_to_look() || work >= BUDGET) continue;
             leave();
             vec3 at = sample_at(view, origin, direction, state.next);
             vec3 x = normalise(g, at);
@@ -364,7 +364,7 @@ void main() {
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
                 OwnerSearch search = no_search();
                 if (state.cursor != 0u) search = OwnerSearch(state.cursor, best_of(state.tet, known, state.smallest));
-                bool ended = find_owner(search, g, at, x, 0.0, work, budget, owner);
+                bool ended = find_owner(search, g, at, x, 0.0, work, BUDGET, owner);
                 state.cursor = search.cursor;
                 state.tet = search.best.owner;
                 known = best_bits(search.best);

@@ -6,7 +6,7 @@
 //     END_ARGUMENTS
 //     BUFFER(0, readonly, uint, keys)
 //     BUFFER(1, writeonly, uint, sorted)
-// and reads keys.at[i]. By default, the push constants hold one 64-bit address per buffer, then the scalars. With
+// and reads keys.at[i]; a kernel without scalars begins with NO_SCALARS(2) instead. By default, the push constants hold one 64-bit address per buffer, then the scalars. With
 // OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i`, and the push constants hold only the scalars. OLBVH_WIDE: see
 // records.glsl.
 #extension GL_EXT_buffer_reference : require
@@ -21,11 +21,13 @@
 #define END_ARGUMENTS };
 #ifdef OLBVH_DESCRIPTORS
 #define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments {
+#define NO_SCALARS(buffers)
 // build.rs reads the alignment from the name of the block.
 #define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \
     layout(set = 0, binding = slot, std430) access buffer name##Block##alignment { T at[]; } name;
 #else
 #define ARGUMENTS(buffers) layout(push_constant, std430) uniform Arguments { uvec2 address[buffers];
+#define NO_SCALARS(buffers) ARGUMENTS(buffers) END_ARGUMENTS
 #define ALIGNED_BUFFER(alignment, slot, access, T, name)                                                                         \
     layout(buffer_reference, std430, buffer_reference_align = alignment) access buffer name##Block { T at[]; };                 \
     name##Block name = name##Block(address[slot]);

@@ -45,10 +45,10 @@ struct BuildStatus {
 
 // The view of a picture, without mesh, tree and field; see src/render.
 struct RenderView {
-    vec4 origin;     // Origin of the ray of pixel (0, 0).
-    vec4 origin_x;   // What one pixel to the right adds to the origin.
-    vec4 origin_y;   // What one pixel down adds to the origin.
-    vec4 direction;        // Direction of the ray of pixel (0, 0), of any length.
+    vec4 origin;     // Origin of the ray of pixel (0, 0); p of a depth buffer, whose value d lies at direction·(p + d·q) / (r + d·s) from the origin.
+    vec4 origin_x;   // What one pixel to the right adds to the origin; q of a depth buffer.
+    vec4 origin_y;   // What one pixel down adds to the origin; r of a depth buffer.
+    vec4 direction;        // Direction of the ray of pixel (0, 0), of any length; s of a depth buffer.
     vec4 direction_x;      // What one pixel to the right adds to the direction.
     vec4 direction_y;      // What one pixel down adds to the direction.
     vec4 to_light;   // Unit vector to the light; strength of the viewer's light as a part of its.

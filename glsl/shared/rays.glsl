@@ -1,5 +1,5 @@
-// Rays of a picture. Twin of `RayGrid::ray` in src/render/camera.rs and `inverse_sqrt` in src/render/mod.rs. Needs
-// layout.glsl and tet.glsl.
+// Rays of a picture. Twin of src/render/rays.rs, and of `inverse_sqrt` in src/render/mod.rs. Needs layout.glsl and
+// tet.glsl.
 
 // 1 / sqrt(x) of a normal x by correctly rounded operations only.
 float inverse_sqrt(float x) {
@@ -14,10 +14,17 @@ float inverse_sqrt(float x) {
     return r;
 }
 
+// The direction of a pixel's ray, of any length.
+vec3 way_of(RenderView view, uvec2 pixel) {
+    vec2 at = vec2(pixel);
+    precise vec3 w = (view.direction.xyz + at.x * view.direction_x.xyz) + at.y * view.direction_y.xyz;
+    return w;
+}
+
 void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction) {
     vec2 at = vec2(pixel);
     precise vec3 o = (view.origin.xyz + at.x * view.origin_x.xyz) + at.y * view.origin_y.xyz;
-    precise vec3 w = (view.direction.xyz + at.x * view.direction_x.xyz) + at.y * view.direction_y.xyz;
+    vec3 w = way_of(view, pixel);
     float r = inverse_sqrt(dot_product(w, w));
     precise vec3 d = w * r;
     origin = o;
@@ -38,6 +45,17 @@ vec3 inverse_of(vec3 direction) {
 
 // Most samples of a ray: beyond, k + 1/2 is not exact, and the march keeps flags in sample numbers from bit 30 on.
 const float MAX_SAMPLES = 8388608.0;
+
+// How many steps from its origin the ray of a pixel reaches value d of a depth buffer.
+float steps_to_depth(RenderView view, uvec2 pixel, float d) {
+    precise float scale = view.origin_y.w + d * view.direction.w;
+    if (!(scale > LEAST && scale < 3.40282347e38)) return MAX_SAMPLES;
+    vec3 w = way_of(view, pixel);
+    float square = dot_product(w, w);
+    precise float way = square * inverse_sqrt(square);
+    precise float steps = (((view.origin.w + d * view.origin_x.w) * way) * reciprocal(scale)) * view.inverse_step;
+    return steps < MAX_SAMPLES ? max(steps, -1.0) : MAX_SAMPLES;
+}
 
 // The position of sample k.
 vec3 sample_at(RenderView view, vec3 origin, vec3 direction, uint k) {

@@ -250,11 +250,7 @@ impl<'a> Stage0<'a> {
             if let Some(given) = given {
                 r.copy(given, grid.part(0, given.size));
             } else {
-                r.dispatch(
-                    &MakeGrid { status, grid, unused: 0 },
-                    MakeGridSpec { workgroup: once, ..Default::default() },
-                    Groups::Count(1),
-                )?;
+                r.dispatch(&MakeGrid { status, grid }, MakeGridSpec { workgroup: once, ..Default::default() }, Groups::Count(1))?;
             }
             r.barrier("mesh.make_grid → mesh.normalise_vertices");
             let spec = NormaliseVerticesSpec { workgroup, ..Default::default() };

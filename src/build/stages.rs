@@ -226,7 +226,7 @@ impl Build<'_> {
             let boxes = tree.boxes.unwrap_or_else(|| r.gpu().nothing());
             let marked = u32::from(marks.is_some());
             let marks = marks.unwrap_or_else(|| r.gpu().nothing());
-            let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, masks, unused: 0 };
+            let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, masks };
             let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), marked, ..Default::default() };
             r.dispatch(&finish, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
             r.barrier("leaves.finish → levels");

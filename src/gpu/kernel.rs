@@ -149,7 +149,7 @@ fn compile(gpu: &Gpu, info: &KernelInfo, constants: &[(u32, u32)], made: &mut Pi
             made.set_layout = device.create_descriptor_set_layout(&info, None).map_err(failed("vkCreateDescriptorSetLayout"))?;
         }
         let sets = [made.set_layout];
-        let mut layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(&ranges);
+        let mut layout_info = vk::PipelineLayoutCreateInfo::default().push_constant_ranges(if push_bytes > 0 { &ranges } else { &[] });
         if binding == Binding::Descriptors {
             layout_info = layout_info.set_layouts(&sets);
         }

@@ -193,7 +193,9 @@ impl<'a> Recorder<'a> {
                 let set = pools.set(pipeline.set_layout, &buffers, info.name)?;
                 device.cmd_bind_descriptor_sets(self.commands, vk::PipelineBindPoint::COMPUTE, pipeline.layout, 0, &[set], &[]);
             }
-            device.cmd_push_constants(self.commands, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, &push);
+            if !push.is_empty() {
+                device.cmd_push_constants(self.commands, pipeline.layout, vk::ShaderStageFlags::COMPUTE, 0, &push);
+            }
             match groups {
                 Groups::Count(n) => {
                     let [x, y, z] = fold_groups(n);

@@ -51,6 +51,11 @@ pub struct RenderInput {
     /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes
     /// them. Without normals, samples are not lit.
     pub normals: Option<BufferRef>,
+    /// A depth buffer, behind which nothing is drawn: a 32-bit float per pixel of this picture or part, row 0 on top, such as
+    /// a copy of a depth attachment (`D32_SFLOAT`) has. [`crate::render::RayGrid::depth`] of the view says what its values
+    /// mean: with [`crate::render::Plan::with_projected`] what Vulkan wrote there, with a camera the distance from the eye
+    /// along the axis of the view.
+    pub depth: Option<BufferRef>,
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
     /// picture is the same either way. With a binary tree nothing is skipped.
     pub visibility: Option<Visibility>,
@@ -64,11 +69,18 @@ impl RenderInput {
         self.part.and_then(|part| part.cells)
     }
 
+    /// Whether there is a depth buffer, and that buffer or an empty one.
+    fn depths(&self, r: &Recorder<'_>) -> (u32, BufferRef) {
+        (u32::from(self.depth.is_some()), self.depth.unwrap_or_else(|| r.gpu().nothing()))
+    }
+
     /// Rejects parts that are too small for a picture of this mesh.
     fn check(&self, mesh: &MeshInput) -> Result<()> {
         self.view.check(size_of::<RenderView>() as u64, "a view")?;
         self.table.check(16 * TABLE_SIZE as u64, "a transfer function")?;
         check_field(self.field, mesh)?;
+        let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
+        self.depth.map_or(Ok(()), |depth| depth.check(4 * pixels, "a depth buffer"))?;
         self.normals.map_or(Ok(()), |normals| normals.check(12 * u64::from(mesh.points), "normals"))
     }
 }
@@ -278,6 +290,7 @@ fn cmd_intervals(
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
     let (mesh, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let (stack, part, iso) = (STACK, u32::from(input.cells().is_some()), u32::from(input.iso));
+    let (depth, depths) = input.depths(r);
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
         dispatch!(r, groups, searched, VolumeIntervals VolumeIntervalsSpec {} {}, LbvhIntervals LbvhIntervalsSpec, {
@@ -286,8 +299,9 @@ fn cmd_intervals(
             frames: memory.frame,
             states: memory.rays,
             colors: memory.colors,
+            depths: depths,
             items: rays,
-        }, { stack, part, iso })
+        }, { stack, part, iso, depth })
     })
 }
 
@@ -303,6 +317,7 @@ fn cmd_march(
     let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
     let (iso, skip, normals) = (u32::from(input.iso), u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
+    let ((depth, depths), budget) = (input.depths(r), BUDGET);
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.march", |r| {
         dispatch!(r, groups, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
@@ -315,8 +330,7 @@ fn cmd_march(
             states: memory.rays,
             colors: memory.colors,
             status: memory.status,
-            items: rays,
-            budget: BUDGET,
-        }, { shading, on_cells, iso })
+            depths: depths,
+        }, { shading, on_cells, iso, depth, budget })
     })
 }

@@ -21,7 +21,7 @@ use super::ranges::{ranges, visible};
 use crate::error::{Error, Result};
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
-use crate::render::{Plan, Prepared, RenderSettings, RenderStats, ValidTets};
+use crate::render::{MAX_SAMPLES, Plan, Prepared, RenderSettings, RenderStats, ValidTets};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -47,6 +47,7 @@ pub struct Scene<'a> {
     pub(crate) visible: Option<Vec<u32>>,
     pub(crate) ranges_ms: f64,
     part: CellRange,
+    depths: Option<&'a [f32]>,
     /// It has tolerance 0, because with another one it would depend on the leaf whether a point just outside the mesh
     /// counts.
     pub(crate) locator: Locator<'a>,
@@ -74,7 +75,7 @@ impl<'a> Scene<'a> {
             prepared.plan.hides(&field.values).then(|| visible(&ranges(mesh, topology, tree, field), &prepared.plan.visible_values));
         let ranges_ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
         let locator = Locator::new(mesh, topology, tree).with_tolerance(0.0);
-        Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, part: CellRange::WHOLE, locator })
+        Ok(Self { mesh, topology, tree, field, prepared, visible, ranges_ms, part: CellRange::WHOLE, depths: None, locator })
     }
 
     /// Turns off skipping: every sample in the mesh is taken, transparent or not.
@@ -88,6 +89,26 @@ impl<'a> Scene<'a> {
     #[must_use]
     pub fn within(self, part: CellRange) -> Self {
         Self { part, ..self }
+    }
+
+    /// Draws another plan of the same field and settings: from a view that no camera describes.
+    #[must_use]
+    pub fn seen_in(mut self, plan: Plan) -> Self {
+        self.prepared.plan = plan;
+        self
+    }
+
+    /// Leaves out what lies behind these values of a depth buffer, one per ray, row 0 on top.
+    #[must_use]
+    pub fn before(self, depths: &'a [f32]) -> Self {
+        Self { depths: Some(depths), ..self }
+    }
+
+    /// How many steps from its origin the ray of pixel (x, y) is hidden.
+    fn limit(&self, x: u32, y: u32) -> f32 {
+        let plan = self.plan();
+        let depth = self.depths.and_then(|depths| depths.get((y * plan.size[0] + x) as usize));
+        depth.map_or(MAX_SAMPLES as f32, |&depth| plan.rays.steps_to(x, y, depth, plan.inverse_step()))
     }
 
     /// The plan of the picture.
@@ -112,11 +133,11 @@ pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture 
     let row = |(y, colors): (usize, &mut [[f32; 4]])| {
         let y = y as u32;
         let begin = Instant::now();
-        let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y))).collect();
+        let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y), scene.limit(x, y))).collect();
         let middle = Instant::now();
         let mut marcher = Marcher::new(scene);
-        for (x, (span, color)) in spans.into_iter().zip(colors).enumerate() {
-            *color = marcher.march(plan.rays.ray(x as u32, y), span);
+        for (x, (span, color)) in (0..).zip(spans.into_iter().zip(colors)) {
+            *color = marcher.march(plan.rays.ray(x, y), scene.limit(x, y), span);
         }
         interval_ns.fetch_add((middle - begin).as_nanos() as u64, Ordering::Relaxed);
         march_ns.fetch_add(middle.elapsed().as_nanos() as u64, Ordering::Relaxed);

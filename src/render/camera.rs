@@ -1,12 +1,16 @@
-//! Cameras, and the ray of each pixel.
+//! Cameras.
 
+mod projected;
 mod spec;
 
+use super::RayGrid;
+use super::rays::View;
 use crate::error::{Error, Result};
 use crate::grid::MIN_EXTENT;
 use crate::layout::Grid;
 use glam::{DMat3, DVec3};
 
+pub use projected::ProjectedView;
 pub use spec::{CameraSpec, HELP};
 
 /// A closed box in mesh coordinates (relative to [`crate::mesh::Mesh::origin`]).
@@ -144,7 +148,7 @@ impl Camera {
     }
 
     /// An upper bound on the distance from the origin of a ray of [`Camera::rays`] at which it can meet the box.
-    pub(crate) fn reach(&self, size: [u32; 2], bounds: &Bounds) -> f64 {
+    fn reach(&self, size: [u32; 2], bounds: &Bounds) -> f64 {
         let depth = |p: DVec3| (p - self.eye).dot(self.forward);
         let corners = bounds.corners();
         let [near, far] = corners.into_iter().map(depth).fold([f64::MAX, f64::MIN], |[lo, hi], d| [lo.min(d), hi.max(d)]);
@@ -157,9 +161,15 @@ impl Camera {
         (self.distance(bounds) * (1.0 - near / far)).min(slope.hypot(1.0) * (far - near))
     }
 
+    /// The view of a picture of `size`.
+    pub(crate) fn view(&self, size: [u32; 2], bounds: &Bounds) -> View {
+        let Self { right, up, forward, .. } = *self;
+        View { right, up, forward, rays: self.rays(size, bounds), reach: self.reach(size, bounds) }
+    }
+
     /// The rays of a picture of `size` (width, height) pixels. They start on the plane across the view through the
     /// nearest corner of `bounds`, or at the eye if that plane lies behind it, so that no single precision is wasted on
-    /// the way to the mesh.
+    /// the way to the mesh. Values of a depth buffer are distances from the eye along the axis of the view.
     pub fn rays(&self, size: [u32; 2], bounds: &Bounds) -> RayGrid {
         let [w, h] = size.map(f64::from);
         let depth = |p: DVec3| (p - self.eye).dot(self.forward);
@@ -173,8 +183,10 @@ impl Camera {
         let (across, upwards) = (self.right * (half * w / h), self.up * half);
         let (first, dx, dy) = (across * s0 + upwards * t0, across * ds, upwards * dt);
         let f = |v: DVec3| v.as_vec3().to_array();
+        let start = if perspective { nearest.max(0.0) } else { nearest };
+        let depth = [-start as f32, 1.0, 1.0, 0.0];
         if perspective {
-            let near = nearest.max(0.0);
+            let near = start;
             let (base, near_dx, near_dy) = (self.eye + (self.forward + first) * near, dx * near, dy * near);
             RayGrid {
                 origin: f(base),
@@ -183,6 +195,7 @@ impl Camera {
                 direction: f(self.forward + first),
                 direction_x: f(dx),
                 direction_y: f(dy),
+                depth,
             }
         } else {
             let base = self.eye + self.forward * nearest + first;
@@ -193,6 +206,7 @@ impl Camera {
                 direction: f(self.forward),
                 direction_x: [0.0; 3],
                 direction_y: [0.0; 3],
+                depth,
             }
         }
     }
@@ -218,46 +232,6 @@ pub fn three_quarter(extent: DVec3) -> DVec3 {
     let mean = (sides[0] * sides[1] * sides[2]).cbrt();
     let weight = sides.map(|side| (side / mean).powf(0.35).clamp(0.5, 2.0));
     DVec3::new(0.58 * weight[0], -weight[1], 0.55 * weight[2])
-}
-
-/// Smaller components of a ray's direction count as this, so that reciprocals are finite. Twin of `LEAST` in
-/// glsl/shared/rays.glsl.
-pub const LEAST: f32 = 1e-20;
-
-/// The rays of a picture, in the form that kernels take: six vectors.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct RayGrid {
-    /// Origin of the ray of pixel (0, 0).
-    pub origin: [f32; 3],
-    /// Added to the origin for each pixel to the right.
-    pub origin_x: [f32; 3],
-    /// Added to the origin for each pixel down.
-    pub origin_y: [f32; 3],
-    /// Direction of the ray of pixel (0, 0), of any length.
-    pub direction: [f32; 3],
-    /// Added to the direction for each pixel to the right.
-    pub direction_x: [f32; 3],
-    /// Added to the direction for each pixel down.
-    pub direction_y: [f32; 3],
-}
-
-impl RayGrid {
-    /// Origin and unit direction of the ray of pixel (x, y), with row 0 on top. The origin is
-    /// `(origin + x·origin_x) + y·origin_y` for each component. With w = `(direction + x·direction_x) + y·direction_y`,
-    /// the direction is w · [`inverse_sqrt`](super::inverse_sqrt)`((w₀² + w₁²) + w₂²)`. No operation is contracted.
-    pub fn ray(&self, x: u32, y: u32) -> ([f32; 3], [f32; 3]) {
-        let (x, y) = (x as f32, y as f32);
-        let origin = [0, 1, 2].map(|c| (self.origin[c] + x * self.origin_x[c]) + y * self.origin_y[c]);
-        let w = [0, 1, 2].map(|c| (self.direction[c] + x * self.direction_x[c]) + y * self.direction_y[c]);
-        let r = super::inverse_sqrt((w[0] * w[0] + w[1] * w[1]) + w[2] * w[2]);
-        (origin, w.map(|v| v * r))
-    }
-
-    /// Whether the rays of all pixels of a picture of this size are finite.
-    pub(crate) fn is_finite(&self, [width, height]: [u32; 2]) -> bool {
-        let corners = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)].map(|(x, y)| self.ray(x, y));
-        corners.iter().all(|(origin, direction)| origin.iter().chain(direction).all(|v| v.is_finite()))
-    }
 }
 
 #[cfg(test)]

@@ -5,7 +5,8 @@
 //! # Definition
 //! - The ray of pixel (x, y), with row 0 on top, is [`RayGrid::ray`]. Sample k lies at
 //!   `origin + direction · ((k + ½)·Δ)`, independently of the tree.
-//! - Samples beyond a clip ([`Plan::kept_stretch`]) are not taken.
+//! - Samples beyond a clip ([`Plan::kept_stretch`]) are not taken, nor those behind what a depth buffer shows
+//!   ([`RayGrid::steps_to`]).
 //! - A sample adds nothing if it lies outside the mesh or its value is not finite. Otherwise it has the field's value v
 //!   in its owner, the place x = clamp((v − lo)·scale, 0, 1) in the transfer function, and the colour and opacity of
 //!   [`Plan::lookup`] there.
@@ -21,15 +22,16 @@
 //! - Iso-surfaces replace the volume. A sample with a value shows the stretch of the ray in its tetrahedron, where the
 //!   value is linear: forwards up to the next sample at most, and backwards to the one before if that has no value.
 //!   Between the stretches of consecutive samples the value is taken as linear, too. Of each such piece, each iso-value
-//!   that only one end is below adds the colour and opacity at its place as one surface, unless a clip leaves out that
-//!   place, in the order along the ray, lit by the normals ([`gradient_normals`]) of a tetrahedron there. For this, one
-//!   sample beyond each clip is taken.
+//!   that only one end is below adds the colour and opacity at its place as one surface, unless a clip or a depth leaves
+//!   out that place, in the order along the ray, lit by the normals ([`gradient_normals`]) of a tetrahedron there. For this, one
+//!   sample beyond each clip and depth is taken.
 
 pub mod auto;
 pub mod camera;
 pub mod clip;
 pub mod maps;
 pub mod plan;
+pub mod rays;
 pub mod settings;
 pub mod shading;
 mod stats;
@@ -39,9 +41,10 @@ mod valid;
 mod visible_values;
 
 pub use auto::auto_opacity;
-pub use camera::{Bounds, Camera, CameraSpec, Projection, RayGrid};
+pub use camera::{Bounds, Camera, CameraSpec, ProjectedView, Projection};
 pub use clip::{Clip, ClipPlace};
-pub use plan::{MAX_SAMPLES, Plan, Prepared, TABLE_SIZE, interval_slack};
+pub use plan::{Plan, Prepared, TABLE_SIZE, interval_slack};
+pub use rays::{MAX_SAMPLES, RayGrid};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};
 pub use stats::RenderStats;

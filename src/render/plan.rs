@@ -1,14 +1,14 @@
 //! The settings of a picture evaluated for one mesh and field: everything that the kernels and the reference renderer
 //! need.
 
-use super::camera::LEAST;
 use super::clip::MAX_CLIPS;
+use super::rays::{LEAST, MAX_SAMPLES, View};
 use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::shading::SKIN;
 use super::visible_values::visible_values;
 use super::{
-    Background, Bounds, Camera, Lighting, OPACITY_UNIT, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity, gradient_normals,
-    shading_normals,
+    Background, Bounds, Camera, Lighting, OPACITY_UNIT, ProjectedView, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity,
+    gradient_normals, shading_normals,
 };
 use crate::error::{Error, Result};
 use crate::grid::{canonical, reciprocal, two_to};
@@ -22,9 +22,6 @@ pub const TABLE_SIZE: usize = 1024;
 const MIN_STEP: f64 = 1.0 / 65_536.0;
 /// Largest distance of the eye, in diagonals: rays start near the mesh, but where is known to 2^-53 of that distance.
 const MAX_DISTANCE: f64 = 1e9;
-/// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
-/// flags from bit 30 on.
-pub const MAX_SAMPLES: u32 = 1 << 23;
 
 /// A picture to draw.
 #[derive(Clone, Debug, PartialEq)]
@@ -85,6 +82,46 @@ impl Plan {
         field_range: Option<[f32; 2]>,
     ) -> Result<Self> {
         settings.check()?;
+        let (distance, diagonal) = (camera.distance(bounds), bounds.diagonal());
+        if distance > diagonal * MAX_DISTANCE {
+            return Err(Error::Invalid(format!(
+                "an eye at a distance of {distance:.1e} from the mesh, whose diagonal is {diagonal:.1e}; rays are exact up to 10^9 diagonals"
+            )));
+        }
+        let view = camera.view(settings.size, bounds);
+        if !view.rays.is_finite(settings.size) {
+            let high = match camera.projection {
+                Projection::Perspective(degrees) => format!("{degrees} degrees"),
+                Projection::Orthographic(height) => format!("{height:e}"),
+            };
+            return Err(Error::Invalid(format!(
+                "a picture {high} high, with rays beyond single precision; take a smaller fov or ortho height, or a larger zoom (the mesh's \
+                 diagonal is {diagonal:.1e})"
+            )));
+        }
+        Self::with_view(settings, &view, bounds, origin, field_range)
+    }
+
+    /// As [`Plan::new`], but with the view of a renderer instead of the camera of the settings.
+    ///
+    /// # Errors
+    /// As [`Plan::new`], and if the matrix has no inverse, or planes of equal depth that are not parallel to the picture.
+    pub fn with_projected(
+        settings: &RenderSettings,
+        view: &ProjectedView,
+        bounds: &Bounds,
+        origin: [f64; 3],
+        field_range: Option<[f32; 2]>,
+    ) -> Result<Self> {
+        settings.check()?;
+        let view = view.view(settings.size, bounds)?;
+        if !view.rays.is_finite(settings.size) {
+            return Err(Error::Invalid("a matrix to clip space with rays beyond single precision".into()));
+        }
+        Self::with_view(settings, &view, bounds, origin, field_range)
+    }
+
+    fn with_view(settings: &RenderSettings, view: &View, bounds: &Bounds, origin: [f64; 3], field_range: Option<[f32; 2]>) -> Result<Self> {
         let diagonal = bounds.diagonal();
         let step = settings.step.unwrap_or(diagonal / DEFAULT_STEPS);
         let wrong = |why: String| Err(Error::Invalid(why));
@@ -95,24 +132,7 @@ impl Plan {
             let least = (diagonal * MIN_STEP).max(f64::from(f32::MIN_POSITIVE));
             return wrong(format!("a step of {step:e} is too small for a mesh of diagonal {diagonal:e}; take at least {least:e}"));
         }
-        let distance = camera.distance(bounds);
-        if distance > diagonal * MAX_DISTANCE {
-            return wrong(format!(
-                "an eye at a distance of {distance:.1e} from the mesh, whose diagonal is {diagonal:.1e}; rays are exact up to 10^9 diagonals"
-            ));
-        }
-        let rays = camera.rays(settings.size, bounds);
-        if !rays.is_finite(settings.size) {
-            let high = match camera.projection {
-                Projection::Perspective(degrees) => format!("{degrees} degrees"),
-                Projection::Orthographic(height) => format!("{height:e}"),
-            };
-            return wrong(format!(
-                "a picture {high} high, with rays beyond single precision; take a smaller fov or ortho height, or a larger zoom (the mesh's \
-                 diagonal is {diagonal:.1e})"
-            ));
-        }
-        let reach = camera.reach(settings.size, bounds);
+        let &View { right, up, forward, rays, reach } = view;
         if reach > step * f64::from(MAX_SAMPLES) {
             return wrong(format!(
                 "rays that reach the mesh after {:.1e} steps of {step:e}, {MAX_SAMPLES} at most; move the camera to the mesh, or take a \
@@ -121,9 +141,9 @@ impl Plan {
                 reach / f64::from(MAX_SAMPLES)
             ));
         }
-        let clips = settings.clips.iter().map(|clip| clip.resolve(bounds, origin, camera)).collect::<Result<_>>()?;
-        let [right, up, back] = settings.light.map(f64::from);
-        let to_light = (camera.right * right + camera.up * up - camera.forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
+        let clips = settings.clips.iter().map(|clip| clip.resolve(bounds, origin, forward)).collect::<Result<_>>()?;
+        let [across, upwards, back] = settings.light.map(f64::from);
+        let to_light = (right * across + up * upwards - forward * back).try_normalize().unwrap_or(DVec3::Z).as_vec3();
         let range = value_range(settings.range.or(settings.transfer.range()).or(field_range));
         let mut iso: Vec<f32> = settings.iso.iter().copied().map(canonical).collect();
         iso.sort_by(f32::total_cmp);
@@ -170,7 +190,8 @@ impl Plan {
 
     /// The plan as the kernels take it, without the table.
     pub fn view(&self) -> RenderView {
-        let wide = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
+        let with = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
+        let [p, q, r, s] = self.rays.depth;
         let Lighting { to_light: [x, y, z], strength: [ambient, diffuse, specular], fill, rim } =
             self.lighting.unwrap_or(Lighting { to_light: [0.0, 0.0, 1.0], strength: [1.0, 0.0, 0.0], fill: 0.0, rim: 0.0 });
         let mut iso = [0.0; MAX_ISO];
@@ -178,12 +199,12 @@ impl Plan {
         let mut clip = [[0.0; 4]; MAX_CLIPS];
         clip.iter_mut().zip(&self.clips).for_each(|(to, plane)| *to = *plane);
         RenderView {
-            origin: wide(self.rays.origin),
-            origin_x: wide(self.rays.origin_x),
-            origin_y: wide(self.rays.origin_y),
-            direction: wide(self.rays.direction),
-            direction_x: wide(self.rays.direction_x),
-            direction_y: wide(self.rays.direction_y),
+            origin: with(self.rays.origin, p),
+            origin_x: with(self.rays.origin_x, q),
+            origin_y: with(self.rays.origin_y, r),
+            direction: with(self.rays.direction, s),
+            direction_x: with(self.rays.direction_x, 0.0),
+            direction_y: with(self.rays.direction_y, 0.0),
             to_light: [x, y, z, fill],
             strength: [ambient, diffuse, specular, rim],
             step_size: self.step,
@@ -227,11 +248,11 @@ impl Plan {
         [0, 1, 2].map(|c| origin[c] + direction[c] * t)
     }
 
-    /// The stretch of a ray (origin, unit direction) that no clip leaves out, in steps from the origin, and the clip at
-    /// which it begins. Clip (n, d) meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if
+    /// The stretch of a ray (origin, unit direction) that no clip leaves out, and that lies within `limit`, in steps from
+    /// the origin, and the clip at which it begins. Clip (n, d) meets the ray at `((d − n·origin) · (1/(n·direction))) · (1/Δ)`, or nowhere if
     /// n·direction is below [`LEAST`]. Nothing is left if the end is less than the start.
-    pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3])) -> ([f32; 2], Option<usize>) {
-        let (mut kept, mut cut) = ([0.0, MAX_SAMPLES as f32], None);
+    pub fn kept_stretch(&self, (origin, direction): ([f32; 3], [f32; 3]), limit: f32) -> ([f32; 2], Option<usize>) {
+        let (mut kept, mut cut) = ([0.0, limit], None);
         for (i, &[x, y, z, d]) in self.clips.iter().enumerate() {
             let dot = |v: [f32; 3]| (x * v[0] + y * v[1]) + z * v[2];
             let (before, speed) = (d - dot(origin), dot(direction));

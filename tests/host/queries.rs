@@ -127,7 +127,17 @@ impl Queries {
         cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
         let [view, table, values, normals] = self.drawn.each_ref().map(Buffer::all);
         let visibility = Some(Visibility { ranges: self.ranges, values, count: self.plan.visible_values.len() as u32 + 1 });
-        let input = RenderInput { size: self.plan.size, view, iso: false, table, field, normals: Some(normals), visibility, part: None };
+        let input = RenderInput {
+            size: self.plan.size,
+            view,
+            iso: false,
+            table,
+            field,
+            normals: Some(normals),
+            depth: None,
+            visibility,
+            part: None,
+        };
         cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
         let other = Scene::new(&self.other, &self.other_tree)?;
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;

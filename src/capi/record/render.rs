@@ -9,7 +9,8 @@ use crate::error::Result;
 use crate::layout::RenderView;
 use crate::primitives::Arena;
 use crate::query::{RenderInput, RenderMemory, Scene, StructureView, Visibility, cmd_render};
-use crate::render::{Bounds, Plan};
+use crate::render::{Bounds, Plan, ProjectedView};
+use glam::DMat4;
 use std::mem::offset_of;
 
 /// What a picture shows, in the form that the device reads. `olbvh_view_make` fills it; the host copies it unchanged to
@@ -55,6 +56,10 @@ pub struct OlbvhPicture {
     /// Optional (size 0: nothing is skipped): the ranges that `olbvh_cmd_ranges` records for the field, by which nodes
     /// without visible values are skipped. The picture is the same either way.
     pub ranges: OlbvhBuffer,
+    /// Optional (size 0: everything is drawn): a depth buffer, behind which nothing is drawn. One float per pixel, upper row
+    /// first, such as a copy of a depth attachment (`D32_SFLOAT`) has; with a view of `olbvh_view_make` the distance from
+    /// the eye along the axis of the view, with one of `olbvh_view_make_projected` what Vulkan wrote there.
+    pub depth: OlbvhBuffer,
     /// Memory of the size that `olbvh_picture_parts` reports.
     pub memory: OlbvhBuffer,
     /// A round takes up to 1,024 samples of every ray. A `count` of 0 without `resume` prepares the picture and leaves
@@ -94,16 +99,40 @@ pub extern "C" fn olbvh_view_make(
 ) -> OlbvhStatus {
     border(|| {
         let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
-        let plan = Plan::new(&handle(settings, "settings")?.read()?, &bounds, [0.0; 3], None)?;
-        let mut view = OlbvhView { frame: [0; 64], table: [[0.0; 4]; 1024], drawn: [[f32::INFINITY; 2]; 512], drawn_count: 0 };
-        let frame = plan.view();
-        view.frame.iter_mut().zip(bytemuck::cast_slice(std::slice::from_ref(&frame))).for_each(|(to, word)| *to = *word);
-        view.table.iter_mut().zip(&plan.table).for_each(|(to, entry)| *to = *entry);
-        // Disjoint ranges take at least three entries of the table each, so there is room for all.
-        view.drawn.iter_mut().zip(&plan.visible_values).for_each(|(to, range)| *to = *range);
-        view.drawn_count = plan.visible_values.len() as u32;
-        put(out, view)
+        put(out, view_of(&Plan::new(&handle(settings, "settings")?.read()?, &bounds, [0.0; 3], None)?))
     })
+}
+
+/// As `olbvh_view_make`, but the mesh appears where a renderer sees it, and not in the view of the settings' camera.
+/// `to_clip` has 16 numbers, column by column: the matrix (projection · view · model) that takes points of the mesh to
+/// Vulkan's clip space, whose y points down; negate the second row of a matrix that is used with a viewport of negative
+/// height. If `reversed` is not 0, the near plane has depth 1 and what is far depth 0, otherwise it is the other way round.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_view_make_projected(
+    settings: *const OlbvhPictureSettings,
+    lo: *const f32,
+    hi: *const f32,
+    to_clip: *const f64,
+    reversed: u32,
+    out: *mut OlbvhView,
+) -> OlbvhStatus {
+    border(|| {
+        let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
+        let to_clip = DMat4::from_cols_array(handle(to_clip.cast::<[f64; 16]>(), "to_clip")?);
+        let view = ProjectedView { to_clip, reversed: reversed != 0 };
+        put(out, view_of(&Plan::with_projected(&handle(settings, "settings")?.read()?, &view, &bounds, [0.0; 3], None)?))
+    })
+}
+
+fn view_of(plan: &Plan) -> OlbvhView {
+    let mut view = OlbvhView { frame: [0; 64], table: [[0.0; 4]; 1024], drawn: [[f32::INFINITY; 2]; 512], drawn_count: 0 };
+    let frame = plan.view();
+    view.frame.iter_mut().zip(bytemuck::cast_slice(std::slice::from_ref(&frame))).for_each(|(to, word)| *to = *word);
+    view.table.iter_mut().zip(&plan.table).for_each(|(to, entry)| *to = *entry);
+    // Disjoint ranges take at least three entries of the table each, so there is room for all.
+    view.drawn.iter_mut().zip(&plan.visible_values).for_each(|(to, range)| *to = *range);
+    view.drawn_count = plan.visible_values.len() as u32;
+    view
 }
 
 /// Reports how many bytes the ranges of a field take.
@@ -154,6 +183,7 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
             table: view.part(offset_of!(OlbvhView, table) as u64, (offset_of!(OlbvhView, drawn) - offset_of!(OlbvhView, table)) as u64),
             field: picture.field.read(),
             normals: picture.normals.given(),
+            depth: picture.depth.given(),
             visibility: picture.ranges.given().map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
             part: None,
         };

@@ -4,12 +4,14 @@ use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
+use crate::layout::RenderView;
 use crate::mesh::Field;
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
-use crate::render::{Bounds, Plan, Prepared, ValidTets};
+use crate::render::{Bounds, Plan, Prepared, ProjectedView, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
+use glam::DMat4;
 
 const NOTHING: OlbvhBuffer = OlbvhBuffer { buffer: 0, offset: 0, size: 0, address: 0 };
 const LO: [f32; 3] = [-1.0; 3];
@@ -127,11 +129,30 @@ pub fn read<T: Pod>(gpu: &Gpu, part: OlbvhBuffer, count: usize) -> Vec<T> {
     all
 }
 
+/// The view of a renderer that looks along z, with depths the other way round.
+fn projected(settings: &OlbvhPictureSettings) {
+    let to_clip = DMat4::from_cols_array(&[0.1, 0.0, 0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0, -0.01, 0.0, 0.0, 0.0, 0.9, 1.0]);
+    let columns = to_clip.to_cols_array();
+    let make = |reversed, out| olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), columns.as_ptr(), reversed, out);
+    let views: [OlbvhView; 2] = [0, 1].map(|reversed| made(|out| make(reversed, out)));
+    for (view, reversed) in views.iter().zip([false, true]) {
+        let (view, bounds) = (&view.frame, Bounds { lo: LO, hi: HI });
+        let plan = Plan::with_projected(&settings.read().unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None).unwrap();
+        assert_eq!(bytemuck::cast_slice::<u32, u8>(&view[..size_of::<RenderView>() / 4]), bytemuck::bytes_of(&plan.view()));
+    }
+    assert!(views[0].frame != views[1].frame);
+    let mut none = std::mem::MaybeUninit::uninit();
+    let flat = [0.0; 16];
+    let made = olbvh_view_make_projected(settings, LO.as_ptr(), HI.as_ptr(), flat.as_ptr(), 0, none.as_mut_ptr());
+    assert!(made == OlbvhStatus::Invalid && message().contains("without an inverse"), "{}", message());
+}
+
 /// Records all queries in one command buffer, after a rehearsal, twice.
 pub fn recorded(gpu: *mut OlbvhGpu) {
     let device = &handle(gpu, "gpu").unwrap().0;
     let meshes = meshes();
     let settings = settings();
+    projected(&settings);
     let view: OlbvhView = made(|out| olbvh_view_make(&raw const settings, LO.as_ptr(), HI.as_ptr(), out));
     assert!((1..100).contains(&view.drawn_count));
     let plan = Plan::new(&settings.read().unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
@@ -145,6 +166,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     let view = device.upload("olbvh.test.view", words).unwrap();
     let (values, normals) = (device.upload("olbvh.test.field", &values(&meshes[0])), device.upload("olbvh.test.normals", &normals));
     let (values, normals) = (values.unwrap(), normals.unwrap());
+    let depth = device.upload("olbvh.test.depth", &[1e9f32; 37 * 30]).unwrap(); // behind everything
     let field = OlbvhField { values: values.all().into(), on_cells: 0 };
     let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
     let ranges = buffer(made(|out| olbvh_range_bytes(a.scene, out)));
@@ -159,6 +181,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         field,
         normals: normals.all().into(),
         ranges: ranges.all().into(),
+        depth: depth.all().into(),
         memory: NOTHING,
         rounds: once,
     };
@@ -283,6 +306,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     refused(draw(OlbvhPicture { field: short, ..picture }), "a field");
     refused(draw(OlbvhPicture { normals: less(picture.normals, 1), ..picture }), "normals");
     refused(draw(OlbvhPicture { ranges: less(picture.ranges, 1), ..picture }), "ranges");
+    refused(draw(OlbvhPicture { depth: less(picture.depth, 1), ..picture }), "a depth buffer");
     olbvh_recording_free(recording);
     olbvh_scene_free(a.scene);
     olbvh_scene_free(b.scene);

@@ -136,6 +136,7 @@ impl<'a> Canvas<'a> {
             table,
             field: (self.field.0.all(), self.field.1),
             normals: self.normals.as_ref().map(Buffer::all),
+            depth: None,
             visibility: self.ranges.map(|ranges| Visibility { ranges, values, count: plan.visible_values.len() as u32 }),
             part,
         };

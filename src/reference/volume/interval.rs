@@ -36,8 +36,9 @@ impl<'a> Intervals<'a> {
 
     /// The samples `[begin, end)` of a ray (origin, unit direction) that can lie in the mesh: from the first to the
     /// last leaf with the boundary flag (or with something visible) whose box the ray meets, and one more at either
-    /// end, without those that a clip leaves out, where iso-surfaces need one more. For a ray that starts in a leaf of the mesh they start at 0.
-    pub fn of(&self, ray: ([f32; 3], [f32; 3])) -> [u32; 2] {
+    /// end, without those that a clip leaves out or that lie `limit` steps from the origin or farther, where iso-surfaces
+    /// need one more. For a ray that starts in a leaf of the mesh they start at 0.
+    pub fn of(&self, ray: ([f32; 3], [f32; 3]), limit: f32) -> [u32; 2] {
         let (origin, direction) = ray;
         let inverse = inverse_of(direction);
         let grid = &self.tree.grid;
@@ -68,7 +69,7 @@ impl<'a> Intervals<'a> {
         // Sample k lies at (k + ½)·Δ.
         let number = |x: f32| x.clamp(0.0, MAX_SAMPLES as f32).floor();
         let inverse_step = self.plan.inverse_step();
-        let (kept, _) = self.plan.kept_stretch(ray);
+        let (kept, _) = self.plan.kept_stretch(ray, limit);
         let more = if self.plan.iso.is_empty() { 0.0 } else { 1.0 };
         let begin = number(first * inverse_step - 1.5).max((kept[0] - 0.5).ceil() - more) as u32;
         let end = number(last * inverse_step + 1.5).min((kept[1] - 0.5).floor() + 1.0 + more).max(0.0) as u32;

@@ -30,7 +30,7 @@ struct Gathered<'a> {
     direction: [f32; 3],
     light: Option<(Lighting, [f32; 3])>,
     normals: &'a [[f32; 3]],
-    /// The stretch that no clip leaves out, and the clip at which it begins.
+    /// The stretch that neither clip nor depth leaves out, and the clip at which it begins.
     kept: ([f32; 2], Option<usize>),
 }
 
@@ -69,13 +69,14 @@ impl<'a> Marcher<'a> {
         Self { scene, plan: scene.plan(), cell: None, samples: 0, skipped_samples: 0, found_samples: 0 }
     }
 
-    /// Premultiplied colour and opacity that a ray gathers over its samples `[begin, end)`.
-    pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), [begin, end]: [u32; 2]) -> [f32; 4] {
+    /// Premultiplied colour and opacity that a ray gathers over its samples `[begin, end)`. It ends `limit` steps from
+    /// its origin.
+    pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), limit: f32, [begin, end]: [u32; 2]) -> [f32; 4] {
         let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
         let mut gathered =
-            Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals, kept: plan.kept_stretch(ray) };
+            Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals, kept: plan.kept_stretch(ray, limit) };
         // The last sample, if that showed something; for iso-surfaces, where the ray leaves its tetrahedron.
         let mut last: Option<Place> = None;
         // Each ray starts without a hint, so that no pixel depends on another one.
@@ -176,7 +177,7 @@ impl<'a> Marcher<'a> {
         self.plan.beside_cut(entry, gathered.normal_at(stand, self.barycentric_at(ray, stand, entry)), gathered.kept)
     }
 
-    /// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip.
+    /// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip or a depth.
     /// Light takes them to lie in `stand`.
     fn add_surfaces(&self, gathered: &mut Gathered<'_>, ray: ([f32; 3], [f32; 3]), [from, to]: [Place; 2], stand: &Stand) {
         let plan = self.plan;

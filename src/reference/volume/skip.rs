@@ -4,7 +4,7 @@ use crate::grid::{MAX_LEVEL, morton, reciprocal};
 use crate::layout::bit;
 use crate::reference::leaves::cell_side;
 use crate::render::Plan;
-use crate::render::camera::LEAST;
+use crate::render::rays::LEAST;
 use crate::tree::TreeArrays;
 
 /// The reciprocals of the components of a direction.

@@ -1,0 +1,101 @@
+//! Pictures in the scenes of renderers: seen through a matrix, and behind what a depth buffer shows.
+#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+
+mod submit;
+
+use glam::DVec3;
+use glam::dcamera::rh::proj::vulkan::{orthographic, perspective, perspective_infinite_reverse};
+use glam::dcamera::rh::view::look_at_mat4;
+use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::gpu::{Gpu, GpuOptions};
+use olbvh::mesh::{On, kuhn_jittered};
+use olbvh::options::BuildOptions;
+use olbvh::primitives::Arena;
+use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, StructureView, cmd_render};
+use olbvh::reference::boundary::topology;
+use olbvh::reference::build::build;
+use olbvh::reference::volume::{Scene, render};
+use olbvh::render::{Plan, Prepared, ProjectedView, RenderSettings, ValidTets};
+use submit::submit;
+
+const SIZE: [u32; 2] = [44, 30];
+
+/// Views of a box of 6×5×4 that a renderer might have, all but the last with Vulkan's depths.
+fn views() -> [ProjectedView; 3] {
+    let eye = look_at_mat4(DVec3::new(-5.0, -7.0, 8.0), DVec3::new(3.0, 2.5, 2.0), DVec3::Z);
+    let aspect = 44.0 / 30.0;
+    [
+        ProjectedView { to_clip: perspective(0.7, aspect, 0.1, 50.0) * eye, reversed: false },
+        ProjectedView { to_clip: perspective_infinite_reverse(0.7, aspect, 0.1) * eye, reversed: true },
+        ProjectedView { to_clip: orthographic(-6.0, 6.0, -4.5, 4.5, 0.5, 40.0) * eye, reversed: false },
+    ]
+}
+
+/// What a depth buffer has where the renderer has drawn the plane x + y = 5 in some columns, and nothing in others.
+fn depths(view: &ProjectedView) -> Vec<f32> {
+    let inverse = view.to_clip.inverse();
+    let at = |i: u32| {
+        let (x, y) = (i % SIZE[0], i / SIZE[0]);
+        let ndc = |x: u32, n: u32| (f64::from(x) + 0.5) / f64::from(n) * 2.0 - 1.0;
+        let place = |z: f64| {
+            let p = inverse * DVec3::new(ndc(x, SIZE[0]), ndc(y, SIZE[1]), z).extend(1.0);
+            p.truncate() / p.w
+        };
+        let [a, b] = [0.3, 0.6].map(place);
+        let [from, to] = [a, b].map(|p| p.x + p.y);
+        let clip = view.to_clip * (a + (b - a) * ((5.0 - from) / (to - from))).extend(1.0);
+        if x % 8 < 6 { (clip.z / clip.w) as f32 } else { f32::from(u8::from(!view.reversed)) }
+    };
+    (0..SIZE[0] * SIZE[1]).map(at).collect()
+}
+
+#[test]
+fn what_lies_behind_is_not_drawn() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn_jittered([6, 5, 4], 0.3, 5).unwrap();
+    let (field, topology) = (&mesh.fields[0], topology(&mesh).unwrap());
+    let arrays = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let searched = StructureView::new(&device, &tree).unwrap();
+    let is_valid = |tet| topology.is_valid(tet);
+    let valid = ValidTets { bounds: (&arrays.grid).into(), neighbours: &topology.neighbours, is_valid: &is_valid };
+    let values = gpu.upload("olbvh.test.field", &field.values).unwrap();
+    let [lo, hi] = field.range().unwrap();
+    for view in views() {
+        let depths = depths(&view);
+        let depth = gpu.upload("olbvh.test.depth", &depths).unwrap();
+        for iso in [vec![], vec![lo + 0.2 * (hi - lo), lo + 0.5 * (hi - lo)]] {
+            let settings = RenderSettings { size: SIZE, iso, opacity_scale: 0.1, ..RenderSettings::default() };
+            let plan = Plan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
+            let scene = || Scene::new(&mesh, &topology, &arrays, field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
+            let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
+            let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
+            let normals = gpu.upload("olbvh.test.normals", &Prepared::new(&settings, &mesh, &valid, field).unwrap().normals).unwrap();
+            let carve = |a: &mut Arena| RenderMemory::carve(a, SIZE, None);
+            let buffer = gpu.upload("olbvh.test.picture", &vec![0u8; Arena::measure(carve).unwrap() as usize]).unwrap();
+            let memory = carve(&mut Arena::new(buffer.all())).unwrap();
+            let input = RenderInput {
+                size: SIZE,
+                view: view.all(),
+                iso: !settings.iso.is_empty(),
+                table: table.all(),
+                field: (values.all(), On::Points),
+                normals: Some(normals.all()),
+                depth: Some(depth.all()),
+                visibility: None,
+                part: None,
+            };
+            submit(&gpu, "olbvh.test.picture", |r| cmd_render(r, &searched, &input, &memory, Rounds::begin(8))).unwrap();
+            let hidden: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 16 * u64::from(SIZE[0] * SIZE[1]))).unwrap();
+            let bits = |colors: &[[f32; 4]]| colors.iter().map(|color| color.map(f32::to_bits)).collect::<Vec<_>>();
+            assert!(bits(&hidden) == bits(&render(&scene().before(&depths), SILENT).colors));
+            let whole = render(&scene(), SILENT).colors;
+            let differs = |i: &usize| whole[*i] != hidden[*i];
+            let columns = |behind: bool| (0..whole.len()).filter(move |i| (i % 44 % 8 < 6) == behind);
+            let (behind, before) = (columns(true).filter(differs).count(), columns(false).filter(differs).count());
+            let shown = whole.iter().filter(|color| color[3] > 0.0).count();
+            assert!(behind * 4 > shown && shown > 100 && before == 0, "{behind} and {before} of {shown} pixels differ");
+        }
+    }
+}
