@@ -598,6 +598,46 @@ typedef struct olbvh_owner_parts_data {
 } olbvh_owner_parts_data;
 
 /*
+ Memory for the closest places of the surface, and where in it the results are.
+ */
+typedef struct OlbvhNearestParts {
+  /*
+   Size of the memory in bytes.
+   */
+  uint64_t bytes;
+  /*
+   Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
+   the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+   */
+  struct olbvh_buffer states;
+  /*
+   Four floats per point: barycentric coordinates of the place, in the order of the tetrahedron's vertices; zeroes if
+   there is none.
+   */
+  struct olbvh_buffer barycentrics;
+  /*
+   A word: the number of points that need another round.
+   */
+  struct olbvh_buffer unfinished;
+} OlbvhNearestParts;
+
+/*
+ How many dispatches are recorded for work whose length is not known in advance. Each dispatch does a bounded amount
+ of work, so that the device is never kept busy for long. The status of the query says how much is left.
+ */
+typedef struct olbvh_rounds {
+  /*
+   Number of dispatches, one after the other; they skip what is finished. At least one, unless they continue work or
+   draw a picture.
+   */
+  uint32_t count;
+  /*
+   Not 0: continue where an earlier recording of the same query ended.
+   */
+  uint32_t resume;
+} olbvh_rounds;
+
+/*
  A scalar field on a mesh.
  */
 typedef struct olbvh_field {
@@ -634,22 +674,6 @@ typedef struct olbvh_view {
    */
   uint32_t drawn_count;
 } olbvh_view;
-
-/*
- How many dispatches are recorded for work whose length is not known in advance. Each dispatch does a bounded amount
- of work, so that the device is never kept busy for long. The status of the query says how much is left.
- */
-typedef struct olbvh_rounds {
-  /*
-   Number of dispatches, one after the other; they skip what is finished. At least one, unless they continue work or
-   draw a picture.
-   */
-  uint32_t count;
-  /*
-   Not 0: continue where an earlier recording of the same query ended.
-   */
-  uint32_t resume;
-} olbvh_rounds;
 
 /*
  What is drawn, and where. The contents of the buffers are read when the commands are executed, so a new view or new
@@ -1034,6 +1058,20 @@ enum olbvh_status olbvh_locate(const struct olbvh_tree *tree,
                                float *barycentrics);
 
 /*
+ Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
+ the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
+ largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
+ `distances` one, NaN without a place; each may be null.
+ */
+enum olbvh_status olbvh_nearest(const struct olbvh_tree *tree,
+                                const float *points,
+                                size_t count,
+                                float within,
+                                uint32_t *owners,
+                                float *barycentrics,
+                                float *distances);
+
+/*
  The default settings of pictures.
  */
 struct olbvh_picture_settings olbvh_default_picture_settings(void);
@@ -1208,6 +1246,26 @@ enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
                                    const struct olbvh_location *location,
                                    struct olbvh_buffer memory,
                                    struct olbvh_buffer found);
+
+/*
+ Reports how much memory the closest places of the surface need for `count` points, and where in `memory` (size 0 if it
+ does not exist yet) the results are.
+ */
+enum olbvh_status olbvh_nearest_parts(uint32_t count,
+                                      struct olbvh_buffer memory,
+                                      struct OlbvhNearestParts *out);
+
+/*
+ Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
+ `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
+ needed, which is rare.
+ */
+enum olbvh_status olbvh_cmd_nearest(struct olbvh_recording *recording,
+                                    const struct olbvh_scene *scene,
+                                    const struct olbvh_location *location,
+                                    float within,
+                                    struct olbvh_buffer memory,
+                                    struct olbvh_rounds rounds);
 
 /*
  Records the interpolation of a field at points that have been located: a float each in `values`, NaN for a point

@@ -138,3 +138,32 @@ fn fields_go_from_one_mesh_to_another() {
     let message = fails(folder.path(), 3, &["locate", "from.vtu", "missing.vtu", "-o", "out.vtu", "--device", "cpu"]);
     assert!(message.contains("missing.vtu"), "{message}");
 }
+
+/// Points outside get what is closest, with the distance, if they ask for it.
+#[test]
+fn points_outside_have_the_closest_place() {
+    let folder = TempDir::new().unwrap();
+    write_mesh(folder.path().join("from.vtu"), &with_linear_fields(kuhn([3, 3, 3]).unwrap())).unwrap();
+    std::fs::write(folder.path().join("p.csv"), "1.5,1.25,1\n1,2,3.25\n-0.3,3.4,2\n1,1,3.75\n4,4,4\n").unwrap();
+    let locate = |within: &[&str], out: &str, device: &[&str]| {
+        let result = json(folder.path(), &[&["locate", "from.vtu", "p.csv", "-o", out, "--field", "t"], within, device].concat());
+        (result["found"].as_u64().unwrap(), result["beside"].as_u64().unwrap(), std::fs::read_to_string(folder.path().join(out)).unwrap())
+    };
+    for device in [&["--device", "cpu"][..], &[]] {
+        let (found, beside, table) = locate(&["--within", "0.51"], "o.csv", device);
+        assert_eq!((found, beside), (1, 2), "{table}");
+        let rows: Vec<Vec<f32>> = table.lines().skip(1).map(|line| line.split(',').map(|v| v.parse().unwrap()).collect()).collect();
+        assert!(table.starts_with("x,y,z,owner,b0,b1,b2,b3,value,distance\n"), "{table}");
+        let near = |a: f32, b: f32| a.is_nan() && b.is_nan() || (a - b).abs() < 1e-5;
+        let nan = f32::NAN;
+        for (row, (value, distance)) in rows.iter().zip([(8.0, 0.0), (17.0, 0.25), (14.0, 0.5), (nan, nan), (nan, nan)]) {
+            assert!(near(row[8], value) && near(row[9], distance), "{row:?}: {value} and {distance}");
+            assert_eq!(row[3] < 1000.0, !value.is_nan(), "{row:?}");
+        }
+        let (found, beside, table) = locate(&[], "without.csv", device);
+        assert!((found, beside) == (1, 0) && !table.contains("distance"), "{table}");
+    }
+    for wrong in ["-1", "nan", "near"] {
+        fails(folder.path(), 2, &["locate", "from.vtu", "p.csv", "-o", "o.csv", "--within", wrong, "--device", "cpu"]);
+    }
+}

@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, overlap, render, slice};
+use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, nearest, overlap, render, slice};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -56,6 +56,13 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     }
     let whole = query::locate_all(&device, &tree, &points, how.tolerance, SILENT).unwrap();
     assert_eq!(locate_all(gpu, memory, &asked, SILENT).unwrap().answer, whole);
+    for within in [0.7, f32::INFINITY] {
+        let whole = query::nearest(&device, &tree, &points, within, None, SILENT).unwrap();
+        let found = nearest(gpu, memory, &asked, within, SILENT).unwrap();
+        assert!(found.answer.owners == whole.owners && found.answer.barycentrics == whole.barycentrics && found.trees > 4);
+        assert_eq!(bits(&found.answer.distances()), bits(&whole.distances()));
+        assert!(whole.owners.iter().filter(|&&owner| owner != u32::MAX).count() > 500);
+    }
     most
 }
 

@@ -13,9 +13,9 @@ use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
 use olbvh::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
-    LocateMethod, LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput, RenderMemory,
-    Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_list_pairs, cmd_locate,
-    cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
+    LocateMethod, LocateOptions, LocateOutput, NearestMemory, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput,
+    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners,
+    cmd_list_pairs, cmd_locate, cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
 };
 use olbvh::render::TABLE_SIZE;
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -104,6 +104,14 @@ fn points_and_their_answers() {
     };
     owners(count).into_iter().for_each(Result::unwrap);
     owners(count - 1).into_iter().for_each(|result| refused(result, "owners"));
+
+    let memory = NearestMemory::carve(&mut Arena::new(lab.memory.all()), count).unwrap();
+    let near = |input, memory, rounds| lab.rehearse(|r| cmd_nearest(r, &scene, &input, 1.0, None, &memory, rounds));
+    near(input, memory, Rounds::begin(1)).unwrap();
+    too_few_rounds(&near(input, memory, Rounds::begin(0)));
+    refused(near(PointInput { points: less(input.points), ..input }, memory, Rounds::begin(1)), "points");
+    refused(near(input, NearestMemory { states: less(memory.states), ..memory }, Rounds::begin(1)), "states of points");
+    refused(near(input, NearestMemory { barycentrics: less(memory.barycentrics), ..memory }, Rounds::begin(1)), "barycentrics");
 }
 
 #[test]

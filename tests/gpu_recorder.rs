@@ -25,8 +25,8 @@ use olbvh::primitives::{
     Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
 };
 use olbvh::query::{
-    LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, Scene, cmd_interpolate, cmd_locate, cmd_sort_points, cmd_visible,
-    visible_bytes,
+    LocateMethod, LocateOptions, LocateOutput, NearestMemory, PointInput, PointOrder, Rounds, Scene, cmd_interpolate, cmd_locate,
+    cmd_nearest, cmd_sort_points, cmd_visible, visible_bytes,
 };
 use submit::submit;
 
@@ -164,6 +164,14 @@ fn location() {
         Ok(())
     });
     assert!(barriers >= 4 + 5, "{barriers}");
+    let (_memory, near) = Arena::reserve(&gpu, "olbvh.test.nearest", |a| NearestMemory::carve(a, frame.points.count)).unwrap();
+    let barriers = every_barrier_counts(&gpu, "closest places", |r| {
+        cmd_nearest(r, &scene, &frame.points, 1.0, None, &near, Rounds::begin(2))?;
+        r.barrier("nearest → caller");
+        read(r, &[near.states, near.barycentrics, near.unfinished], &sink);
+        Ok(())
+    });
+    assert_eq!(barriers, 4);
     let unordered = submit(&gpu, "olbvh.test.unordered", |r| {
         cmd_locate(r, &scene, &frame.points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })
     });

@@ -140,6 +140,14 @@ struct TouchState {
     uint voxel;   // Number of the voxel in the band.
 };
 
+// State of the search for the place of the surface that is closest to a point.
+struct NearState {
+    uint code;    // Morton code of the leaf to resume at, or `NONE`: the search has ended.
+    uint entry;   // Entries of that leaf already tested.
+    uint owner;   // Closest tetrahedron at the surface so far, or `NONE`.
+    float square; // Its squared distance, scaled by (scale·2^19)² of the grid.
+};
+
 // State of the location of a run of voxels between two dispatches.
 struct RunState {
     uint next;      // Number of the next voxel in the run.

@@ -148,11 +148,13 @@ vec3 closest_in_triangle(vec3 a, vec3 b, vec3 c) {
     return vec3(u, v, w);
 }
 
-// Squared distance (scaled by 2^-42) of the tetrahedron's surface to 0, and the weights of its closest point.
-float closest(vec3 v[4], out vec4 weights_of) {
+// Squared distance (scaled by 2^-42) of some of the tetrahedron's faces to 0, one bit each, and the weights of the closest
+// point.
+float closest_on(vec3 v[4], uint faces, out vec4 weights_of) {
     float best = 3.40282347e38;
     weights_of = vec4(0.0);
     for (uint f = 0u; f < 4u; ++f) {
+        if ((faces >> f & 1u) == 0u) continue;
         uvec3 face = FACES[f];
         precise vec3 a = v[face.x] * two_to(-21), b = v[face.y] * two_to(-21), c = v[face.z] * two_to(-21);
         vec3 w = closest_in_triangle(a, b, c);
@@ -171,3 +173,5 @@ float closest(vec3 v[4], out vec4 weights_of) {
     }
     return max(best, box_square(v));
 }
+
+float closest(vec3 v[4], out vec4 weights_of) { return closest_on(v, 15u, weights_of); }

@@ -5,6 +5,7 @@ use super::size::least_bytes;
 use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, check_field, pieces, smaller, try_block, unless_too_large};
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
+use crate::grid::CellRange;
 use crate::mesh::{Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, LocateOptions, Located, Progress, SILENT, numbered};
@@ -42,7 +43,7 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
     let nan = f32::from_bits(0x7fc0_0000);
     let values = vec![nan; if field.is_some() { n } else { 0 }];
     let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, stages: Vec::new() };
-    let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
+    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let here = field.map(|(values, on)| (placed.values(values, on), on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
         let found = query::locate(&placed.mesh, &placed.tree, points, here, &asked.how, SILENT)?;
@@ -65,7 +66,7 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
 /// Those of [`locate`].
 pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
-    let took = each(gpu, memory, asked, report, &mut |ids, points, placed| {
+    let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let found = query::locate_all(&placed.mesh, &placed.tree, points, asked.how.tolerance, SILENT)?;
         for (&i, owners) in ids.iter().zip(found) {
             all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
@@ -75,19 +76,28 @@ pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'
     Ok(took.with(all))
 }
 
-/// The work on some points (their numbers, then their coordinates) that lie in a block or the whole mesh. It may be
-/// repeated with a part of the points.
-type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed) -> Result<()>;
+/// The work on some points (their numbers, then their coordinates) in a block, whose finest cells are given, or the whole
+/// mesh. It may be repeated with a part of the points.
+pub(super) type Ask<'a> = &'a mut dyn FnMut(&[u32], &[[f32; 3]], &Placed, Option<CellRange>) -> Result<()>;
+
+/// The blocks in which each point is asked about.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(super) enum Blocks {
+    /// The one that it lies in.
+    OfPoint,
+    /// All of them.
+    All,
+}
 
 /// Queries the whole mesh, if it fits, or one block after another.
-fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
+pub(super) fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, blocks: Blocks, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
     let Points { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
     let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.place(gpu, mesh, options, 0);
-        if unless_too_large(whole.and_then(|placed| job.ask(&placed, &all)))?.is_some() {
+        if unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all)))?.is_some() {
             return Ok(job.end());
         }
     }
@@ -103,7 +113,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: A
         let need = block.bytes(gpu, &source.options)?;
         let tried = try_block(need, memory, || {
             let placed = job.took.build(|| block.place(gpu, &source))?;
-            job.ask(&placed, &ids)
+            job.ask(&placed, Some(block.cells.finest(source.level)), &ids)
         })?;
         let Tried::TooLarge(why) = tried else { continue };
         let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
@@ -112,7 +122,7 @@ fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>, ask: A
             return Err(refused.error(block.tets.len(), need, why));
         };
         let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
-        let (below, above) = ids.into_iter().partition(is_low);
+        let (below, above) = if blocks == Blocks::All { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
         waiting.extend([(high, above), (low, below)]);
     }
     report(points.len() as u64, points.len() as u64);
@@ -130,7 +140,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Queries the points in chunks that fit the memory that is left.
-    fn ask(&mut self, placed: &Placed, ids: &[u32]) -> Result<()> {
+    fn ask(&mut self, placed: &Placed, cells: Option<CellRange>, ids: &[u32]) -> Result<()> {
         let input = placed.mesh.input();
         let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));
         let most = usize::try_from(left / PER_POINT).unwrap_or(CHUNK).min(CHUNK);
@@ -141,7 +151,7 @@ impl Job<'_> {
         }
         for chunk in ids.chunks(most.max(1)) {
             let points: Vec<_> = chunk.iter().map(|&i| self.points[i as usize]).collect();
-            (self.ask)(chunk, &points, placed)?;
+            (self.ask)(chunk, &points, placed, cells)?;
             self.done += chunk.len();
             (self.report)(self.done.min(self.points.len()) as u64, self.points.len() as u64);
         }

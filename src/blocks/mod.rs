@@ -11,6 +11,7 @@
 //!
 //! - A voxel's centre lies in one block, but its box may reach into several: each block reports the closest tetrahedron
 //!   that it lists in its own cells.
+//! - Every block reports the closest place of the surface in its own cells, and the closest of all is taken.
 //! - A sample of a ray lies in one block, and the samples of a block are consecutive. Blocks are rendered front to
 //!   back.
 //! - Two meshes overlap where their blocks overlap.
@@ -30,12 +31,14 @@
 
 mod cut;
 mod locate;
+mod nearest;
 mod overlap;
 mod render;
 mod size;
 mod slice;
 
 pub use locate::{Points, locate, locate_all};
+pub use nearest::nearest;
 pub use overlap::{Meshes, overlap};
 pub use render::{Picture, View, render};
 pub use slice::{Stack, slice};

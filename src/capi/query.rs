@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Field, Mesh, On};
-use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, overlap, render, slice};
+use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Bounds, Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -211,6 +211,36 @@ pub extern "C" fn olbvh_locate(
         let method = LocateMethod::suited(count, mesh.device.input().tets as usize, false);
         let options = LocateOptions { tolerance: self::tolerance(tolerance), method };
         let found = locate(&mesh.device, tree, points, None, &options, SILENT)?;
+        put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
+        if !barycentrics.is_null() {
+            put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);
+        }
+        Ok(())
+    })
+}
+
+/// Finds the place of the mesh's surface that is closest to each of `count` points (three floats each), wherever they lie:
+/// the tetrahedron with it, or `UINT32_MAX` if none is at most `within` away. That is limited to between half of the mesh's
+/// largest extent and all of it. `barycentrics` gets four floats per point, in the order of the tetrahedron's vertices,
+/// `distances` one, NaN without a place; each may be null.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_nearest(
+    tree: *const OlbvhTree,
+    points: *const f32,
+    count: usize,
+    within: f32,
+    owners: *mut u32,
+    barycentrics: *mut f32,
+    distances: *mut f32,
+) -> OlbvhStatus {
+    border(|| {
+        let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
+        let points = array(points.cast::<[f32; 3]>(), count, "points")?;
+        let mut owners = array_mut(owners, count, "owners")?.iter_mut();
+        let found = nearest(&mesh.device, tree, points, within, None, SILENT)?;
+        if !distances.is_null() {
+            put(&mut array_mut(distances, count, "distances")?.iter_mut(), found.distances());
+        }
         put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
         if !barycentrics.is_null() {
             put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);

@@ -14,9 +14,11 @@ use crate::primitives::Arena;
 use crate::query::code_bits;
 use crate::query::{
     LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, SILENT, Scene, cmd_locate, cmd_sort_points, locate, locate_all,
+    nearest,
 };
 use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
+use crate::reference::nearest::Surface;
 
 /// How the points of a case are located.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -37,6 +39,8 @@ pub(crate) enum How {
     All,
     /// With interpolated values of a field.
     Values,
+    /// The closest places of the surface.
+    Nearest,
     /// Trees of every α and assignment must give the same owners and lose no point of the mesh.
     Same,
 }
@@ -52,6 +56,7 @@ impl How {
             Self::Hints => "hints".into(),
             Self::All => "all-owners".into(),
             Self::Values => "values".into(),
+            Self::Nearest => "nearest".into(),
             Self::Same => "same-owners".into(),
         }
     }
@@ -117,6 +122,20 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                         &format!("{:?}", found.values.get(i)),
                     ));
                 }
+            }
+            Ok(())
+        }
+        How::Nearest => {
+            let surface = Surface::new(mesh, &twin.topology, built.tree());
+            for within in [f32::INFINITY, 0.1 / built.tree().grid.scale] {
+                let found = nearest(device, &tree, points, within, None, SILENT)?;
+                let expected: Vec<_> = points.iter().map(|&p| surface.nearest(p, within)).collect();
+                let places: Vec<_> = expected.iter().map(|place| place.map_or(Location::NOWHERE, |(location, _)| location)).collect();
+                compare_locations(&places, &found.owners, &found.barycentrics, points)?;
+                let bits = |square: Option<f32>| square.map(f32::to_bits);
+                let squares: Vec<_> =
+                    found.owners.iter().zip(&found.squares).map(|(&o, &square)| bits((o != NONE).then_some(square))).collect();
+                compare("query.nearest", "squares", &expected.iter().map(|e| bits(e.map(|e| e.1))).collect::<Vec<_>>(), &squares)?;
             }
             Ok(())
         }

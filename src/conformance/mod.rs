@@ -15,7 +15,7 @@
 //! mesh/two-share-face                      topology: bounds, bad cells, neighbours, boundary
 //! scan/100003/host/in-place/row-amd        … with the target for a kind of device
 //! build/slivers/exact/alpha-1.5/recorded   mesh, assignment [, lists], α [, boxes], how it is built [, target]
-//! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path
+//! locate/cloud/aabb/alpha-0.5/stack-3      mesh, assignment [, lists], α, path, or `nearest`: the surface closest to points
 //! ranges/slivers/exact/alpha-1/cells       mesh, assignment [, lists], α, field
 //! render/one-tet/iso/points/shaded         mesh, camera, field [, light] [, transfer function] [, clips] [, parts]
 //! slice/plate/aabb/alpha-2/oblique         mesh, assignment [, lists], α, stack of layers

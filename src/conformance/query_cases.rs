@@ -50,7 +50,7 @@ pub(super) fn add(cases: &mut Vec<Case>) {
             }
         }
         let hows = [How::Traversal(8), How::Traversal(1), How::Traversal(3), How::Hints, How::All, How::Values];
-        for how in hows.into_iter().chain([How::Runs, How::Sorted, How::SortedRuns]) {
+        for how in hows.into_iter().chain([How::Runs, How::Sorted, How::SortedRuns, How::Nearest]) {
             for lists in Lists::EVERY {
                 let quick = !matches!(how, How::Traversal(8 | 1) | How::Values);
                 add_location(cases, quick, LocateCase { mesh, alpha: 0.5, assign: Assign::Aabb, lists, how });
@@ -92,7 +92,7 @@ pub(super) fn add(cases: &mut Vec<Case>) {
 
 /// Adds queries of a mesh of the caller.
 pub(super) fn add_given(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for how in [How::Descent, How::Traversal(8), How::Runs, How::Sorted, How::SortedRuns, How::Hints, How::All] {
+    for how in [How::Descent, How::Traversal(8), How::Runs, How::Sorted, How::SortedRuns, How::Hints, How::All, How::Nearest] {
         for lists in Lists::EVERY {
             add_location(cases, true, LocateCase { mesh, alpha: 0.0, assign: Assign::Aabb, lists, how });
         }

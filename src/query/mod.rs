@@ -2,6 +2,7 @@
 
 mod all_owners;
 mod locate;
+mod nearest;
 mod order;
 mod overlap;
 mod slice;
@@ -11,6 +12,7 @@ mod volume;
 pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub(crate) use locate::numbered;
 pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
+pub use nearest::{Nearest, NearestMemory, cmd_nearest, nearest};
 pub(crate) use order::code_bits;
 pub use order::{PointOrder, cmd_sort_points};
 pub use overlap::{OverlapInput, OverlapMemory, Overlapped, PairMemory, cmd_count_pairs, cmd_list_pairs, cmd_overlap, overlap};

@@ -15,6 +15,7 @@ pub mod leaves;
 pub mod levels;
 pub mod locate;
 pub mod marks;
+pub mod nearest;
 pub mod overlap;
 pub mod quarters;
 pub mod ranges;

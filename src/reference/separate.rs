@@ -159,9 +159,14 @@ fn closest_in_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
 /// The point of the surface of the tetrahedron `v` nearest to 0. If several faces are equally near, the one opposite to
 /// the first vertex counts.
 pub fn closest(v: &[Vec3; 4]) -> Closest {
+    closest_on(v, [true; 4])
+}
+
+/// As [`closest`], but only of some faces, each given by the vertex opposite to it.
+pub fn closest_on(v: &[Vec3; 4], faces: [bool; 4]) -> Closest {
     let s = v.map(|p| p.map(|x| x * two_to(-21)));
     let mut best = Closest { square: f32::MAX, weights: [0.0; 4] };
-    for [p, q, r] in FACES {
+    for ([p, q, r], _) in FACES.into_iter().zip(faces).filter(|(_, counts)| *counts) {
         let w = closest_in_triangle(s[p], s[q], s[r]);
         let at = per_axis(|c| (w[0] * s[p][c] + w[1] * s[q][c]) + w[2] * s[r][c]);
         let square = canonical(canonical(canonical(at[0] * at[0]) + canonical(at[1] * at[1])) + canonical(at[2] * at[2]));

@@ -6,6 +6,7 @@ mod boundary;
 mod build;
 mod lists;
 mod locate;
+mod nearest;
 mod oracle;
 mod order;
 mod overlap;

@@ -12,7 +12,7 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
-use olbvh::query::Located;
+use olbvh::query::{Located, Nearest};
 use olbvh::reference::boundary::{Counts, Fault};
 use olbvh::reference::overlap::Overlap;
 use olbvh::render::Bounds;
@@ -38,6 +38,8 @@ pub trait Engine {
     fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
+    /// Builds a tree over a mesh and finds the place of its surface that is closest to each point, at most `within` away.
+    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
     /// Builds a tree over each of two meshes and finds where they overlap.
     fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.

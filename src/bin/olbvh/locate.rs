@@ -1,7 +1,7 @@
 //! The subcommand `olbvh locate`.
 
 use crate::common::{Common, Failure, Outcome};
-use crate::engine;
+use crate::engine::{self, Engine, OnProgress};
 use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
@@ -32,6 +32,7 @@ Examples:
   olbvh locate bracket.vtu points.csv -o values.csv --all-fields
   olbvh locate bracket.vtu points.csv -o cells.csv --all   every cell that contains the point
   olbvh locate coarse.vtu fine.vtu -o fine-with-fields.vtu --all-fields   fields of one mesh at the points of another
+  olbvh locate bracket.vtu points.csv -o values.csv --within 0.5   points up to 0.5 outside have the closest values
   echo 40,30,20 | olbvh locate bracket.vtu - -o -   without files
 
 Points are in the coordinates of the mesh file. Each has one owner: the cell with the lowest id of those that contain it (with --reorder, the first \
@@ -71,6 +72,11 @@ pub struct Args {
     /// tree.
     #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
+    /// Points outside the mesh get the closest place of its surface, if that is at most D away (in units of the mesh, up to
+    /// half the mesh's largest extent): owner, barycentric coordinates and values are those of that place. Adds a column
+    /// `distance`, which is 0 in the mesh.
+    #[arg(long, value_name = "D", conflicts_with = "all", allow_hyphen_values = true)]
+    within: Option<f32>,
     /// Search for the points in the given order, without sorting them first. This is faster for points that follow each
     /// other closely, such as samples on a line or of a scan. Answers do not depend on it.
     #[arg(long, conflicts_with = "all")]
@@ -84,6 +90,8 @@ pub struct Args {
 /// What the summary at the end reports.
 struct Done {
     found: usize,
+    /// Points outside that have a place of the surface instead.
+    beside: usize,
     took: InBlocks,
 }
 
@@ -91,6 +99,9 @@ struct Done {
 pub fn run(args: &Args, common: &Common) -> Outcome {
     if !(0.0..=1.0).contains(&args.tolerance) {
         return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", args.tolerance)));
+    }
+    if args.within.is_some_and(|within| within.is_nan() || within < 0.0) {
+        return Err(Failure::Usage("--within: a distance of 0 or more is needed".into()));
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
@@ -125,10 +136,13 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let done = if args.all {
         let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.into_parts();
         seconds = start.elapsed().as_secs_f64();
-        Done { found: every_owner(&output, mesh, &owners)?, took }
+        Done { found: every_owner(&output, mesh, &owners)?, beside: 0, took }
     } else {
-        let (located, took) = engine.locate(&asked, args.memory.memory, &report)?.into_parts();
-        let values = columns(mesh, &fields, args.all_fields, &located);
+        let (mut located, took) = engine.locate(&asked, args.memory.memory, &report)?.into_parts();
+        let found = located.owners.iter().filter(|&&tet| tet != u32::MAX).count();
+        let distances =
+            args.within.map(|within| beside(&*engine, &asked, &mut located, within, args.memory.memory, &report)).transpose()?;
+        let values = columns(mesh, &fields, args.all_fields, &located, distances);
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
         let of = if output.format == OutputFormat::Vtu { probed(&args.points, points.len()) } else { None };
@@ -136,11 +150,11 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
             output.path(),
             &Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values },
         )?;
-        Done { found: located.owners.iter().filter(|&&tet| tet != u32::MAX).count(), took }
+        Done { found, beside: located.owners.iter().filter(|&&tet| tet != u32::MAX).count() - found, took }
     };
     drop(progress);
     let took = done.took;
-    if done.found == 0 && !points.is_empty() {
+    if done.found + done.beside == 0 && !points.is_empty() {
         let (grid, [x, y, z]) = (valid_grid(mesh), mesh.origin);
         let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
         let Bounds { lo, hi } = Bounds::from(&grid);
@@ -150,15 +164,16 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     seconds -= took.build_seconds;
     let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
     let json = json!({
-        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "seconds": seconds,
+        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "beside": done.beside, "seconds": seconds,
         "points_per_second": per_second, "field": fields.first().map(|f| &f.name), "fields": fields.iter().map(|f| &f.name).collect::<Vec<_>>(), "tolerance": single(args.tolerance),
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
         "device": engine.name(),
     });
     // With few points, most of the time passes before the first one, so no rate is printed.
     let rate = if points.len() < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };
+    let near = args.within.map_or(String::new(), |within| format!(", {} more at most {within} away", grouped(done.beside as u64)));
     let text = format!(
-        "{}: {}, {} of them in the mesh; {} on {}{rate}{}\n",
+        "{}: {}, {} of them in the mesh{near}; {} on {}{rate}{}\n",
         args.output.display(),
         counted(points.len() as u64, "point"),
         grouped(done.found as u64),
@@ -175,28 +190,51 @@ fn probed(path: &Path, points: usize) -> Option<Mesh> {
     load(path, &options).ok().map(|loaded| loaded.mesh).filter(|mesh| mesh.points.len() == points)
 }
 
-/// The columns of values: `value` for the one field (NaN without any), or each field by its name, with an underscore
-/// behind it where other columns have that name.
-fn columns(mesh: &Mesh, fields: &[&Field], named: bool, located: &query::Located) -> Vec<(String, Vec<f32>)> {
+/// Gives points without an owner the closest place of the surface within a distance. Returns the distance of every point,
+/// 0 in the mesh, NaN if nothing is so near.
+fn beside(
+    engine: &dyn Engine,
+    asked: &Points<'_>,
+    located: &mut query::Located,
+    within: f32,
+    memory: Option<u64>,
+    report: OnProgress<'_>,
+) -> Outcome<Vec<f32>> {
+    let outside: Vec<usize> = (0..located.owners.len()).filter(|&i| located.owners[i] == u32::MAX).collect();
+    let points: Vec<[f32; 3]> = outside.iter().map(|&i| asked.points[i]).collect();
+    let mut distances = vec![0.0; located.owners.len()];
+    if points.is_empty() {
+        return Ok(distances);
+    }
+    let (nearest, _) = engine.nearest(&Points { points: &points, ..*asked }, within, memory, report)?.into_parts();
+    for (k, (&i, distance)) in outside.iter().zip(nearest.distances()).enumerate() {
+        (located.owners[i], located.barycentrics[i], distances[i]) = (nearest.owners[k], nearest.barycentrics[k], distance);
+    }
+    Ok(distances)
+}
+
+/// The columns of values: `value` for the one field (NaN without any), or each field by its name; and the distances.
+/// Names have an underscore behind them where other columns have that name.
+fn columns(mesh: &Mesh, fields: &[&Field], named: bool, located: &query::Located, distances: Option<Vec<f32>>) -> Vec<(String, Vec<f32>)> {
     let at = |field: &Field| {
         let points = located.owners.par_iter().zip(&located.barycentrics);
         points.map(|(&owner, &barycentric)| Location { owner, barycentric }.value(mesh, field)).collect()
     };
-    match fields {
-        [] => vec![("value".to_owned(), vec![f32::NAN; located.owners.len()])],
-        [field] if !named => vec![("value".to_owned(), at(field))],
-        _ => {
-            let mut taken: HashSet<String> = Located::TAKEN.map(str::to_owned).into();
-            let mut free = |name: &str| {
-                let mut name = name.to_owned();
-                while !taken.insert(name.clone()) {
-                    name.push('_');
-                }
-                name
-            };
-            fields.iter().map(|field| (free(&field.name), at(field))).collect()
+    let mut taken: HashSet<String> = Located::TAKEN.map(str::to_owned).into();
+    let mut free = |name: &str| {
+        let mut name = name.to_owned();
+        while !taken.insert(name.clone()) {
+            name.push('_');
         }
-    }
+        name
+    };
+    let mut columns = match fields {
+        [] => vec![(free("value"), vec![f32::NAN; located.owners.len()])],
+        [field] if !named => vec![(free("value"), at(field))],
+        _ => fields.iter().map(|field| (free(&field.name), at(field))).collect(),
+    };
+    columns.extend(distances.map(|distances| (free("distance"), distances)));
+    columns
 }
 
 /// Writes every owner of every point as rows (point, cell); returns how many points have an owner.

@@ -1,12 +1,12 @@
 //! The C interface to point location, to all owners of points, and to values at points.
 
 use super::scene::{OlbvhScene, scene_on};
-use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, recorded};
+use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::{OlbvhStatus, border, handle, put, tolerance};
 use crate::error::{Error, Result};
 use crate::query::{
-    LocateMethod, LocateOptions, LocateOutput, OwnersMemory, PointInput, PointOrder, cmd_count_owners, cmd_interpolate, cmd_list_owners,
-    cmd_locate, cmd_sort_points,
+    LocateMethod, LocateOptions, LocateOutput, NearestMemory, OwnersMemory, PointInput, PointOrder, cmd_count_owners, cmd_interpolate,
+    cmd_list_owners, cmd_locate, cmd_nearest, cmd_sort_points,
 };
 
 /// Points to locate, and where the results go.
@@ -61,6 +61,22 @@ pub struct OlbvhOwnerParts {
     pub ends: OlbvhBuffer,
     /// A word: the total number of owners of all points, even if there was not room for all of them.
     pub total: OlbvhBuffer,
+}
+
+/// Memory for the closest places of the surface, and where in it the results are.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default)]
+pub struct OlbvhNearestParts {
+    /// Size of the memory in bytes.
+    pub bytes: u64,
+    /// Four words per point. The third is the tetrahedron with the closest place, or `UINT32_MAX`; the fourth, a float, is
+    /// the squared distance times (scale · 2^19)², with the scale of the mesh's grid.
+    pub states: OlbvhBuffer,
+    /// Four floats per point: barycentric coordinates of the place, in the order of the tetrahedron's vertices; zeroes if
+    /// there is none.
+    pub barycentrics: OlbvhBuffer,
+    /// A word: the number of points that need another round.
+    pub unfinished: OlbvhBuffer,
 }
 
 impl OlbvhLocation {
@@ -156,6 +172,37 @@ pub extern "C" fn olbvh_cmd_owners(
         let options = LocateOptions { tolerance: tolerance(location.tolerance), ..LocateOptions::default() };
         cmd_count_owners(r, scene, &input, &memory, &options)?;
         cmd_list_owners(r, scene, &input, &memory, found.part())
+    })
+}
+
+/// Reports how much memory the closest places of the surface need for `count` points, and where in `memory` (size 0 if it
+/// does not exist yet) the results are.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_nearest_parts(count: u32, memory: OlbvhBuffer, out: *mut OlbvhNearestParts) -> OlbvhStatus {
+    border(|| {
+        let (bytes, parts) = memory.carve(|a| NearestMemory::carve(a, count))?;
+        let NearestMemory { states, barycentrics, unfinished } = parts;
+        put(out, OlbvhNearestParts { bytes, states: states.into(), barycentrics: barycentrics.into(), unfinished: unfinished.into() })
+    })
+}
+
+/// Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of
+/// `location`, only points, stride and count are used. `unfinished` of `olbvh_nearest_parts` says whether more rounds are
+/// needed, which is rare.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_cmd_nearest(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    location: *const OlbvhLocation,
+    within: f32,
+    memory: OlbvhBuffer,
+    rounds: OlbvhRounds,
+) -> OlbvhStatus {
+    recorded(recording, |r| {
+        let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
+        let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
+        let memory = memory.place(|a| NearestMemory::carve(a, location.count))?;
+        cmd_nearest(r, scene, &input, within, None, &memory, rounds.into())
     })
 }
 

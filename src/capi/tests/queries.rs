@@ -4,10 +4,10 @@ use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
-use crate::layout::RenderView;
+use crate::layout::{NearState, RenderView};
 use crate::mesh::Field;
 use crate::options::TOLERANCE;
-use crate::query::{LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
+use crate::query::{LocateOptions, Nearest, OverlapInput, SILENT, locate, locate_all, nearest, overlap, render, slice};
 use crate::render::{Bounds, Plan, Prepared, ProjectedView, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
@@ -47,6 +47,7 @@ struct Expected {
     pairs: Vec<[u32; 2]>,
     owners: Vec<Vec<u32>>,
     located: Vec<f32>,
+    nearest: Nearest,
 }
 
 /// Answers, bits of the values, and the number of bands of a stack.
@@ -85,6 +86,7 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
         hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
         pairs: pairs.pairs.unwrap(),
         owners: locate_all(&mesh, &tree, points, TOLERANCE, SILENT).unwrap(),
+        nearest: nearest(&mesh, &tree, points, 1.0, None, SILENT).unwrap(),
         located: locate(&mesh, &tree, points, field, &LocateOptions::default(), SILENT).unwrap().values,
     }
 }
@@ -229,6 +231,9 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     let pair_memory = buffer(parts(NOTHING).bytes);
     let pair_parts = parts(pair_memory.all().into());
     let found = buffer(8 * expected.pairs.len() as u64);
+    let parts = |memory| -> OlbvhNearestParts { made(|out| olbvh_nearest_parts(count, memory, out)) };
+    let near_memory = buffer(parts(NOTHING).bytes);
+    let near_parts = parts(near_memory.all().into());
 
     let recording: *mut OlbvhRecording = made(|out| olbvh_recording_new(gpu, out));
     let record = |commands: u64| {
@@ -247,6 +252,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         ok(olbvh_cmd_overlap(recording, a.scene, b.scene, overlap_memory.all().into(), four));
         ok(olbvh_cmd_count_pairs(recording, a.scene, b.scene, pair_memory.all().into(), eight));
         ok(olbvh_cmd_list_pairs(recording, a.scene, b.scene, pair_memory.all().into(), found.all().into(), eight));
+        ok(olbvh_cmd_nearest(recording, a.scene, &raw const odd, 1.0, near_memory.all().into(), four));
         ok(olbvh_recording_end(recording));
     };
     record(0);
@@ -274,6 +280,11 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert_eq!((read(device, location.owners, firsts.len()), read(device, owner_parts.owners, firsts.len())), (firsts.clone(), firsts));
     let all = expected.owners.concat();
     assert_eq!((read::<u32>(device, owner_parts.total, 1)[0] as usize, read(device, lists.all().into(), all.len())), (all.len(), all));
+    let states: Vec<NearState> = read(device, near_parts.states, count as usize);
+    let near = &expected.nearest;
+    assert!(states.iter().map(|state| (state.owner, state.square)).eq(near.owners.iter().copied().zip(near.squares.iter().copied())));
+    assert!(read::<[f32; 4]>(device, near_parts.barycentrics, count as usize) == near.barycentrics && near.squares.contains(&0.0));
+    assert_eq!(read::<u32>(device, near_parts.unfinished, 1), [0]);
     let hits = [0, 1].map(|i| read::<u32>(device, overlap_parts.hits[i], expected.hits[i].len()));
     assert!(hits == expected.hits && hits.iter().all(|words| words.iter().any(|&w| w != 0)));
     let status: Vec<u32> = read(device, pair_parts.status, 10);
@@ -364,6 +375,13 @@ pub fn owned(gpu: *mut OlbvhGpu) {
         let mut owners = vec![0; middles.len()];
         ok(olbvh_locate(tree, middles.as_ptr().cast(), middles.len(), -1.0, owners.as_mut_ptr(), null_mut()));
         assert!((0..).zip(&owners).all(|(tet, &owner)| tet == owner));
+        let (count, wanted) = (mesh.points.len(), &expected.nearest);
+        let (mut owners, mut places, mut distances) = (vec![0; count], vec![[0f32; 4]; count], vec![0f32; count]);
+        let [to_places, to_distances] = [places.as_mut_ptr().cast(), distances.as_mut_ptr()];
+        ok(olbvh_nearest(tree, mesh.points.as_ptr().cast(), count, 1.0, owners.as_mut_ptr(), to_places, to_distances));
+        // In another order, equally near places are found in other tetrahedra.
+        assert!(owners == wanted.owners && places == wanted.barycentrics || reorder == 1);
+        assert!(distances.iter().zip(wanted.distances()).all(|(a, b)| (a - b).abs() < 1e-5 || a.is_nan() && b.is_nan()));
         let values = values(&mesh);
         let mut colors = vec![[0f32; 4]; 37 * 30];
         ok(olbvh_render(tree, &raw const settings, values.as_ptr(), 0, colors.as_mut_ptr().cast()));

@@ -5,10 +5,11 @@ use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
-use olbvh::query::{LocateMethod, LocateOptions, Located, Rendered};
+use olbvh::query::{LocateMethod, LocateOptions, Located, Nearest, Rendered};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
-use olbvh::reference::locate::{self, Locator};
+use olbvh::reference::locate::{self, Location, Locator};
+use olbvh::reference::nearest::Surface;
 use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
@@ -71,6 +72,19 @@ impl Engine for Cpu {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
             Ok(each(asked.points, |p| locator.owners(p), report))
+        })
+    }
+
+    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| {
+            let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
+            let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::NAN)), report);
+            Ok(Nearest {
+                owners: found.iter().map(|(location, _)| location.owner).collect(),
+                barycentrics: found.iter().map(|(location, _)| location.barycentric).collect(),
+                squares: found.iter().map(|(_, square)| *square).collect(),
+                scale: tree.tree.grid.scale,
+            })
         })
     }
 

@@ -8,7 +8,7 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
-use olbvh::query::Located;
+use olbvh::query::{Located, Nearest};
 use olbvh::reference::boundary::{Counts, fault_of};
 use olbvh::reference::overlap::Overlap;
 use olbvh::slicing::Tally;
@@ -94,6 +94,10 @@ impl Engine for Device {
 
     fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
         blocks::locate_all(&self.0, self.memory(memory), asked, report)
+    }
+
+    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+        blocks::nearest(&self.0, self.memory(memory), asked, within, report)
     }
 
     fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {

@@ -1,0 +1,179 @@
+#version 460
+// The place of the surface that is closest to a point: of the tetrahedra with faces that have no neighbour, the one whose
+// such face has the smallest squared distance (ties: lowest id), at most `within` away, among the lists of the boundary
+// leaves in the cells asked for. A descent to the
+// closest leaf gives a first bound; the leaves within it are then visited in Morton order. Twin of
+// src/reference/nearest.rs.
+#include "shared/kernel.glsl"
+#include "shared/layout.glsl"
+#include "shared/grid.glsl"
+#include "shared/tet.glsl"
+#include "shared/separate.glsl"
+#include "shared/boxes.glsl"
+#include "shared/node.glsl"
+layout(constant_id = 2) const uint FRESH = 1;     // whether the search begins
+layout(constant_id = 3) const uint BUDGET = 1024; // nodes and tetrahedra per point and dispatch
+ARGUMENTS(13)
+    uint count;
+    uint stride; // floats from one point to the next
+    float within;
+    uint first_cell;
+    uint last_cell;
+END_ARGUMENTS
+BUFFER16(0, readonly, Grid, grid)
+BUFFER(1, readonly, uint, masks)
+BUFFER(2, readonly, uint, co)
+BUFFER(3, readonly, uint, po)
+BUFFER(4, readonly, uint, p)
+BUFFER(5, readonly, uint, flags)
+RECORDS(6, uvec4, cells)
+RECORDS(7, vec4, vertices)
+RECORDS(8, uvec4, neighbours)
+BUFFER(9, readonly, float, points)
+BUFFER16(10, READ_WRITE, NearState, states)
+BUFFER16(11, writeonly, vec4, barycentrics)
+BUFFER(12, READ_WRITE, uint, unfinished)
+#include "shared/vertices.glsl"
+#include "shared/tree.glsl"
+#include "shared/quarters.glsl"
+#include "shared/boundary_node.glsl"
+#include "shared/points.glsl"
+
+NearState state;
+vec3 x; // the point in normalised coordinates
+
+// Squared distance of a node's cell, scaled as that of a tetrahedron. Rounding never makes it larger than that of what
+// its cell contains: it is reduced by 2^-20 of the bounds per axis.
+float node_square(Node node) {
+    Grid g = grid.at[0];
+    vec3 lo, hi;
+    cell_box(g, node.level, node.code, lo, hi);
+    vec3 below = difference(normalise(g, lo), x), above = difference(x, normalise(g, hi));
+    precise vec3 d = max(max(below, above) * two_to(-21) - 1.0, vec3(0.0));
+    return dot_product(d, d);
+}
+
+bool walk_ended = false;
+uvec3 lo, hi;
+bool enters(Node node) { return is_boundary_node(node.index) && node_square(node) <= state.square; }
+#include "shared/leaf_walk.glsl"
+
+// The faces of a tetrahedron at the surface, and its vertices around the point.
+struct Patch {
+    uint faces;
+    uvec4 rank;
+    vec3 v[4];
+};
+
+uint surface_of(uvec4 rank, uvec4 beside) {
+    uint faces = 0u;
+    for (uint k = 0u; k < 4u; ++k) faces |= uint(beside[k] == NONE) << rank[k];
+    return faces;
+}
+
+Patch patch_of(uint t, uvec4 beside) {
+    Tet tet = load_tet(words(cells.at[t]));
+    vec3 v[4] = vec3[4](difference(tet.v[0], x), difference(tet.v[1], x), difference(tet.v[2], x), difference(tet.v[3], x));
+    return Patch(surface_of(tet.rank, beside), tet.rank, v);
+}
+
+// Keeps the closest of the entries [begin, end).
+void measure(uint begin, uint end) {
+    for (uint e = begin; e < end; ++e) {
+        uint t = listed_tet(e);
+        uvec4 beside = words(neighbours.at[t]);
+        if (all(notEqual(beside, uvec4(NONE)))) continue;
+        Patch part = patch_of(t, beside);
+        if (box_square(part.v) > state.square) continue;
+        vec4 unused;
+        float square = closest_on(part.v, part.faces, unused);
+        if (square < state.square || (square == state.square && t < state.owner)) {
+            state.square = square;
+            state.owner = t;
+        }
+    }
+}
+
+// Descends to a leaf close to the point, each time into the closest child with surface in it.
+void begin_close(uint level) {
+    Node node = Node(0u, 0u, 0u);
+    while (node.level < level) {
+        uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
+        float least = 3.40282347e38;
+        Node closest_child = node;
+        for (uint digit = 0u; digit < 8u; ++digit) {
+            if ((mask >> digit & 1u) == 0u) continue;
+            Node child = Node(first + bitCount(mask & ((1u << digit) - 1u)), node.level + 1u, node.code << 3 | digit);
+            uvec3 cell = unmorton(child.code);
+            uint shift = MAX_LEVEL - child.level;
+            bool asked = all(lessThanEqual(lo >> shift, cell)) && all(lessThanEqual(cell, hi >> shift));
+            float square = node_square(child);
+            if (asked && is_boundary_node(child.index) && square < least) {
+                least = square;
+                closest_child = child;
+            }
+        }
+        if (closest_child.index == node.index) return;
+        node = closest_child;
+    }
+    uvec2 range = entry_range(node.index);
+    measure(range.x, min(range.y, range.x + BUDGET));
+}
+
+// Goes on with the search. Returns true once it has ended.
+bool measure_all(uint level) {
+    LeafWalk at = walk_from(level, state.code);
+    uint leaf = WALK_PAUSED;
+    for (uint work = 0u; work < BUDGET;) {
+        leaf = next_leaf(at, level, work, BUDGET);
+        if (leaf >= WALK_PAUSED) break;
+        uvec2 range = entry_range(leaf);
+        uint from = range.x + state.entry, to = min(range.y, from + max(BUDGET - min(work, BUDGET), 1u));
+        measure(from, to);
+        work += to - from;
+        state.entry = to - range.x;
+        if (to < range.y) break;
+        state.entry = 0u;
+        leaf = walk_past(at, level, level) ? WALK_PAUSED : WALK_DONE;
+        if (leaf == WALK_DONE) break;
+    }
+    state.code = leaf == WALK_DONE ? NONE : at.code;
+    return leaf == WALK_DONE;
+}
+
+void main() {
+    uint i = item_index(), left = 0u;
+    if (i < count) {
+        Grid g = grid.at[0];
+        vec3 at = point(i, stride);
+        lo = unpack_cell(first_cell);
+        hi = unpack_cell(last_cell);
+        if (FRESH != 0u) {
+            precise float reach = min(within * g.scale, 1.0) * two_to(19);
+            precise float square = reach * reach;
+            bool asked = near_bounds(g, at) && !is_empty_tree(g.level) && is_boundary_node(0u) && within >= 0.0;
+            state = NearState(asked ? 0u : NONE, 0u, NONE, square);
+        } else {
+            state = states.at[i];
+        }
+        if (state.code != NONE) {
+            x = normalise(g, at);
+            if (FRESH != 0u) begin_close(g.level);
+            left = uint(!measure_all(g.level));
+        }
+        states.at[i] = state;
+        if (state.code == NONE) {
+            vec4 weights = vec4(0.0);
+            if (state.owner != NONE) {
+                x = normalise(g, at);
+                Patch found = patch_of(state.owner, words(neighbours.at[state.owner]));
+                vec4 w;
+                closest_on(found.v, found.faces, w);
+                weights = vec4(w[found.rank.x], w[found.rank.y], w[found.rank.z], w[found.rank.w]);
+            }
+            barycentrics.at[i] = weights;
+        }
+    }
+    left = subgroupAdd(left);
+    if (subgroupElect() && left > 0u) atomicAdd(unfinished.at[0], left);
+}

@@ -1,0 +1,30 @@
+//! The places of the surface that are closest to points, in blocks: each block tells the closest in its own cells.
+
+use super::InBlocks;
+use super::locate::{Blocks, Points, each};
+use crate::error::Result;
+use crate::gpu::Gpu;
+use crate::query::{self, Nearest, Progress, SILENT};
+use crate::reference::boundary::NONE;
+
+/// Finds the place of the surface that is closest to each point, at most `within` away, as [`query::nearest`] does, within
+/// `memory` bytes of device memory; [`Points::how`] is not used. `report` receives the number of points done, and of all.
+///
+/// # Errors
+/// Those of [`super::locate`].
+pub fn nearest(gpu: &Gpu, memory: u64, asked: &Points<'_>, within: f32, report: Progress<'_>) -> Result<InBlocks<Nearest>> {
+    let n = asked.points.len();
+    let mut all = Nearest { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], squares: vec![f32::INFINITY; n], scale: 1.0 };
+    let took = each(gpu, memory, asked, Blocks::All, report, &mut |ids, points, placed, cells| {
+        let found = query::nearest(&placed.mesh, &placed.tree, points, within, cells, SILENT)?;
+        all.scale = found.scale;
+        for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
+            let (owner, square) = (placed.tet(found.owners[k]), found.squares[k]);
+            if owner != NONE && (square, owner) < (all.squares[i], all.owners[i]) {
+                (all.owners[i], all.squares[i], all.barycentrics[i]) = (owner, square, found.barycentrics[k]);
+            }
+        }
+        Ok(())
+    })?;
+    Ok(took.with(all))
+}

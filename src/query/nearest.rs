@@ -1,0 +1,159 @@
+//! The place of the mesh's surface that is closest to each point, wherever the point lies.
+
+use super::locate::numbered;
+use super::{PointInput, Progress, Rounds, Scene};
+use crate::build::{DeviceMesh, Tree};
+use crate::error::Result;
+use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::grid::CellRange;
+use crate::kernels::{Nearest as NearestKernel, NearestSpec};
+use crate::layout::NearState;
+use crate::primitives::Arena;
+use crate::reference::boundary::NONE;
+use crate::reference::locate::CHUNK;
+use crate::reference::nearest::distance;
+
+/// Answers and scratch memory: 32 bytes per point.
+#[derive(Clone, Copy, Debug)]
+pub struct NearestMemory {
+    /// [`NearState`] per point: the tetrahedron with the closest place, and its squared distance.
+    pub states: BufferRef,
+    /// Four floats per point: barycentric coordinates of the closest place in that tetrahedron; zeros without one.
+    pub barycentrics: BufferRef,
+    /// One word: the number of points that need another round.
+    pub unfinished: BufferRef,
+}
+
+impl NearestMemory {
+    /// Carves the memory for `count` points.
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] if the arena is too small.
+    pub fn carve(arena: &mut Arena, count: u32) -> Result<Self> {
+        let n = u64::from(count);
+        Ok(Self { states: arena.take(size_of::<NearState>() as u64 * n)?, barycentrics: arena.take(16 * n)?, unfinished: arena.words(1)? })
+    }
+}
+
+/// Records the search for the place of the surface that is closest to each point, at most `within` away, in units of the
+/// mesh, and at most 1 / [`crate::layout::Grid::scale`], which is between half of the mesh's largest extent and all of it:
+/// of the faces without neighbour the one with the smallest squared distance (ties: that of the tetrahedron with the lowest
+/// id). Hints and order of the
+/// points are not used. `part` restricts the search to the leaves in these cells, as it must be for a block of a mesh. Each
+/// round tests some thousand nodes and tetrahedra per point and passes over points that are finished.
+///
+/// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: a transfer write of `unfinished`, and
+/// compute reads and writes. Last use: compute reads and writes; no barrier before or after.
+///
+/// # Errors
+/// [`crate::Error::Invalid`] if a part is too small, or for a beginning without rounds.
+pub fn cmd_nearest(
+    r: &mut Recorder<'_>,
+    scene: &Scene,
+    input: &PointInput,
+    within: f32,
+    part: Option<CellRange>,
+    memory: &NearestMemory,
+    rounds: Rounds,
+) -> Result<()> {
+    rounds.check()?;
+    input.check()?;
+    let n = u64::from(input.count);
+    memory.states.check(size_of::<NearState>() as u64 * n, "states of points")?;
+    memory.barycentrics.check(16 * n, "barycentrics")?;
+    let (tree, mesh, workgroup) = (&scene.tree, &scene.mesh, r.gpu().target().query);
+    let [first_cell, last_cell] = part.unwrap_or(CellRange::WHOLE).words();
+    let arguments = NearestKernel {
+        grid: tree.grid,
+        masks: tree.masks,
+        co: tree.co,
+        po: tree.po,
+        p: tree.p,
+        flags: tree.flags,
+        cells: mesh.input.cells,
+        vertices: mesh.arrays.vertices,
+        neighbours: mesh.arrays.neighbours,
+        points: input.points,
+        states: memory.states,
+        barycentrics: memory.barycentrics,
+        unfinished: memory.unfinished,
+        count: input.count,
+        stride: input.stride,
+        within,
+        first_cell,
+        last_cell,
+    };
+    for round in 0..rounds.count {
+        if round > 0 {
+            r.barrier("nearest → nearest.clear");
+        }
+        r.fill(memory.unfinished, 0);
+        r.barrier("nearest.clear → nearest");
+        let fresh = u32::from(round == 0 && !rounds.resume);
+        let spec = NearestSpec { workgroup, fresh, ..Default::default() };
+        r.stage("query.nearest", |r| r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup))))?;
+    }
+    Ok(())
+}
+
+/// Closest places of the surface, in host memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Nearest {
+    /// The tetrahedron with the closest place, or `u32::MAX`.
+    pub owners: Vec<u32>,
+    /// Barycentric coordinates of the place, in the order of the tetrahedron's vertices.
+    pub barycentrics: Vec<[f32; 4]>,
+    /// Squared distances, as [`NearState::square`].
+    pub squares: Vec<f32>,
+    /// [`crate::layout::Grid::scale`] of the tree.
+    pub scale: f32,
+}
+
+impl Nearest {
+    /// Distances in units of the mesh; NaN where nothing was found.
+    pub fn distances(&self) -> Vec<f32> {
+        let found = self.owners.iter().zip(&self.squares);
+        found.map(|(&owner, &square)| if owner == NONE { f32::NAN } else { distance(square, self.scale) }).collect()
+    }
+}
+
+/// Finds the place of the surface that is closest to each point, at most `within` away ([`cmd_nearest`]). Points are
+/// relative to the mesh's origin. `part` restricts the search to a block of a mesh. `report` receives the number of points
+/// done and their total.
+///
+/// # Errors
+/// [`crate::Error::Memory`], a failed Vulkan call, or [`crate::Error::Invalid`] if the tree was built over another mesh.
+pub fn nearest(
+    mesh: &DeviceMesh,
+    tree: &Tree,
+    points: &[[f32; 3]],
+    within: f32,
+    part: Option<CellRange>,
+    report: Progress<'_>,
+) -> Result<Nearest> {
+    numbered(points.len())?;
+    let (gpu, scene, scale) = (tree.gpu(), Scene::new(mesh, tree)?, tree.grid().scale);
+    let most = points.len().min(CHUNK) as u32;
+    let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.nearest", |a| NearestMemory::carve(a, most))?;
+    let mut all = Nearest { scale, ..Nearest::default() };
+    for chunk in points.chunks(CHUNK) {
+        let asked = gpu.upload("olbvh.query.points", chunk)?;
+        let count = chunk.len() as u32;
+        let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
+        let mut rounds = Rounds::begin(1);
+        loop {
+            gpu.submit("olbvh.query.nearest", |r| cmd_nearest(r, &scene, &input, within, part, &memory, rounds))?;
+            let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
+            report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64);
+            if unfinished == 0 {
+                break;
+            }
+            rounds = Rounds::resume(1);
+        }
+        let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * u64::from(count)))?;
+        all.owners.extend(states.iter().map(|state| state.owner));
+        all.squares.extend(states.iter().map(|state| state.square));
+        all.barycentrics.extend(gpu.download::<[f32; 4]>(&buffer, memory.barycentrics.part(0, 16 * u64::from(count)))?);
+    }
+    Ok(all)
+}
