@@ -1,17 +1,19 @@
 //! The place of the surface that is closest to a point. Twin of `glsl/query/nearest`.
 
 use super::boundary::{NONE, Topology};
-use super::leaf_walk::walk_leaves;
 use super::leaves::cell_box;
 use super::locate::{Location, place};
 use super::separate::{Closest, box_square, closest_on};
 use super::tet::{Tet, Vec3, dot, sub};
-use super::traverse::Node;
 use super::vertices::Vertices;
 use crate::grid::{per_axis, two_to};
 use crate::mesh::Mesh;
 use crate::tree::TreeArrays;
-use std::cell::Cell;
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+
+/// A node: its index, its level, and the Morton code of its cell.
+type Node = (u32, u32, u32);
 
 /// Finds the places of a mesh's surface that are closest to points.
 pub struct Surface<'a> {
@@ -34,33 +36,37 @@ impl<'a> Surface<'a> {
         let grid = &self.tree.grid;
         let (_, x) = place(grid, p).filter(|_| within >= 0.0)?;
         let reach = (within * grid.scale).min(1.0) * two_to(19);
-        let best = Cell::new((reach * reach, NONE));
-        let measure = |leaf: u32| {
-            for &t in self.tree.primitives(leaf).iter().filter(|&&t| self.topology.neighbours[t as usize].contains(&NONE)) {
+        let (mut least, mut owner) = (reach * reach, NONE);
+        // Nearest nodes first. The order of the leaves does not matter, but a close one saves most of the others.
+        let mut waiting = BinaryHeap::from([Reverse((0, (0, 0, 0)))]);
+        while let Some(Reverse((square, (index, level, code)))) = waiting.pop() {
+            if f32::from_bits(square) > least {
+                break;
+            }
+            if level < grid.level {
+                let children = (0..8).filter_map(|digit| {
+                    let index = self.tree.child(index, digit).filter(|&child| self.tree.is_boundary(child))?;
+                    let child = (index, level + 1, code << 3 | digit);
+                    // Squares are not negative, so their bits are in their order.
+                    Some(Reverse((self.square_of(child, x).to_bits(), child)))
+                });
+                waiting.extend(children);
+                continue;
+            }
+            for &t in self.tree.primitives(index).iter().filter(|&&t| self.topology.neighbours[t as usize].contains(&NONE)) {
                 let (tet, v) = self.around(t, x);
-                let (least, owner) = best.get();
                 if box_square(&v) <= least {
                     let Closest { square, .. } = closest_on(&v, self.surface_of(t, tet.rank));
                     if square < least || square == least && t < owner {
-                        best.set((square, t));
+                        (least, owner) = (square, t);
                     }
                 }
             }
-        };
-        let enters = |node: Node| self.tree.is_boundary(node.index) && self.node_square(node, x) <= best.get().0;
-        // The order of the leaves does not matter; a close one saves most of the others.
-        if let Some(leaf) = self.close_leaf(x) {
-            measure(leaf);
         }
-        walk_leaves(self.tree, enters, |leaf| {
-            measure(leaf.index);
-            false
-        });
-        let (square, owner) = best.get();
         (owner != NONE).then(|| {
             let (tet, v) = self.around(owner, x);
             let Closest { weights, .. } = closest_on(&v, self.surface_of(owner, tet.rank));
-            (Location { owner, barycentric: tet.rank.map(|r| weights[r]) }, square)
+            (Location { owner, barycentric: tet.rank.map(|r| weights[r]) }, least)
         })
     }
 
@@ -82,25 +88,12 @@ impl<'a> Surface<'a> {
     }
 
     /// Squared distance of a node's cell, never larger than that of what it contains.
-    fn node_square(&self, node: Node, x: Vec3) -> f32 {
+    fn square_of(&self, (_, level, code): Node, x: Vec3) -> f32 {
         let grid = &self.tree.grid;
-        let [x0, y0, z0, x1, y1, z1] = cell_box(grid, node.level, node.code);
+        let [x0, y0, z0, x1, y1, z1] = cell_box(grid, level, code);
         let (below, above) = (sub(grid.normalise([x0, y0, z0]), x), sub(x, grid.normalise([x1, y1, z1])));
         let d = per_axis(|c| (below[c].max(above[c]) * two_to(-21) - 1.0).max(0.0));
         dot(d, d)
-    }
-
-    /// A leaf with surface in it, close to a point.
-    fn close_leaf(&self, x: Vec3) -> Option<u32> {
-        let mut node = Node::default();
-        while node.level < self.tree.grid.level {
-            let children = (0..8).filter_map(|digit| {
-                let index = self.tree.child(node.index, digit).filter(|&child| self.tree.is_boundary(child))?;
-                Some(Node { index, level: node.level + 1, code: node.code << 3 | digit })
-            });
-            node = children.min_by(|a, b| self.node_square(*a, x).total_cmp(&self.node_square(*b, x)))?;
-        }
-        Some(node.index)
     }
 }
 

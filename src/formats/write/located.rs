@@ -160,11 +160,14 @@ fn arrays(mut columns: &[(String, Vec<f32>)]) -> Vec<(&str, usize, Cow<'_, [f32]
 
 fn grid(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
     let values = arrays(located.values);
-    let mut point_data = vec![
-        Column { name: "owner", components: 1, block: Block::U32(located.owner) },
-        Column { name: "bary", components: 4, block: Block::F32(located.bary.as_flattened()) },
-    ];
-    point_data.extend(values.iter().map(|(name, components, values)| Column { name, components: *components, block: Block::F32(values) }));
+    // The values come first: viewers show the first array.
+    let values = values.iter().map(|(name, components, values)| Column { name, components: *components, block: Block::F32(values) });
+    let point_data: Vec<_> = values
+        .chain([
+            Column { name: "owner", components: 1, block: Block::U32(located.owner) },
+            Column { name: "bary", components: 4, block: Block::F32(located.bary.as_flattened()) },
+        ])
+        .collect();
     let points = Column { name: "Points", components: 3, block: Block::F64(located.points.as_flattened()) };
     let n = located.owner.len();
     let (connectivity, corners, kind) = match located.of {
