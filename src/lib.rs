@@ -1,8 +1,9 @@
 //! OLBVH: octree linear bounding volume hierarchies over volumetric meshes (Ströter, Mueller-Roemer, Stork, Fellner
 //! 2020), built and queried with Vulkan compute shaders.
 //!
-//! A tree answers which tetrahedron contains a point, where a ray may meet the mesh, and what a voxel touches.
-//! Everything runs on the device: construction, point location, volume rendering, slicing, mesh overlap. All decisions
+//! A tree answers which tetrahedron contains a point, which place of the surface is closest to it, where a ray may meet the
+//! mesh, and what a voxel touches. Everything runs on the device: construction, point location, volume rendering, slicing,
+//! mesh overlap. All decisions
 //! are made with integers and correctly rounded operations in a fixed order, so trees and owners are **the same bytes
 //! on every device**, and equal to those of [`mod@reference`], the reference implementation in safe Rust.
 //!
@@ -58,6 +59,10 @@
 //! ```
 //! - **Moved points**: after the first frame, [`build::cmd_move_mesh`] in place of [`build::cmd_prepare_mesh`] spares the
 //!   search for neighbours, most of stage 0.
+//! - **Your scene**: draw what is opaque, copy the depth attachment to a buffer (a `D32_SFLOAT` as it is, with a barrier from
+//!   the transfer to compute shaders), and record [`query::cmd_render`] with it ([`query::RenderInput::depth`]) and with the
+//!   view of your matrix ([`render::Plan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over
+//!   your picture: `color.rgb + (1 − color.a)·yours`.
 //! - **Frames in flight**: whatever is written in every frame needs its own memory per frame in flight, or a barrier
 //!   between frames. So do descriptor pools on devices without buffer addresses. Data that does not change (cells,
 //!   fields) can be shared.

@@ -167,3 +167,26 @@ fn points_outside_have_the_closest_place() {
         fails(folder.path(), 2, &["locate", "from.vtu", "p.csv", "-o", "o.csv", "--within", wrong, "--device", "cpu"]);
     }
 }
+
+/// A deformed mesh is asked about instead of the mesh itself.
+#[test]
+fn meshes_are_deformed_by_a_vector() {
+    let folder = TempDir::new().unwrap();
+    let mut mesh = with_linear_fields(kuhn([3, 3, 3]).unwrap());
+    mesh.fields.iter_mut().for_each(|field| field.values[0] = if field.name.starts_with('v') { f32::NAN } else { field.values[0] });
+    write_mesh(folder.path().join("from.vtu"), &mesh).unwrap();
+    std::fs::write(folder.path().join("p.csv"), "5,4,2\n").unwrap();
+    // The vector is the place of each point, so the mesh is twice as large, with the values of half the place.
+    for (warp, wanted) in [("v", 10.5), ("v=1", 10.5), ("v = 3", 5.25)] {
+        let out = olbvh(folder.path(), &["locate", "from.vtu", "p.csv", "-o", "o.csv", "--warp", warp, "--field", "t", "--device", "cpu"]);
+        let message = text(&out.stderr);
+        assert_eq!((out.status.code(), message.contains("1 point left in place")), (Some(0), true), "{message}");
+        let table = std::fs::read_to_string(folder.path().join("o.csv")).unwrap();
+        let value: f32 = table.lines().nth(1).unwrap().rsplit(',').next().unwrap().parse().unwrap();
+        assert!((value - wanted).abs() < 1e-4, "{warp}: {table}");
+    }
+    for wrong in ["w", "t", "v=", "v=much", "v=inf"] {
+        let arguments = ["locate", "from.vtu", "p.csv", "-o", "o.csv", "--warp", wrong, "--device", "cpu"];
+        assert!(fails(folder.path(), 2, &arguments).contains("--warp"), "{wrong}");
+    }
+}

@@ -4,6 +4,7 @@ pub mod cases;
 mod kuhn;
 mod measure;
 mod procedural;
+mod warp;
 pub(crate) use kuhn::hash;
 pub use kuhn::{kuhn, kuhn_jittered};
 pub use procedural::{graded, shell, slivers};

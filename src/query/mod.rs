@@ -1,4 +1,5 @@
-//! Queries on the device: point location (SPEC 3.1, 3.2), volume rendering (3.3), slicing (3.4) and mesh overlap (3.5).
+//! Queries on the device: point location and closest places (SPEC 3.1, 3.2), volume rendering (3.3), slicing (3.4) and mesh
+//! overlap (3.5).
 
 mod all_owners;
 mod locate;

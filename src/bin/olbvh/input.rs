@@ -62,6 +62,36 @@ pub struct ReadArgs {
     merge: Merge,
 }
 
+/// Arguments that deform a mesh.
+#[derive(clap::Args)]
+pub struct WarpArgs {
+    /// Move the points by a vector of theirs, such as a displacement, times FACTOR (1 by default): the deformed shape.
+    #[arg(long, value_name = "VECTOR[=FACTOR]")]
+    warp: Option<String>,
+}
+
+impl WarpArgs {
+    /// Deforms the mesh if that is asked for. A name may contain `=`.
+    pub fn apply(&self, mesh: &mut Mesh, common: &Common) -> Outcome {
+        let Some(text) = &self.warp else { return Ok(()) };
+        let (vector, factor): (&str, f64) = match text.rsplit_once('=') {
+            Some((vector, factor)) if mesh.field(&format!("{text}.x")).is_none() => {
+                let factor = factor.trim().parse().ok().filter(|f: &f64| f.is_finite());
+                (vector.trim_end(), factor.ok_or_else(|| Failure::Usage(format!("--warp {text}: a number is needed after `=`")))?)
+            }
+            _ => (text.as_str(), 1.0),
+        };
+        let still = mesh.warp(vector, factor).map_err(|error| match error {
+            Error::Invalid(why) => Failure::Usage(format!("--warp: {why}; {}", fields(mesh))),
+            other => other.into(),
+        })?;
+        if still > 0 {
+            common.remark(format_args!("--warp: {} left in place, for want of a finite vector", counted(still as u64, "point")));
+        }
+        Ok(())
+    }
+}
+
 /// Arguments that limit how much of a device is used.
 #[derive(clap::Args)]
 pub struct MemoryArgs {

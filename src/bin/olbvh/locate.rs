@@ -2,7 +2,7 @@
 
 use crate::common::{Common, Failure, Outcome};
 use crate::engine::{self, Engine, OnProgress};
-use crate::input::{self, MemoryArgs, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{InBlocks, Points};
@@ -82,6 +82,8 @@ pub struct Args {
     #[arg(long, conflicts_with = "all")]
     coherent: bool,
     #[command(flatten)]
+    warp: WarpArgs,
+    #[command(flatten)]
     tree: TreeArgs,
     #[command(flatten)]
     memory: MemoryArgs,
@@ -107,7 +109,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
-    let loaded = args.tree.mesh(&args.mesh, common)?;
+    let mut loaded = args.tree.mesh(&args.mesh, common)?;
+    args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
     let fields: Vec<&Field> = if args.all {
         Vec::new()

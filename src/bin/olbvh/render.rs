@@ -4,7 +4,7 @@ use crate::arguments::{message, named, range, vector};
 use crate::bounding_box;
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
-use crate::input::{self, MemoryArgs, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
@@ -31,6 +31,7 @@ Examples:
   olbvh render bracket.vtu -o part.png --opacity 0:0,0.6:0,0.7:0.9,0.8:0   some of the values
   olbvh render bracket.vtu -o iso.png --iso 40,55,70 --opacity 0.5 --box   three translucent iso-surfaces
   olbvh render bracket.vtu -o half.png --clip view --opacity 1       the half near the viewer cut away
+  olbvh render bracket.vtu -o bent.png --warp displacement=300       the deformed shape, 300 times as bent as it is
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
 By default, the camera sees the whole mesh. An opacity, of --opacity or a transfer function, is that of a layer as thick as 1/100 of the diagonal of \
@@ -112,6 +113,8 @@ pub struct Args {
     #[arg(long, default_value_t = 0.99, value_name = "A", allow_negative_numbers = true)]
     termination: f32,
     #[command(flatten)]
+    warp: WarpArgs,
+    #[command(flatten)]
     tree: TreeArgs,
     #[command(flatten)]
     memory: MemoryArgs,
@@ -133,7 +136,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;
     let engine = engine::open(common)?;
-    let loaded = args.tree.mesh(&args.mesh, common)?;
+    let mut loaded = args.tree.mesh(&args.mesh, common)?;
+    args.warp.apply(&mut loaded.mesh, common)?;
     let rays: u64 = settings.size.into_iter().map(u64::from).product();
     if options.fineness == Fineness::Pictures && 2 * rays < loaded.mesh.tets.len() as u64 {
         options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves

@@ -3,7 +3,7 @@
 use crate::arguments::{named, range, vector};
 use crate::common::{Common, Failure, Outcome};
 use crate::engine;
-use crate::input::{self, MemoryArgs, TreeArgs};
+use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::output::{self, Progress};
 use crate::slice_output::{Appearance, Layers, layer_file, materials};
 use crate::slice_placement::Placement;
@@ -92,6 +92,8 @@ pub struct Args {
     #[arg(long, value_name = "M", value_parser = unit, allow_negative_numbers = true)]
     unit: Option<f64>,
     #[command(flatten)]
+    warp: WarpArgs,
+    #[command(flatten)]
     tree: TreeArgs,
     #[command(flatten)]
     memory: MemoryArgs,
@@ -108,7 +110,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
     let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
-    let loaded = args.tree.mesh(&args.mesh, common)?;
+    let mut loaded = args.tree.mesh(&args.mesh, common)?;
+    args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
     let field = input::field(mesh, args.field.as_deref())?;
     if field.is_none() && format == OutputFormat::Png {

@@ -7,10 +7,24 @@ use crate::render::rays::View;
 use glam::{DMat4, DVec2, DVec3, DVec4};
 
 /// The view of a renderer, in whose picture the mesh appears at its place.
+///
+/// ```
+/// use olbvh::glam::{DVec3, dcamera::rh::{proj::vulkan::perspective_infinite_reverse, view::look_at_mat4}};
+/// use olbvh::render::{Bounds, Plan, ProjectedView, RenderSettings};
+///
+/// let eye = look_at_mat4(DVec3::new(-3.0, -4.0, 5.0), DVec3::ZERO, DVec3::Z);
+/// let view = ProjectedView { to_clip: perspective_infinite_reverse(0.8, 16.0 / 9.0, 0.1) * eye, reversed: true };
+/// let bounds = Bounds { lo: [-1.0; 3], hi: [1.0; 3] };
+/// let settings = RenderSettings { size: [1920, 1080], ..RenderSettings::default() };
+/// let plan = Plan::with_projected(&settings, &view, &bounds, [0.0; 3], Some([20.0, 95.0]))?;
+/// // Upload plan.view() and plan.table, and give both to query::cmd_render, along with your depth buffer.
+/// # Ok::<(), olbvh::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ProjectedView {
     /// Takes points of the mesh (relative to [`crate::mesh::Mesh::origin`]) to Vulkan's clip space: projection · view ·
-    /// model. Its y points down, so negate the second row of a matrix that is used with a viewport of negative height.
+    /// model. Its y points down, so negate the second row of a matrix that is used with a viewport of negative height. The
+    /// viewport is the picture, with depths from 0 to 1.
     pub to_clip: DMat4,
     /// Whether the near plane has depth 1, and what is far depth 0; otherwise it is the other way round. The far plane may
     /// lie at infinity.
