@@ -3,9 +3,9 @@
 //!
 //! A tree answers which tetrahedron contains a point, which place of the surface is closest to it, where a ray may meet the
 //! mesh, and what a voxel touches. Everything runs on the device: construction, point location, volume rendering, slicing,
-//! mesh overlap. All decisions
-//! are made with integers and correctly rounded operations in a fixed order, so trees and owners are **the same bytes
-//! on every device**, and equal to those of [`mod@reference`], the reference implementation in safe Rust.
+//! mesh overlap. All decisions are made with integers and correctly rounded operations in a fixed order, so trees and owners
+//! are **the same bytes on every device**, and equal to those of [`mod@reference`], the reference implementation in safe
+//! Rust.
 //!
 //! # A complete example
 //! ```no_run

@@ -72,8 +72,8 @@ pub struct Args {
     /// tree.
     #[arg(long, default_value_t = olbvh::options::TOLERANCE, value_name = "T", allow_hyphen_values = true)]
     tolerance: f32,
-    /// Points outside the mesh get the closest place of its surface, if that is at most D away (in units of the mesh, up to
-    /// half the mesh's largest extent): owner, barycentric coordinates and values are those of that place. Adds a column
+    /// Points outside the mesh get the closest place of its surface, if that is at most D away (in units of the mesh; places
+    /// farther than the mesh's largest extent are not found, and those beyond half of it not always): owner, barycentric coordinates and values are those of that place. Adds a column
     /// `distance`, which is 0 in the mesh.
     #[arg(long, value_name = "D", conflicts_with = "all", allow_hyphen_values = true)]
     within: Option<f32>,

@@ -43,8 +43,8 @@ impl Located<'_> {
 /// `v.x`, `v.y` and `v.z` without a field `v`, and `s.0`, `s.1` and so on, are one array) or `.json` (lists).
 ///
 /// # Errors
-/// [`Error::Invalid`] for another extension, for arrays of different lengths, for a mesh of other points, or for a field whose name is that of
-/// another or one of [`Located::TAKEN`]; [`Error::Io`] if the file cannot be written.
+/// [`Error::Invalid`] for another extension, for arrays of different lengths, for a mesh of other points, or for a field
+/// whose name is that of another or one of [`Located::TAKEN`]; [`Error::Io`] if the file cannot be written.
 pub fn write_located(path: impl AsRef<Path>, located: &Located<'_>) -> Result<()> {
     let path = path.as_ref();
     let format = OutputFormat::of(path, &Located::FORMATS)?;

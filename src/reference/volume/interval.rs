@@ -36,7 +36,7 @@ impl<'a> Intervals<'a> {
 
     /// The samples `[begin, end)` of a ray (origin, unit direction) that can lie in the mesh: from the first to the
     /// last leaf with the boundary flag (or with something visible) whose box the ray meets, and one more at either
-    /// end, without those that a clip leaves out or that lie `limit` steps from the origin or farther, where iso-surfaces
+    /// end, without those that a clip leaves out or that lie more than `limit` steps from the origin, where iso-surfaces
     /// need one more. For a ray that starts in a leaf of the mesh they start at 0.
     pub fn of(&self, ray: ([f32; 3], [f32; 3]), limit: f32) -> [u32; 2] {
         let (origin, direction) = ray;
