@@ -31,7 +31,8 @@ fn views() -> [ProjectedView; 3] {
     ]
 }
 
-/// What a depth buffer has where the renderer has drawn the plane x + y = 5 in some columns, and nothing in others.
+/// What a depth buffer has where the renderer has drawn the plane x + y = 5 in some columns, nothing in others, and what
+/// is not a number in some.
 fn depths(view: &ProjectedView) -> Vec<f32> {
     let inverse = view.to_clip.inverse();
     let at = |i: u32| {
@@ -44,7 +45,11 @@ fn depths(view: &ProjectedView) -> Vec<f32> {
         let [a, b] = [0.3, 0.6].map(place);
         let [from, to] = [a, b].map(|p| p.x + p.y);
         let clip = view.to_clip * (a + (b - a) * ((5.0 - from) / (to - from))).extend(1.0);
-        if x % 8 < 6 { (clip.z / clip.w) as f32 } else { f32::from(u8::from(!view.reversed)) }
+        match x % 8 {
+            0..6 => (clip.z / clip.w) as f32,
+            6 => f32::from(u8::from(!view.reversed)),
+            _ => f32::NAN,
+        }
     };
     (0..SIZE[0] * SIZE[1]).map(at).collect()
 }

@@ -1,9 +1,8 @@
 #version 460
 // The place of the surface that is closest to a point: of the tetrahedra with faces that have no neighbour, the one whose
 // such face has the smallest squared distance (ties: lowest id), at most `within` away, among the lists of the boundary
-// leaves in the cells asked for. A descent to the
-// closest leaf gives a first bound; the leaves within it are then visited in Morton order. Twin of
-// src/reference/nearest.rs.
+// leaves in the cells asked for. A descent to a close leaf gives a first bound; the leaves within it are then visited in
+// Morton order. Twin of src/reference/nearest.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
@@ -98,12 +97,12 @@ void measure(uint begin, uint end) {
 void begin_close(uint level) {
     Node node = Node(0u, 0u, 0u);
     while (node.level < level) {
-        uint mask = child_mask(node.index), first = co.at[node.index] + 1u;
+        uint mask = child_mask(node.index);
         float least = 3.40282347e38;
         Node closest_child = node;
         for (uint digit = 0u; digit < 8u; ++digit) {
             if ((mask >> digit & 1u) == 0u) continue;
-            Node child = Node(first + bitCount(mask & ((1u << digit) - 1u)), node.level + 1u, node.code << 3 | digit);
+            Node child = Node(child_of(node.index, mask, digit), node.level + 1u, node.code << 3 | digit);
             uvec3 cell = unmorton(child.code);
             uint shift = MAX_LEVEL - child.level;
             bool asked = all(lessThanEqual(lo >> shift, cell)) && all(lessThanEqual(cell, hi >> shift));
@@ -141,39 +140,43 @@ bool measure_all(uint level) {
     return leaf == WALK_DONE;
 }
 
-void main() {
-    uint i = item_index(), left = 0u;
-    if (i < count) {
-        Grid g = grid.at[0];
-        vec3 at = point(i, stride);
+// The weights of the closest place, in the caller's order of the vertices.
+vec4 place_on(uint t) {
+    Patch found = patch_of(t, words(neighbours.at[t]));
+    vec4 w;
+    closest_on(found.v, found.faces, w);
+    return vec4(w[found.rank.x], w[found.rank.y], w[found.rank.z], w[found.rank.w]);
+}
+
+// Begins or resumes the search for a point, if it has not ended before. Returns true if it needs another round.
+bool search(uint i) {
+    Grid g = grid.at[0];
+    vec3 at = point(i, stride);
+    if (FRESH != 0u) {
+        precise float reach = min(within * g.scale, 1.0) * two_to(19);
+        precise float square = reach * reach;
+        bool asked = near_bounds(g, at) && !is_empty_tree(g.level) && is_boundary_node(0u) && within >= 0.0;
+        state = NearState(asked ? 0u : NONE, 0u, NONE, square);
+    } else {
+        state = states.at[i];
+        if (state.code == NONE) return false;
+    }
+    bool ended = state.code == NONE;
+    if (!ended) {
+        x = normalise(g, at);
         lo = unpack_cell(first_cell);
         hi = unpack_cell(last_cell);
-        if (FRESH != 0u) {
-            precise float reach = min(within * g.scale, 1.0) * two_to(19);
-            precise float square = reach * reach;
-            bool asked = near_bounds(g, at) && !is_empty_tree(g.level) && is_boundary_node(0u) && within >= 0.0;
-            state = NearState(asked ? 0u : NONE, 0u, NONE, square);
-        } else {
-            state = states.at[i];
-        }
-        if (state.code != NONE) {
-            x = normalise(g, at);
-            if (FRESH != 0u) begin_close(g.level);
-            left = uint(!measure_all(g.level));
-        }
-        states.at[i] = state;
-        if (state.code == NONE) {
-            vec4 weights = vec4(0.0);
-            if (state.owner != NONE) {
-                x = normalise(g, at);
-                Patch found = patch_of(state.owner, words(neighbours.at[state.owner]));
-                vec4 w;
-                closest_on(found.v, found.faces, w);
-                weights = vec4(w[found.rank.x], w[found.rank.y], w[found.rank.z], w[found.rank.w]);
-            }
-            barycentrics.at[i] = weights;
-        }
+        if (FRESH != 0u) begin_close(g.level);
+        ended = measure_all(g.level);
     }
+    states.at[i] = state;
+    if (ended) barycentrics.at[i] = state.owner == NONE ? vec4(0.0) : place_on(state.owner);
+    return !ended;
+}
+
+void main() {
+    uint i = item_index(), left = 0u;
+    if (i < count) left = uint(search(i));
     left = subgroupAdd(left);
     if (subgroupElect() && left > 0u) atomicAdd(unfinished.at[0], left);
 }

@@ -214,8 +214,8 @@ vec3 normal_of_sample(uint k, Sides here, bool joins) {
     return beside_cut(entry, normal_at(barycentric_at(entry)));
 }
 
-// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip or a depth. Light
-// takes them to lie in the stand.
+// Adds the surfaces between two places of the ray, between which the value is linear, but for those beyond a clip or a depth.
+// Light takes them to lie in the stand.
 void add_surfaces(Place from, Place to) {
     bool rises = from.rank < to.rank;
     for (uint i = from.rank; i != to.rank && sum.w < view.termination; i += rises ? 1u : ~0u) {

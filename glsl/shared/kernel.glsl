@@ -6,8 +6,8 @@
 //     END_ARGUMENTS
 //     BUFFER(0, readonly, uint, keys)
 //     BUFFER(1, writeonly, uint, sorted)
-// and reads keys.at[i]; a kernel without scalars begins with NO_SCALARS(2) instead. By default, the push constants hold one 64-bit address per buffer, then the scalars. With
-// OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i`, and the push constants hold only the scalars. OLBVH_WIDE: see
+// and reads keys.at[i]; a kernel without scalars begins with NO_SCALARS(2) instead. By default, the push constants hold
+// one 64-bit address per buffer, then the scalars. With OLBVH_DESCRIPTORS, buffer i is `set = 0, binding = i`, and the push constants hold only the scalars. OLBVH_WIDE: see
 // records.glsl.
 #extension GL_EXT_buffer_reference : require
 #extension GL_EXT_buffer_reference_uvec2 : require

@@ -31,6 +31,7 @@ void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction)
     direction = d;
 }
 
+const float MOST = 1e30;   // larger divisors of a depth count as infinite, so that their reciprocals are normal
 const float LEAST = 1e-20; // smaller components of a direction count as this, so that reciprocals are finite
 
 vec3 inverse_of(vec3 direction) {
@@ -49,7 +50,8 @@ const float MAX_SAMPLES = 8388608.0;
 // How many steps from its origin the ray of a pixel reaches value d of a depth buffer.
 float steps_to_depth(RenderView view, uvec2 pixel, float d) {
     precise float scale = view.origin_y.w + d * view.direction.w;
-    if (!(scale > LEAST && scale < 3.40282347e38)) return MAX_SAMPLES;
+    bool finite = (floatBitsToUint(d) & 0x7f800000u) != 0x7f800000u; // by its bits: drivers may compare NaN as they like
+    if (!finite || scale <= LEAST || scale >= MOST) return MAX_SAMPLES;
     vec3 w = way_of(view, pixel);
     float square = dot_product(w, w);
     precise float way = square * inverse_sqrt(square);

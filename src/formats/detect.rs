@@ -24,15 +24,42 @@ const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio conv
 /// For what meshio cannot read.
 const SAVE_AS: &str = "save it as .vtu, for example with ParaView (File, Save Data)";
 
-/// Whether a file with points is a mesh, or named like one, rather than an array or a table.
-pub(crate) fn is_mesh(source: &Source) -> bool {
-    const ENDINGS: [&str; 13] = ["vtu", "pvtu", "vtm", "vtpd", "vtpc", "pvd", "vtk", "msh", "mesh", "meshb", "node", "ele", "tet"];
+/// The format that the content of a file tells.
+fn told(source: &Source) -> Result<Option<Format>> {
     let bytes = source.start();
     let start = &bytes[skip_comments(bytes)..];
-    let marks: [&[u8]; 3] = [b"<", b"$", b"MeshVersionFormatted"];
-    bytes.trim_ascii_start().starts_with(b"# vtk DataFile")
-        || marks.iter().any(|mark| start.starts_with(mark))
-        || ENDINGS.contains(&ending(&source.path).as_str())
+    let is = |prefix: &[u8]| start.get(..prefix.len()).is_some_and(|b| b.eq_ignore_ascii_case(prefix));
+    Ok(if bytes.trim_ascii_start().starts_with(b"# vtk DataFile") {
+        Some(Format::VtkLegacy)
+    } else if is(b"<") {
+        Some(Format::VtkXml)
+    } else if is(b"$") {
+        Some(Format::Gmsh)
+    } else if is(b"MeshVersionFormatted") {
+        Some(Format::Medit)
+    } else if is(b"v ") && isaac::has_tetrahedra(source)? {
+        Some(Format::Isaac)
+    } else {
+        None
+    })
+}
+
+/// The format that the name of a file tells.
+fn named(source: &Source) -> Option<Format> {
+    let is_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| source.start().starts_with(one));
+    match ending(&source.path).as_str() {
+        "vtu" | "pvtu" | "vtm" | "vtpd" | "vtpc" | "pvd" => Some(Format::VtkXml),
+        "vtk" => Some(Format::VtkLegacy),
+        "msh" => Some(Format::Gmsh),
+        "mesh" | "meshb" => Some(if is_binary { Format::MeditBinary } else { Format::Medit }),
+        "node" | "ele" => Some(Format::TetGen),
+        _ => None,
+    }
+}
+
+/// Whether a file is a mesh, or named like one, and not an array or a table of points.
+pub(crate) fn is_mesh(source: &Source) -> Result<bool> {
+    Ok(named(source).is_some() || told(source)?.is_some())
 }
 
 /// Detects the format of a file; for a file that cannot be read, returns an error that names what was found.
@@ -45,39 +72,22 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
     if let Some(found) = foreign_binary(bytes, &ending) {
         return Err(source.error(found));
     }
+    if let Some(format) = told(source)? {
+        return Ok(format);
+    }
     let start = skip_comments(bytes);
     let is = |prefix: &[u8]| bytes[start..].get(..prefix.len()).is_some_and(|b| b.eq_ignore_ascii_case(prefix));
-    if bytes.trim_ascii_start().starts_with(b"# vtk DataFile") {
-        return Ok(Format::VtkLegacy);
-    }
-    if bytes[start..].first() == Some(&b'<') {
-        return Ok(Format::VtkXml);
-    }
-    if bytes[start..].first() == Some(&b'$') {
-        return Ok(Format::Gmsh);
-    }
-    if is(b"MeshVersionFormatted") {
-        return Ok(Format::Medit);
-    }
-    if is(b"v ") && isaac::has_tetrahedra(source)? {
-        return Ok(Format::Isaac);
-    }
     let has_dollar = bytes.trim_ascii_start().starts_with(b"$");
     if let Some(found) = foreign_text(&is, has_dollar, &ending) {
         return Err(source.error(found));
     }
-    let medit_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| bytes.starts_with(one));
-    match ending.as_str() {
-        "vtu" | "pvtu" | "vtm" | "vtpd" | "vtpc" | "pvd" => Ok(Format::VtkXml),
-        "vtk" => Ok(Format::VtkLegacy),
-        "msh" => Ok(Format::Gmsh),
-        "mesh" | "meshb" if medit_binary => Ok(Format::MeditBinary),
-        "mesh" | "meshb" => Ok(Format::Medit),
-        "node" | "ele" => Ok(Format::TetGen),
-        "inp" => Err(source.error(format!("looks like AVS UCD, which cannot be read; {CONVERT}"))),
-        "" => Err(source.error(format!("its content is not recognised, and it has no ending; readable are {READABLE}"))),
-        other => Err(source.error(format!("neither its content nor the ending .{other} is one of {READABLE}; {CONVERT}"))),
-    }
+    named(source).ok_or_else(|| {
+        source.error(match ending.as_str() {
+            "inp" => format!("looks like AVS UCD, which cannot be read; {CONVERT}"),
+            "" => format!("its content is not recognised, and it has no ending; readable are {READABLE}"),
+            other => format!("neither its content nor the ending .{other} is one of {READABLE}; {CONVERT}"),
+        })
+    })
 }
 
 /// The extension of a path in lower case, without the dot.

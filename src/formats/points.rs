@@ -30,7 +30,7 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
         return made.map(|(_, mesh)| mesh.points.iter().map(|p| p.map(f64::from)).collect());
     }
     let source = Source::open(path, ".npy, a table of text, or a mesh")?;
-    if detect::is_mesh(&source) { of_mesh(&source) } else { points(&source.whole()?) }
+    if detect::is_mesh(&source)? { of_mesh(&source) } else { points(&source.whole()?) }
 }
 
 /// Reads points from a stream, such as standard input, in the formats of [`load_points`].
@@ -41,7 +41,7 @@ pub fn read_points(mut stream: impl Read) -> Result<Vec<[f64; 3]>> {
     let (path, mut bytes) = (Path::new("-"), Vec::new());
     stream.read_to_end(&mut bytes).map_err(|source| Error::Io { path: path.into(), source })?;
     let source = Source::new(path, bytes);
-    if detect::is_mesh(&source) { of_mesh(&source) } else { points(&source) }
+    if detect::is_mesh(&source)? { of_mesh(&source) } else { points(&source) }
 }
 
 fn of_mesh(source: &Source) -> Result<Vec<[f64; 3]>> {

@@ -7,6 +7,9 @@ use glam::DVec3;
 /// Smaller components of a ray's direction count as this, so that reciprocals are finite.
 pub const LEAST: f32 = 1e-20;
 
+/// Larger divisors of a depth count as infinite, so that their reciprocals are normal.
+const MOST: f32 = 1e30;
+
 /// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
 /// flags from bit 30 on.
 pub const MAX_SAMPLES: u32 = 1 << 23;
@@ -44,11 +47,11 @@ impl RayGrid {
     }
 
     /// How many steps of `1 / inverse_step` from its origin the ray of pixel (x, y) reaches value `d` of a depth buffer, at
-    /// least −1 and at most [`MAX_SAMPLES`], which also stands for infinity and for what is not a number.
+    /// least −1 and at most [`MAX_SAMPLES`], which also stands for infinity and for values that are not finite.
     pub fn steps_to(&self, x: u32, y: u32, d: f32, inverse_step: f32) -> f32 {
         let [p, q, r, s] = self.depth;
         let scale = r + d * s;
-        if !(scale > LEAST && scale < f32::MAX) {
+        if !(d.is_finite() && scale > LEAST && scale < MOST) {
             return MAX_SAMPLES as f32;
         }
         let square = square(self.way(x, y));
