@@ -9,9 +9,11 @@ mod reflect;
 
 use reflect::{Interface, StructLayout};
 use std::cell::RefCell;
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
 use std::{env, fs, process, thread};
 
 const GLSL: &str = "glsl";
@@ -41,20 +43,32 @@ fn generate(out: &Path) -> Result<(), String> {
     let mut kernels = Vec::new();
     find_kernels(Path::new(GLSL), &mut kernels)?;
     kernels.sort();
-    // glslang is so slow that a second thread is worthwhile.
-    let (left, right) = kernels.split_at(kernels.len() / 2);
-    let (left, right) = thread::scope(|scope| {
-        let left = scope.spawn(|| left.iter().map(|k| compile_kernel(k, out)).collect::<Result<Vec<_>, _>>());
-        let right = right.iter().map(|k| compile_kernel(k, out)).collect::<Result<Vec<_>, _>>();
-        (left.join().map_err(|_| "the shader compiler panicked".to_string()), right)
-    });
-    let interfaces = [left??, right?].concat();
+    let interfaces = on_all_cores(kernels.len(), |i| reflect_kernel(&kernels[i]))?;
+    // From the last one on, since those of queries take longest.
+    let [count, forms] = [kernels.len(), FORMS.len()];
+    on_all_cores(count * forms, |i| compile_kernel(&kernels[count - 1 - i / forms], &FORMS[i % forms], out))?;
     write(&out.join("kernels.rs"), &kernels_source(&interfaces))?;
     for form in [&ADDRESS, &DESCRIPTOR] {
         compile(FOREIGN, "foreign.comp", form, false)?;
     }
     write(&out.join("olbvh.glsl"), &export::export(Path::new(GLSL))?)?;
     write(&out.join("layout.rs"), &layout_source()?)
+}
+
+/// The results of jobs 0 to `count` - 1, in this order. The shader compiler takes up to a second for a kernel.
+fn on_all_cores<T: Send>(count: usize, job: impl Fn(usize) -> Result<T, String> + Sync) -> Result<Vec<T>, String> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(BTreeMap::new()));
+    thread::scope(|scope| {
+        for _ in 0..thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(|| {
+                while let Some(i) = Some(next.fetch_add(1, Ordering::Relaxed)).filter(|&i| i < count) {
+                    let result = job(i);
+                    done.lock().unwrap_or_else(PoisonError::into_inner).insert(i, result);
+                }
+            });
+        }
+    });
+    done.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
 fn find_kernels(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
@@ -111,7 +125,7 @@ fn compile(source: &str, name: &str, form: &Form, optimise: bool) -> Result<Vec<
     options.set_include_callback(|file, _, _, _| {
         let path = Path::new(GLSL).join(file);
         let again = !included.borrow_mut().insert(file.to_owned());
-        let content = if again { String::new() } else { fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))? };
+        let content = if again { String::new() } else { read(&path)? };
         Ok(shaderc::ResolvedInclude { resolved_name: path.display().to_string(), content })
     });
     let artifact = compiler
@@ -120,19 +134,26 @@ fn compile(source: &str, name: &str, form: &Form, optimise: bool) -> Result<Vec<
     Ok(artifact.as_binary().to_vec())
 }
 
-fn compile_kernel(path: &Path, out: &Path) -> Result<Interface, String> {
-    let source = fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))?;
+/// The stem of a kernel's compiled files: `query.locate` of `glsl/query/locate.comp`.
+fn stem_of(path: &Path) -> String {
+    let path = path.with_extension("");
+    path.strip_prefix(GLSL).unwrap_or(&path).display().to_string().replace(['/', '\\'], ".")
+}
+
+/// Optimisation may remove names, so an unoptimised module is reflected, and optimised ones are shipped.
+fn reflect_kernel(path: &Path) -> Result<Interface, String> {
     let name = path.display().to_string();
-    let stem = path.with_extension("").strip_prefix(GLSL).map_err(|e| e.to_string())?.display().to_string().replace(['/', '\\'], ".");
-    // Optimisation may remove names, so an unoptimised module is reflected, and optimised ones are shipped.
-    let plain = compile(&source, &name, &DESCRIPTOR, false)?;
-    let interface = reflect::interface(&plain, &stem).map_err(|e| format!("{name}: {e}"))?;
-    for form in &FORMS {
-        let words = compile(&source, &name, form, true)?;
-        let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
-        fs::write(out.join(format!("{stem}.{}.spv", form.suffix)), bytes).map_err(|e| e.to_string())?;
-    }
-    Ok(interface)
+    reflect::interface(&compile(&read(path)?, &name, &DESCRIPTOR, false)?, &stem_of(path)).map_err(|e| format!("{name}: {e}"))
+}
+
+fn compile_kernel(path: &Path, form: &Form, out: &Path) -> Result<(), String> {
+    let words = compile(&read(path)?, &path.display().to_string(), form, true)?;
+    let bytes: Vec<u8> = words.iter().flat_map(|w| w.to_le_bytes()).collect();
+    fs::write(out.join(format!("{}.{}.spv", stem_of(path), form.suffix)), bytes).map_err(|e| e.to_string())
+}
+
+fn read(path: &Path) -> Result<String, String> {
+    fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 fn write(path: &Path, text: &str) -> Result<(), String> {
@@ -192,7 +213,8 @@ fn kernels_source(interfaces: &[Interface]) -> String {
             };
             let _ = writeln!(s, "            BufferInfo {{ name: \"{}\", access: Access::{access}, alignment: {} }},", b.name, b.alignment);
         }
-        let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n    }};", k.scalar_bytes);
+        let _ = writeln!(s, "        ],\n        scalar_bytes: {},\n    }};\n}}", k.scalar_bytes);
+        let _ = writeln!(s, "impl Arguments for {name} {{\n    fn info(&self) -> &'static KernelInfo {{\n        Self::INFO\n    }}");
         let _ = writeln!(
             s,
             "    fn buffers(&self) -> Vec<BufferRef> {{\n        vec![{}]\n    }}",
@@ -220,7 +242,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
 /// comments of the source.
 fn layout_source() -> Result<String, String> {
     let file = Path::new(GLSL).join("shared/layout.glsl");
-    let text = fs::read_to_string(&file).map_err(|e| format!("{}: {e}", file.display()))?;
+    let text = read(&file)?;
     let docs = reflect::comments(&text);
     let names: Vec<&str> = text.lines().filter_map(|l| l.strip_prefix("struct ")).filter_map(|l| l.split_whitespace().next()).collect();
     let mut probe = String::from("#version 460\n#include \"shared/layout.glsl\"\nlayout(local_size_x = 1) in;\n");

@@ -40,10 +40,15 @@ pub(crate) trait Specialization: Copy + Default {
     fn values(&self) -> Vec<(u32, u32)>;
 }
 
-/// The arguments of a kernel; implemented by generated code.
-pub(crate) trait Kernel {
+/// A kernel by the type of its arguments; implemented by generated code.
+pub(crate) trait Kernel: Arguments {
     type Spec: Specialization;
     const INFO: &'static KernelInfo;
+}
+
+/// The arguments of a kernel.
+pub(crate) trait Arguments {
+    fn info(&self) -> &'static KernelInfo;
     fn buffers(&self) -> Vec<BufferRef>;
     /// Writes the scalars into the push-constant bytes, from byte `base` on.
     fn scalars(&self, base: usize, out: &mut [u8]);
@@ -73,11 +78,12 @@ impl KernelInfo {
 
 /// The push constants of a kernel: its scalars, preceded by the addresses of its buffers if they are passed by address.
 /// Addresses are checked, since a host may have omitted one and the device would access address 0.
-pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Result<Vec<u8>> {
-    let mut push = vec![0u8; K::INFO.push_bytes(binding)];
-    arguments.scalars(K::INFO.scalar_base(binding), &mut push);
+pub(super) fn push_constants(arguments: &dyn Arguments, binding: Binding) -> Result<Vec<u8>> {
+    let kernel = arguments.info();
+    let mut push = vec![0u8; kernel.push_bytes(binding)];
+    arguments.scalars(kernel.scalar_base(binding), &mut push);
     if binding == Binding::Address {
-        for ((place, buffer), info) in push.chunks_exact_mut(8).zip(arguments.buffers()).zip(K::INFO.buffers) {
+        for ((place, buffer), info) in push.chunks_exact_mut(8).zip(arguments.buffers()).zip(kernel.buffers) {
             // Kernels do not access an empty buffer.
             if buffer.size > 0 && (buffer.address == 0 || !buffer.address.is_multiple_of(info.alignment)) {
                 let fault = if buffer.address == 0 {
@@ -85,7 +91,7 @@ pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Resu
                 } else {
                     format!("is not at a multiple of {} bytes", info.alignment)
                 };
-                return Err(Error::Invalid(format!("{} is given `{}`, which {fault}", K::INFO.name, info.name)));
+                return Err(Error::Invalid(format!("{} is given `{}`, which {fault}", kernel.name, info.name)));
             }
             place.copy_from_slice(&buffer.address.to_le_bytes());
         }
@@ -94,18 +100,18 @@ pub(super) fn push_constants<K: Kernel>(arguments: &K, binding: Binding) -> Resu
 }
 
 /// The ranges that a kernel uses, and whether it writes each.
-pub(super) fn uses<K: Kernel>(arguments: &K) -> Vec<(BufferRef, bool)> {
-    arguments.buffers().into_iter().zip(K::INFO.buffers).map(|(b, i)| (b, i.access != Access::Read)).collect()
+pub(super) fn uses(arguments: &dyn Arguments) -> Vec<(BufferRef, bool)> {
+    arguments.buffers().into_iter().zip(arguments.info().buffers).map(|(b, i)| (b, i.access != Access::Read)).collect()
 }
 
 impl Gpu {
     /// The pipeline of a kernel with these constants, compiled at first use.
-    pub(crate) fn pipeline<K: Kernel>(&self, spec: K::Spec) -> Result<Pipeline> {
-        let key = (K::INFO.name, spec.values());
+    pub(super) fn pipeline(&self, kernel: &'static KernelInfo, constants: Vec<(u32, u32)>) -> Result<Pipeline> {
+        let key = (kernel.name, constants);
         if let Some(found) = self.pipelines().find(&key) {
             return Ok(found);
         }
-        let made = create_pipeline(self, K::INFO, &key.1)?;
+        let made = create_pipeline(self, kernel, &key.1)?;
         Ok(self.pipelines().keep(self.device(), key, made))
     }
 }

@@ -31,7 +31,7 @@ pub use buffer_ref::{BufferRef, USAGE};
 pub use context::{Binding, Gpu, GpuOptions};
 pub use descriptors::{DescriptorPools, DescriptorRoom};
 pub use host::{Enabled, HostDevice};
-pub(crate) use kernel::{Access, BufferInfo, Kernel, KernelInfo, Specialization};
+pub(crate) use kernel::{Access, Arguments, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer};
 pub use open::list_devices;
 pub use queue::HostQueue;

@@ -8,7 +8,7 @@
 use super::buffer_ref::BufferRef;
 use super::context::{Binding, Gpu};
 use super::descriptors::{DescriptorPools, DescriptorRoom};
-use super::kernel::{Kernel, push_constants, uses};
+use super::kernel::{Arguments, Kernel, Specialization, push_constants, uses};
 use crate::error::{Error, Result};
 use ash::vk;
 
@@ -161,8 +161,13 @@ impl<'a> Recorder<'a> {
 
     /// Records a dispatch of a kernel.
     pub(crate) fn dispatch<K: Kernel>(&mut self, arguments: &K, spec: K::Spec, groups: Groups) -> Result<()> {
-        let info = K::INFO;
-        let pipeline = self.gpu.pipeline::<K>(spec)?;
+        self.dispatch_with(arguments, spec.values(), groups)
+    }
+
+    /// The same with specialization constants as pairs (id, value): one function for all kernels.
+    fn dispatch_with(&mut self, arguments: &dyn Arguments, constants: Vec<(u32, u32)>, groups: Groups) -> Result<()> {
+        let info = arguments.info();
+        let pipeline = self.gpu.pipeline(info, constants)?;
         let buffers = arguments.buffers();
         if let Groups::Count(0) = groups {
             return Ok(());
@@ -299,23 +304,31 @@ impl<'a> Recorder<'a> {
         if self.is_rehearsal() {
             return work(self);
         }
+        let begin = self.begin_stage(name);
+        let result = work(self);
+        self.end_stage(name, begin);
+        result
+    }
+
+    /// Records the start of a stage, and returns the slot of its timestamp. Both timestamps are at the bottom: a stage
+    /// begins when all before it has ended, so that no time counts twice.
+    fn begin_stage(&mut self, name: &str) -> Option<u32> {
         let text = std::ffi::CString::new(format!("olbvh.{}", name.replace('\0', " "))).unwrap_or_default();
         if let Some(debug) = self.gpu.debug_device() {
-            // SAFETY: the label is ended below.
+            // SAFETY: the label is ended by `end_stage`.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }
-        // Both at the bottom: a stage begins when all before it has ended, so that no time counts twice.
-        let begin = self.timestamp();
-        let result = work(self);
-        let end = self.timestamp();
-        if let (Some(begin), Some(end)) = (begin, end) {
+        self.timestamp()
+    }
+
+    fn end_stage(&mut self, name: &str, begin: Option<u32>) {
+        if let (Some(begin), Some(end)) = (begin, self.timestamp()) {
             self.stages.push((name.to_string(), begin, end));
         }
         if let Some(debug) = self.gpu.debug_device() {
-            // SAFETY: ends the label begun above.
+            // SAFETY: ends the label begun by `begin_stage`.
             unsafe { debug.cmd_end_debug_utils_label(self.commands) };
         }
-        result
     }
 
     /// Ends the recording and reports the result of its checks.

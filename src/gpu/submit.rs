@@ -64,20 +64,36 @@ impl Gpu {
     /// Runs work of this crate as [`Gpu::run`] does. It is safe because this crate makes the recorded buffers to fit,
     /// and keeps them alive for the duration of the call.
     pub(crate) fn submit<T>(&self, label: &'static str, record: impl FnOnce(&mut Recorder<'_>) -> Result<T>) -> Result<(T, StageTimes)> {
+        let submission = Submission::new(self)?;
+        let mut recorder = self.begin(&submission, label)?;
+        let value = record(&mut recorder)?;
+        let times = self.execute(submission, &recorder, label)?;
+        Ok((value, times))
+    }
+
+    /// A recorder for the command buffer of a submission.
+    fn begin(&self, submission: &Submission<'_>, label: &'static str) -> Result<Recorder<'_>> {
         let (device, timed) = (self.device(), self.timestamp_bits() > 0);
-        let mut submission = Submission::new(self)?;
-        let (commands, fence, queries) = submission.handles();
+        let (commands, _, queries) = submission.handles();
         super::debug::name(self.debug_device(), commands, label);
-        // SAFETY: objects of this device, which no other submission uses; the queue is locked during the submission.
+        // SAFETY: objects of this device, which no other submission uses.
         unsafe {
             let begin = vk::CommandBufferBeginInfo::default().flags(vk::CommandBufferUsageFlags::ONE_TIME_SUBMIT);
             device.begin_command_buffer(commands, &begin).map_err(failed("vkBeginCommandBuffer"))?;
             if timed {
                 device.cmd_reset_query_pool(commands, queries, 0, TIMESTAMPS);
             }
-            let mut recorder = Recorder::new(self, commands, timed.then_some((queries, TIMESTAMPS)));
-            let value = record(&mut recorder)?;
-            recorder.finish()?;
+            Ok(Recorder::new(self, commands, timed.then_some((queries, TIMESTAMPS))))
+        }
+    }
+
+    /// Submits what was recorded, and waits until it has been executed.
+    fn execute(&self, mut submission: Submission<'_>, recorder: &Recorder<'_>, label: &str) -> Result<StageTimes> {
+        recorder.finish()?;
+        let device = self.device();
+        let (commands, fence, queries) = submission.handles();
+        // SAFETY: objects of this device, which no other submission uses; the queue is locked during the submission.
+        unsafe {
             // Makes the results visible to the host, and to the submissions that follow.
             let barrier = [vk::MemoryBarrier::default()
                 .src_access_mask(vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE)
@@ -86,14 +102,12 @@ impl Gpu {
             let target = vk::PipelineStageFlags::HOST | vk::PipelineStageFlags::ALL_COMMANDS;
             device.cmd_pipeline_barrier(commands, source, target, vk::DependencyFlags::empty(), &barrier, &[], &[]);
             device.end_command_buffer(commands).map_err(failed("vkEndCommandBuffer"))?;
-            let buffers = [commands];
-            let submit = [vk::SubmitInfo::default().command_buffers(&buffers)];
-            self.submit_to_queue(&submit, fence)?;
-            self.wait(fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
-            submission.end();
-            let stages = if timed { self.read_timestamps(queries, recorder.timed_stages())? } else { Vec::new() };
-            Ok((value, StageTimes { stages }))
         }
+        let buffers = [commands];
+        self.submit_to_queue(&[vk::SubmitInfo::default().command_buffers(&buffers)], fence)?;
+        self.wait(fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
+        submission.end();
+        Ok(StageTimes { stages: self.read_timestamps(queries, recorder.timed_stages())? })
     }
 
     /// Submits under the queue's lock.
@@ -159,7 +173,10 @@ impl Gpu {
 
     /// Writes data to a buffer, starting at byte `at`.
     pub(crate) fn write<T: Pod>(&self, buffer: &mut Buffer, at: u64, data: &[T]) -> Result<()> {
-        let bytes: &[u8] = bytemuck::cast_slice(data);
+        self.write_bytes(buffer, at, bytemuck::cast_slice(data))
+    }
+
+    fn write_bytes(&self, buffer: &mut Buffer, at: u64, bytes: &[u8]) -> Result<()> {
         if let Some(mapped) = buffer.mapped_mut() {
             mapped[at as usize..at as usize + bytes.len()].copy_from_slice(bytes);
             return Ok(());
@@ -186,26 +203,32 @@ impl Gpu {
     /// [`Error::Invalid`] for a part that does not lie in the buffer or is no whole number of items, a failed Vulkan
     /// call, or no memory for the transfer.
     pub fn download<T: Pod>(&self, buffer: &Buffer, part: BufferRef) -> Result<Vec<T>> {
+        let item = size_of::<T>() as u64;
+        self.check_part(buffer, part, item)?;
+        let mut data = vec![T::zeroed(); (part.size / item) as usize];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
+        if let Some(mapped) = buffer.cached() {
+            let at = part.offset as usize;
+            bytes.copy_from_slice(&mapped[at..at + bytes.len()]);
+        } else {
+            self.download_ref(part, bytes)?;
+        }
+        Ok(data)
+    }
+
+    /// Checks that a part lies in a buffer of this device, and is a whole number of items of `item` bytes.
+    fn check_part(&self, buffer: &Buffer, part: BufferRef, item: u64) -> Result<()> {
         // The range is checked as well: the part may be of an earlier buffer whose handle the driver gave out again.
         let within = part.offset.checked_add(part.size).is_some_and(|end| end <= buffer.size());
         if part.buffer != buffer.all().buffer || !within || !self.is_same_device(&buffer.gpu) {
             let text = format!("the part to be read does not lie in the buffer `{}`, or that is on another device", buffer.name());
             return Err(Error::Invalid(text));
         }
-        let item = size_of::<T>() as u64;
         if part.size.checked_rem(item) != Some(0) {
             let text = format!("{} bytes of the buffer `{}`, to be read as items of {item}", part.size, buffer.name());
             return Err(Error::Invalid(text));
         }
-        let mut data = vec![T::zeroed(); (part.size / item) as usize];
-        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut data);
-        if let Some(mapped) = buffer.cached() {
-            let at = part.offset as usize;
-            bytes.copy_from_slice(&mapped[at..at + bytes.len()]);
-            return Ok(data);
-        }
-        self.download_ref(part, bytes)?;
-        Ok(data)
+        Ok(())
     }
 
     /// Reads back the value at the beginning of a part of a buffer.

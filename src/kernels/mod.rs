@@ -1,6 +1,6 @@
 //! The kernels' Rust side, generated from `glsl/` by `build.rs`, and their tuning per device.
 
-use crate::gpu::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
+use crate::gpu::{Access, Arguments, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization};
 
 mod rows;
 mod target;
@@ -14,7 +14,7 @@ fn put(out: &mut [u8], at: usize, bytes: &[u8]) {
 
 mod generated {
     #![allow(clippy::all, clippy::pedantic, unused_variables)]
-    use super::{Access, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization, put};
+    use super::{Access, Arguments, BufferInfo, BufferRef, Kernel, KernelInfo, Specialization, put};
     include!(concat!(env!("OUT_DIR"), "/kernels.rs"));
 }
 pub(crate) use generated::*;
