@@ -189,7 +189,7 @@ struct olbvh_NearState {
     uint code;    // Morton code of the leaf to resume at, or `NONE`: the search has ended.
     uint entry;   // Entries of that leaf already tested.
     uint owner;   // Closest tetrahedron at the surface so far, or `NONE`.
-    float square; // Its squared distance, scaled by (scale·2^19)² of the grid.
+    float square; // Its squared distance, scaled by (scale·2^19)² of the grid; infinite if the search ended without one.
 };
 
 // State of the location of a run of voxels between two dispatches.

@@ -8,7 +8,7 @@
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
-#include "shared/boxes.glsl"
+#include "shared/centre.glsl"
 #include "shared/node.glsl"
 layout(constant_id = 2) const uint FRESH = 1;     // whether the search begins
 layout(constant_id = 3) const uint BUDGET = 1024; // nodes and tetrahedra per point and dispatch
@@ -42,13 +42,12 @@ NearState state;
 vec3 x; // the point in normalised coordinates
 
 // Squared distance of a node's cell, scaled as that of a tetrahedron. Rounding never makes it larger than that of what
-// its cell contains: it is reduced by 2^-20 of the bounds per axis.
+// its cell contains: it is reduced by about 2^-19 of the bounds per axis. Cells are those in normalised coordinates, by
+// which tetrahedra are assigned, since their sides in units of the mesh are rounded by more where that is far from 0.
 float node_square(Node node) {
-    Grid g = grid.at[0];
-    vec3 lo, hi;
-    cell_box(g, node.level, node.code, lo, hi);
-    vec3 below = difference(normalise(g, lo), x), above = difference(x, normalise(g, hi));
-    precise vec3 d = max(max(below, above) * two_to(-21) - 1.0, vec3(0.0));
+    vec3 h = half_cell(grid.at[0], node.level);
+    precise vec3 apart = abs(difference(cell_centre(h, unmorton(node.code)), x)) - h;
+    precise vec3 d = max(apart * two_to(-21) - 2.0, vec3(0.0));
     return dot_product(d, d);
 }
 
@@ -125,6 +124,7 @@ bool measure_all(uint level) {
     uint leaf = WALK_PAUSED;
     for (uint work = 0u; work < BUDGET;) {
         leaf = next_leaf(at, level, work, BUDGET);
+        if (at.code != state.code) state.entry = 0u; // the leaf that had been begun is too far away by now
         if (leaf >= WALK_PAUSED) break;
         uvec2 range = entry_range(leaf);
         uint from = range.x + state.entry, to = min(range.y, from + max(BUDGET - min(work, BUDGET), 1u));
@@ -169,6 +169,7 @@ bool search(uint i) {
         if (FRESH != 0u) begin_close(g.level);
         ended = measure_all(g.level);
     }
+    if (ended && state.owner == NONE) state.square = uintBitsToFloat(0x7f800000u);
     states.at[i] = state;
     if (ended) barycentrics.at[i] = state.owner == NONE ? vec4(0.0) : place_on(state.owner);
     return !ended;

@@ -102,7 +102,7 @@ float box_square(vec3 v[4]) {
 float share(float x, float whole) {
     if (whole <= 0.0) return 0.0;
     precise float r = x * reciprocal(whole);
-    return clamp(r, 0.0, 1.0);
+    return clamp(canonical(r), 0.0, 1.0);
 }
 
 float area(float x, float y, float z, float w) {

@@ -132,10 +132,8 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                 let expected: Vec<_> = points.iter().map(|&p| surface.nearest(p, within)).collect();
                 let places: Vec<_> = expected.iter().map(|place| place.map_or(Location::NOWHERE, |(location, _)| location)).collect();
                 compare_locations(&places, &found.owners, &found.barycentrics, points)?;
-                let bits = |square: Option<f32>| square.map(f32::to_bits);
-                let squares: Vec<_> =
-                    found.owners.iter().zip(&found.squares).map(|(&o, &square)| bits((o != NONE).then_some(square))).collect();
-                compare("query.nearest", "squares", &expected.iter().map(|e| bits(e.map(|e| e.1))).collect::<Vec<_>>(), &squares)?;
+                let squares: Vec<u32> = expected.iter().map(|place| place.map_or(f32::INFINITY, |(_, square)| square).to_bits()).collect();
+                compare("query.nearest", "squares", &squares, &found.squares.iter().map(|s| s.to_bits()).collect::<Vec<_>>())?;
             }
             Ok(())
         }

@@ -166,7 +166,7 @@ mod tests {
         assert!(refused(|t| t.query = 512).contains("query is 512"));
         assert!(refused(|t| t.scan.rows = 0).contains("scan.rows is 0"));
         assert!(refused(|t| t.sort.digit_bits = 13).contains("sort.digit_bits is 13"));
-        assert!(refused(|t| t.sort.digit_bits = 10).contains("41472 bytes of shared memory of 16384"));
+        assert!(refused(|t| t.sort.digit_bits = 10).contains("41480 bytes of shared memory of 16384"));
         assert!(refused(|t| t.sort.rows = 8192).contains("sort.rows is 8192; with ballots, it must be from 1 to 64"));
         let serial = |t: &mut Target| t.sort = SortTarget { serial: true, workgroup: 32, rows: 32_000, digit_bits: 11 };
         assert!(refused(serial).contains("the sort loops 34048 times, 32768 are allowed; sort.rows must be smaller"));

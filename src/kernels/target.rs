@@ -102,9 +102,9 @@ impl SortTarget {
     /// Bytes of shared memory: a table of digits per subgroup or, in the same place, the keys of the tile and then its
     /// values; and two more tables.
     fn shared_bytes(self, subgroup: u32) -> u32 {
-        const TOTALS: u32 = 512; // of subgroups, see workgroup.glsl
+        const OTHERS: u32 = 512 + 8; // totals of subgroups, see workgroup.glsl; two words of the tile
         let (tables, digits) = (self.workgroup / subgroup.max(1), 1 << self.digit_bits);
-        if self.serial { 0 } else { 4 * ((tables * digits).max(self.tile()) + 2 * digits) + TOTALS }
+        if self.serial { 0 } else { 4 * ((tables * digits).max(self.tile()) + 2 * digits) + OTHERS }
     }
 
     /// Loop iterations of an invocation that clears its digits and counts its pairs, if it does so serially.

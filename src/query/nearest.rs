@@ -5,13 +5,16 @@ use super::{PointInput, Progress, Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
-use crate::grid::CellRange;
+use crate::grid::{CellRange, canonical};
 use crate::kernels::{Nearest as NearestKernel, NearestSpec};
 use crate::layout::NearState;
 use crate::primitives::Arena;
 use crate::reference::boundary::NONE;
 use crate::reference::locate::CHUNK;
 use crate::reference::nearest::distance;
+
+/// Points of one submission. Each may take thousands of tests, so they are fewer than in other queries.
+const AT_ONCE: usize = CHUNK / 8;
 
 /// Answers and scratch memory: 32 bytes per point.
 #[derive(Clone, Copy, Debug)]
@@ -38,9 +41,9 @@ impl NearestMemory {
 /// Records the search for the place of the surface that is closest to each point, at most `within` away, in units of the
 /// mesh, and at most 1 / [`crate::layout::Grid::scale`], which is between half of the mesh's largest extent and all of it:
 /// of the faces without neighbour the one with the smallest squared distance (ties: that of the tetrahedron with the lowest
-/// id). Hints and order of the
-/// points are not used. `part` restricts the search to the leaves in these cells, as it must be for a block of a mesh. Each
-/// round tests some thousand nodes and tetrahedra per point and passes over points that are finished.
+/// id). Hints and order of the points are not used. `part` restricts the search to the leaves in these cells, as it must be
+/// for a block of a mesh. Each round tests some thousand nodes and tetrahedra per point and passes over points that are
+/// finished; [`nearest`] searches for 131,072 points at a time, so that no dispatch takes long.
 ///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: a transfer write of `unfinished`, and
 /// compute reads and writes. Last use: compute reads and writes; no barrier before or after.
@@ -61,9 +64,13 @@ pub fn cmd_nearest(
     let n = u64::from(input.count);
     memory.states.check(size_of::<NearState>() as u64 * n, "states of points")?;
     memory.barycentrics.check(16 * n, "barycentrics")?;
-    let (tree, mesh, workgroup) = (&scene.tree, &scene.mesh, r.gpu().target().query);
+    record(r, &arguments(scene, input, within, part, memory), rounds, NearestSpec::default().budget)
+}
+
+fn arguments(scene: &Scene, input: &PointInput, within: f32, part: Option<CellRange>, memory: &NearestMemory) -> NearestKernel {
+    let (tree, mesh) = (&scene.tree, &scene.mesh);
     let [first_cell, last_cell] = part.unwrap_or(CellRange::WHOLE).words();
-    let arguments = NearestKernel {
+    NearestKernel {
         grid: tree.grid,
         masks: tree.masks,
         co: tree.co,
@@ -79,19 +86,25 @@ pub fn cmd_nearest(
         unfinished: memory.unfinished,
         count: input.count,
         stride: input.stride,
-        within,
+        // Not a number finds nothing, like a negative distance: drivers may compare it as they like.
+        within: if within >= 0.0 { canonical(within) } else { -1.0 },
         first_cell,
         last_cell,
-    };
+    }
+}
+
+/// Records the rounds. In each, a point has `budget` nodes and tetrahedra, which must exceed the level of the tree.
+fn record(r: &mut Recorder<'_>, arguments: &NearestKernel, rounds: Rounds, budget: u32) -> Result<()> {
+    let (workgroup, unfinished) = (r.gpu().target().query, arguments.unfinished);
     for round in 0..rounds.count {
         if round > 0 {
             r.barrier("nearest → nearest.clear");
         }
-        r.fill(memory.unfinished, 0);
+        r.fill(unfinished, 0);
         r.barrier("nearest.clear → nearest");
         let fresh = u32::from(round == 0 && !rounds.resume);
-        let spec = NearestSpec { workgroup, fresh, ..Default::default() };
-        r.stage("query.nearest", |r| r.dispatch(&arguments, spec, Groups::Count(input.count.div_ceil(workgroup))))?;
+        let spec = NearestSpec { workgroup, fresh, budget, ..Default::default() };
+        r.stage("query.nearest", |r| r.dispatch(arguments, spec, Groups::Count(arguments.count.div_ceil(workgroup))))?;
     }
     Ok(())
 }
@@ -103,7 +116,7 @@ pub struct Nearest {
     pub owners: Vec<u32>,
     /// Barycentric coordinates of the place, in the order of the tetrahedron's vertices.
     pub barycentrics: Vec<[f32; 4]>,
-    /// Squared distances, as [`NearState::square`].
+    /// Squared distances, as [`NearState::square`]; infinite where nothing was found.
     pub squares: Vec<f32>,
     /// [`crate::layout::Grid::scale`] of the tree.
     pub scale: f32,
@@ -133,10 +146,10 @@ pub fn nearest(
 ) -> Result<Nearest> {
     numbered(points.len())?;
     let (gpu, scene, scale) = (tree.gpu(), Scene::new(mesh, tree)?, tree.grid().scale);
-    let most = points.len().min(CHUNK) as u32;
+    let most = points.len().min(AT_ONCE) as u32;
     let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.nearest", |a| NearestMemory::carve(a, most))?;
     let mut all = Nearest { scale, ..Nearest::default() };
-    for chunk in points.chunks(CHUNK) {
+    for chunk in points.chunks(AT_ONCE) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
@@ -156,4 +169,53 @@ pub fn nearest(
         all.barycentrics.extend(gpu.download::<[f32; 4]>(&buffer, memory.barycentrics.part(0, 16 * u64::from(count)))?);
     }
     Ok(all)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::BadCells;
+    use crate::gpu::{Gpu, GpuOptions};
+    use crate::grid::per_axis;
+    use crate::mesh::kuhn_jittered;
+    use crate::options::BuildOptions;
+    use crate::reference::boundary::topology;
+    use crate::reference::nearest::Surface;
+
+    /// Wherever a round ends, the next one goes on there, also where what was found since excludes that leaf.
+    #[test]
+    fn rounds_of_any_length_find_the_same() {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        let mesh = kuhn_jittered([6, 5, 4], 0.3, 5).unwrap();
+        let topology = topology(&mesh).unwrap();
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let points: Vec<[f32; 3]> = (0..2000u32)
+            .map(|i| per_axis(|c| i.wrapping_mul([0x9e37_79b9, 0x7f4a_7c15, 0xf39c_c060][c]) as f32 / 4_294_967_296.0 * 9.0 - 1.5))
+            .collect();
+        let input = gpu.upload("olbvh.test.points", &points).unwrap();
+        for level in [1, 3, 5] {
+            let options = BuildOptions { level: Some(level), ..BuildOptions::default() };
+            let tree = Tree::build(&gpu, &device, &options).unwrap();
+            let reference = crate::reference::build::build(&mesh, &topology, &options).unwrap();
+            let surface = Surface::new(&mesh, &topology, &reference);
+            let found = |p| surface.nearest(p, f32::INFINITY).map_or((NONE, f32::INFINITY), |(place, square)| (place.owner, square));
+            let expected: Vec<_> = points.iter().map(|&p| found(p)).collect();
+            let input = PointInput { points: input.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
+            let carve = |a: &mut Arena| NearestMemory::carve(a, input.count);
+            let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.nearest", carve).unwrap();
+            let arguments = arguments(&Scene::new(&device, &tree).unwrap(), &input, f32::INFINITY, None, &memory);
+            for budget in [7, 8, 12, 37] {
+                let mut rounds = Rounds::begin(1);
+                let mut count = 0;
+                while count == 0 || gpu.download_one::<u32>(&buffer, memory.unfinished).unwrap() > 0 {
+                    gpu.submit("olbvh.test.nearest", |r| record(r, &arguments, rounds, budget)).unwrap();
+                    rounds = Rounds::resume(1);
+                    count += 1;
+                }
+                let states: Vec<NearState> = gpu.download(&buffer, memory.states.part(0, 16 * points.len() as u64)).unwrap();
+                let wrong = (0..points.len()).filter(|&i| (states[i].owner, states[i].square) != expected[i]).count();
+                assert!(wrong == 0 && count > 3, "level {level}, budget {budget}: {wrong} wrong after {count} rounds");
+            }
+        }
+    }
 }

@@ -1,12 +1,12 @@
 //! The place of the surface that is closest to a point. Twin of `glsl/query/nearest`.
 
+use super::assign::{cell_centre, half_cell};
 use super::boundary::{NONE, Topology};
-use super::leaves::cell_box;
 use super::locate::{Location, place};
 use super::separate::{Closest, box_square, closest_on};
 use super::tet::{Tet, Vec3, dot, sub};
 use super::vertices::Vertices;
-use crate::grid::{per_axis, two_to};
+use crate::grid::{canonical, per_axis, two_to, unmorton};
 use crate::mesh::Mesh;
 use crate::tree::TreeArrays;
 use std::cmp::Reverse;
@@ -35,7 +35,7 @@ impl<'a> Surface<'a> {
     pub fn nearest(&self, p: [f32; 3], within: f32) -> Option<(Location, f32)> {
         let grid = &self.tree.grid;
         let (_, x) = place(grid, p).filter(|_| within >= 0.0)?;
-        let reach = (within * grid.scale).min(1.0) * two_to(19);
+        let reach = (canonical(within) * grid.scale).min(1.0) * two_to(19);
         let (mut least, mut owner) = (reach * reach, NONE);
         // Nearest nodes first. The order of the leaves does not matter, but a close one saves most of the others.
         let mut waiting = BinaryHeap::from([Reverse((0, (0, 0, 0)))]);
@@ -89,10 +89,9 @@ impl<'a> Surface<'a> {
 
     /// Squared distance of a node's cell, never larger than that of what it contains.
     fn square_of(&self, (_, level, code): Node, x: Vec3) -> f32 {
-        let grid = &self.tree.grid;
-        let [x0, y0, z0, x1, y1, z1] = cell_box(grid, level, code);
-        let (below, above) = (sub(grid.normalise([x0, y0, z0]), x), sub(x, grid.normalise([x1, y1, z1])));
-        let d = per_axis(|c| (below[c].max(above[c]) * two_to(-21) - 1.0).max(0.0));
+        let h = half_cell(&self.tree.grid, level);
+        let from = sub(cell_centre(h, unmorton(code)), x);
+        let d = per_axis(|c| ((from[c].abs() - h[c]) * two_to(-21) - 2.0).max(0.0));
         dot(d, d)
     }
 }

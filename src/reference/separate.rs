@@ -133,7 +133,7 @@ fn closest_in_triangle(a: Vec3, b: Vec3, c: Vec3) -> [f32; 3] {
     if d6 >= 0.0 && d5 <= d6 {
         return [0.0, 0.0, 1.0];
     }
-    let part = |x: f32, whole: f32| if whole <= 0.0 { 0.0 } else { (x * reciprocal(whole)).clamp(0.0, 1.0) };
+    let part = |x: f32, whole: f32| if whole <= 0.0 { 0.0 } else { canonical(x * reciprocal(whole)).clamp(0.0, 1.0) };
     let area = |x: f32, y: f32, z: f32, w: f32| canonical(x * y) - canonical(z * w);
     let vc = canonical(area(d1, d4, d3, d2));
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {

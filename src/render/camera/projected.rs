@@ -70,15 +70,17 @@ impl ProjectedView {
             let [corner, right, down] = [f(first.x, first.y), f(first.x + 1.0, first.y), f(first.x, first.y + 1.0)];
             [corner, (right - corner) * dx, (down - corner) * dy].map(|v| v.as_vec3().to_array())
         };
-        let [origins, ways] = [axes(&origin), axes(&way)];
+        let longest = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|[x, y]| way(x, y).length()).into_iter().fold(0.0, f64::max);
+        // Directions of about unit length, so that their squares are neither denormal nor infinite in single precision.
+        let unit = (-longest.log2().floor()).exp2();
+        let [origins, ways] = [axes(&origin), axes(&|x, y| way(x, y) * unit)];
         let from = base - start;
-        let depth = [from, slope, 1.0 + from * bend, slope * bend].map(|v| v as f32);
+        let depth = [from / unit, slope / unit, 1.0 + from * bend, slope * bend].map(|v| v as f32);
         let right = (origin(1.0, 0.0) - origin(-1.0, 0.0)).normalize();
         let up = (origin(0.0, -1.0) - origin(0.0, 1.0)).normalize();
         let ahead = way(0.0, 0.0);
         let forward = up.cross(right).normalize() * up.cross(right).dot(ahead).signum();
         let behind = (farthest - start).max(0.0);
-        let longest = [[-1.0, -1.0], [1.0, -1.0], [-1.0, 1.0], [1.0, 1.0]].map(|[x, y]| way(x, y).length()).into_iter().fold(0.0, f64::max);
         Ok(View {
             right,
             up,

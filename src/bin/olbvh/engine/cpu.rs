@@ -78,7 +78,7 @@ impl Engine for Cpu {
     fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
-            let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::NAN)), report);
+            let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report);
             Ok(Nearest {
                 owners: found.iter().map(|(location, _)| location.owner).collect(),
                 barycentrics: found.iter().map(|(location, _)| location.barycentric).collect(),

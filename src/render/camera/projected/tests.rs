@@ -102,3 +102,23 @@ fn matrices_that_show_nothing_are_refused() {
         assert!(error.to_string().contains(why), "{error}");
     }
 }
+
+/// A scene that is 2^80 times as large, or as small, is seen by the same rays.
+#[test]
+fn scenes_of_any_size_are_seen_alike() {
+    for (name, projected) in views() {
+        let as_it_is = projected.view(SIZE, &BOX).unwrap().rays;
+        for exponent in [-80, 80] {
+            let (scale, to_unit) = (2f32.powi(exponent), DMat4::from_scale(DVec3::splat(2f64.powi(-exponent))));
+            let scaled = ProjectedView { to_clip: projected.to_clip * to_unit, ..projected };
+            let bounds = Bounds { lo: BOX.lo.map(|v| v * scale), hi: BOX.hi.map(|v| v * scale) };
+            let rays = scaled.view(SIZE, &bounds).unwrap().rays;
+            for (x, y) in [(0, 0), (63, 0), (20, 47)] {
+                let ([_, a], [_, b]) = (as_it_is.ray(x, y).into(), rays.ray(x, y).into());
+                assert!((0..3).all(|c| (a[c] - b[c]).abs() < 1e-6), "{name}, 2^{exponent}: {a:?} {b:?}");
+                let [a, b] = [as_it_is.steps_to(x, y, 0.5, 10.0), rays.steps_to(x, y, 0.5, 10.0 / scale)];
+                assert!((a - b).abs() <= 1e-3 * a.abs(), "{name}, 2^{exponent}: {a} {b}");
+            }
+        }
+    }
+}
