@@ -187,7 +187,8 @@ typedef struct olbvh_tree_info_data {
  */
 typedef struct olbvh_host_requirements {
   /*
-   The first queue family with compute; any other family with compute works as well.
+   The queue family that this library would take for itself, preferably one without graphics. Any family with compute
+   works; a renderer takes one with graphics as well.
    */
   uint32_t queue_family;
   /*
@@ -600,7 +601,7 @@ typedef struct olbvh_owner_parts_data {
 /*
  Memory for the closest places of the surface, and where in it the results are.
  */
-typedef struct OlbvhNearestParts {
+typedef struct olbvh_nearest_parts_data {
   /*
    Size of the memory in bytes.
    */
@@ -619,7 +620,7 @@ typedef struct OlbvhNearestParts {
    A word: the number of points that need another round.
    */
   struct olbvh_buffer unfinished;
-} OlbvhNearestParts;
+} olbvh_nearest_parts_data;
 
 /*
  How many dispatches are recorded for work whose length is not known in advance. Each dispatch does a bounded amount
@@ -809,8 +810,8 @@ typedef struct olbvh_slicing_parts_data {
   struct olbvh_buffer values;
   /*
    Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
-   used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are more than twice as
-   large as the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
+   used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are larger than two to
+   four times the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
    touches, voxels that it does not touch.
    */
   struct olbvh_buffer status;
@@ -1253,7 +1254,7 @@ enum olbvh_status olbvh_cmd_owners(struct olbvh_recording *recording,
  */
 enum olbvh_status olbvh_nearest_parts(uint32_t count,
                                       struct olbvh_buffer memory,
-                                      struct OlbvhNearestParts *out);
+                                      struct olbvh_nearest_parts_data *out);
 
 /*
  Records the search for the place of the surface that is closest to each point, as `olbvh_nearest` finds it. Of

@@ -3,10 +3,12 @@
 //!
 //! # Guide
 //! 1. Make [`OLBVH`] available to your shader compiler as `olbvh.glsl` (it is also checked in as `include/olbvh.glsl`),
-//!    and include it in any stage immediately after `#version`. All its names start with `olbvh_` or `OLBVH_`.
+//!    and include it in any stage immediately after `#version` and the macros that are named below. All its names start with
+//!    `olbvh_` or `OLBVH_`. Compile for Vulkan 1.2; glslang wants
+//!    `#extension GL_GOOGLE_include_directive : require`.
 //! 2. Fill a buffer with [`SceneBuffers::addresses`] once; they stay valid as long as the arrays stay where they are.
-//!    The buffer's device address, a `uvec2` whose value is a multiple of 8, identifies the tree: pass it to the shader
-//!    in any way, call `olbvh_open(tree)` once per invocation, and then use:
+//!    Its usage flags are those of [`crate::gpu::Gpu::usage`]. Its device address, a `uvec2` with the low word first, whose
+//!    value is a multiple of 8, identifies the tree: pass it to the shader in any way, call `olbvh_open(tree)` once per invocation, and then use:
 //!
 //!    - `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)`: owner of a point or `OLBVH_NONE`, and its
 //!      barycentric coordinates; the usual tolerance is 1e-5
@@ -22,18 +24,20 @@
 //!      `bool olbvh_visit_node(olbvh_Node)` (descend?) and `bool olbvh_visit_leaf(olbvh_Node)` (done?)
 //!
 //! 3. Without buffer addresses define `OLBVH_DESCRIPTORS`, and bind [`SceneBuffers::list`] as storage buffers of set
-//!    `OLBVH_SET`, starting at binding `OLBVH_BINDING`; the argument of `olbvh_open` is then ignored.
+//!    `OLBVH_SET`, starting at binding `OLBVH_BINDING`; the argument of `olbvh_open` is then ignored. Check that the device has
+//!    `maxPerStageDescriptorStorageBuffers` for [`SceneBuffers::COUNT`] and your own.
 //! 4. Mesh and tree must be visible to your stage: after [`crate::build::cmd_build`] record a barrier from compute and
-//!    transfer writes to shader reads. A queue of another family also needs a semaphore and, with exclusive sharing, a
+//!    transfer writes to shader reads, and one from your stage to compute shaders and transfers before the tree is built
+//!    again in the same memory. A queue of another family also needs a semaphore and, with exclusive sharing, a
 //!    transfer of ownership.
 //!
 //! From C, `olbvh_scene_arrays` returns addresses and bindings, and `olbvh_tree_info` describes a tree in memory owned
 //! by the library.
 //!
 //! To use several trees by address, call `olbvh_open` again. Every function that you call is compiled into your shader
-//! as often as you call it, and they are long: call each at one place, in a loop. Answers are the same bytes as those of [`crate::query::locate`]. A
-//! leaf's list is searched in one go, so on drivers that limit the time of a draw prefer a small α, or
-//! `Lists::Boundary`.
+//! as often as you call it, and they are long: call each at one place, in a loop. Answers are the same bytes as those of
+//! [`crate::query::locate`]. A leaf's list is searched in one go, so on drivers that limit the time of a draw prefer a
+//! small α, or `Lists::Boundary`.
 
 use crate::build::{MeshView, TreeMemory};
 use crate::gpu::BufferRef;

@@ -48,7 +48,9 @@
 //!
 //! /// Records into your command buffer; `r` comes from `Recorder::new(&gpu, commands, None)`, which is unsafe.
 //! fn record(r: &mut Recorder, frame: &Frame, asked: &PointInput, found: &LocateOutput) -> Result<()> {
-//!     r.barrier("frame before → mesh"); // `r` does not see what earlier recordings do with the same memory
+//!     // For the compute shaders and transfers of the frame before, which `r` does not see. If a draw of that frame reads
+//!     // this memory, its stage needs a barrier of yours.
+//!     r.barrier("frame before → mesh");
 //!     cmd_prepare_mesh(r, &frame.input, &frame.arrays, &frame.scratch)?; // positions must be visible to compute shaders
 //!     r.barrier("mesh → tree");
 //!     let mesh = MeshView { input: frame.input, arrays: frame.arrays };
@@ -62,22 +64,22 @@
 //! - **Your scene**: draw what is opaque, copy the depth attachment to a buffer (a `D32_SFLOAT` as it is, with a barrier from
 //!   the transfer to compute shaders), and record [`query::cmd_render`] with it ([`query::RenderInput::depth`]) and with the
 //!   view of your matrix ([`render::Plan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over
-//!   your picture: `color.rgb + (1 − color.a)·yours`.
+//!   your picture: `color.rgb + (1 − color.a)·yours`, where yours are sRGB values as well: after tone mapping, and through a
+//!   view whose format is `UNORM`, not `SRGB`.
 //! - **Frames in flight**: whatever is written in every frame needs its own memory per frame in flight, or a barrier
 //!   between frames. So do descriptor pools on devices without buffer addresses. Data that does not change (cells,
 //!   fields) can be shared.
 //! - **Queues**: a [`gpu::Gpu`] records for one queue family. Semaphores and timelines are yours: recording submits
 //!   nothing. Only the owning calls ([`build::DeviceMesh::upload`], [`build::Tree::build`], [`query::locate`] …) and
-//!   [`gpu::Gpu::run`], which runs what you record on a device that this crate has opened, submit, under the queue's
-//!   lock, and wait for a fence.
+//!   [`gpu::Gpu::run`], which runs what you record, submit, under the queue's lock, and wait for a fence.
 //! - **Threads**: everything is [`Send`] and [`Sync`], except that a [`gpu::Recorder`] belongs to one thread.
 //! - **A lost device** is reported as an [`Error::Vulkan`] with its `vk::Result`, by the call that waited. Drop
 //!   everything and start again with a new device.
 //!
 //! # Layers
 //! Dependencies point one way. Without Vulkan: [`layout`], [`grid`], [`mesh`], [`options`] ← [`tree`], [`render`],
-//! [`slicing`] ← [`mod@reference`]. With it: [`gpu`], [`kernels`] and [`primitives`], one layer, because no device is
-//! opened without a self-test ← [`build`] ← [`query`] ← [`blocks`], [`baseline`], [`conformance`], the C interface ←
+//! [`slicing`] ← [`mod@reference`]. With it: [`gpu`], [`kernels`] and [`primitives`], one layer, because opening a
+//! device runs the self-test, which uses kernels ← [`build`] ← [`query`] ← [`blocks`], [`baseline`], [`conformance`], the C interface ←
 //! `bench` ← `tune` ← program. `tests/rules.rs` has the whole order and holds the code to it.
 //!
 //! - **Recording functions**, named `cmd_*`, append to a [`gpu::Recorder`]: the command buffer and the memory are the

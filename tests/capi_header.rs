@@ -33,4 +33,6 @@ fn the_header_in_the_repository_is_the_generated_one() {
         fs::write(&header, generated).unwrap();
     }
     assert!(same, "include/olbvh.h is old; OLBVH_BLESS=1 writes it anew");
+    let text = fs::read_to_string(header).unwrap();
+    assert!(!text.contains("struct Olbvh"), "a struct lacks its name in C: `[export.rename]` of .config/cbindgen.toml");
 }

@@ -55,7 +55,7 @@ pub struct BuildScratch {
 
 impl BuildScratch {
     /// Takes the scratch memory for a mesh of `tets` tetrahedra, bad ones included, within `capacity` and the capacity
-    /// of `options`. If that is at least `tets` candidates, there is a tree for every mesh.
+    /// of `options`, at least `tets` candidates; then there is a tree for every mesh.
     ///
     /// # Errors
     /// [`Error::TooLarge`] for a capacity of fewer entries than tetrahedra or for sizes that shaders cannot number,
@@ -100,7 +100,7 @@ impl BuildScratch {
 /// entries than there are tetrahedra. `tree.status` reports the level that was built, or, where a budget or
 /// [`Capacity::entries`] is too small for the root, that nothing was.
 ///
-/// `scratch` must be carved for that capacity and these options. The first use of `tree` and `scratch` is a transfer or
+/// `scratch` must be carved for that capacity and options with the same `assign`, `lists`, `boxes` and `capacity`. The first use of `tree` and `scratch` is a transfer or
 /// compute write. `mesh` is read by compute shaders and transfers. The last use is a compute write, followed by a
 /// barrier to compute, transfer and indirect reads.
 ///

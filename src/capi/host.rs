@@ -12,7 +12,8 @@ use std::sync::{Arc, Mutex};
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct OlbvhHostRequirements {
-    /// The first queue family with compute; any other family with compute works as well.
+    /// The queue family that this library would take for itself, preferably one without graphics. Any family with compute
+    /// works; a renderer takes one with graphics as well.
     pub queue_family: u32,
     /// Not 0: the device has the feature `bufferDeviceAddress`. Without it, buffers are bound by descriptors.
     pub buffer_addresses: u32,

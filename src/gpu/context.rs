@@ -216,7 +216,7 @@ impl Gpu {
     /// Runs the self-test with these tuning parameters, as opening a device does.
     ///
     /// # Errors
-    /// [`Error::SelfTest`].
+    /// [`Error::SelfTest`], or [`Error::Invalid`] if the host lent no queue.
     pub fn self_test(&self) -> Result<()> {
         crate::primitives::self_test(self)
     }

@@ -42,7 +42,7 @@ pub struct HostDevice {
     /// Family of the queues that the recorded commands are submitted to; it must support compute.
     pub family: u32,
     /// A queue of that family with the lock that the host also takes for its own submissions; used by the owning calls
-    /// and the start-up self-test. `None`: only the `cmd_*` functions can be used.
+    /// and the start-up self-test. `None`: only the `cmd_*` functions can be used, and the device is not tested.
     pub queue: Option<Arc<dyn HostQueue>>,
     /// The host's allocator, made with `buffer_device_address` if that is enabled. `None`: this crate makes its own.
     pub allocator: Option<Arc<Mutex<Allocator>>>,

@@ -45,6 +45,14 @@ enum Pools<'a> {
 }
 
 /// Records into one command buffer.
+///
+/// What holds for all `cmd_*` functions, unless one says otherwise: it reads its input in compute shaders, uses its
+/// memory in compute shaders and transfers, writes its results in compute shaders, and records no barrier before or after
+/// itself. So before anything reads the results or uses the memory again, record [`Recorder::barrier`], or a barrier of
+/// your own. [`Recorder::finish`] names two commands of this recorder that lack one between them.
+///
+/// A function that returns an error may have recorded a part of its work: do not submit the command buffer then, but
+/// reset it and start the recording again.
 pub struct Recorder<'a> {
     gpu: &'a Gpu,
     pub(super) commands: vk::CommandBuffer,
@@ -212,7 +220,10 @@ impl<'a> Recorder<'a> {
         Ok(())
     }
 
-    /// Makes everything written so far visible to everything that follows. `label` names the writer and the reader.
+    /// Makes what compute shaders and transfers wrote visible to the compute shaders, transfers and indirect commands that
+    /// follow, and lets these wait for what such commands read. No other stage is covered: before a draw or the host
+    /// reads results, and before memory that a draw reads is written again, record a barrier of your own, and report it
+    /// with [`Recorder::host_barrier`]. `label` names the writer and the reader.
     pub fn barrier(&mut self, label: &'static str) {
         let stages = vk::PipelineStageFlags::COMPUTE_SHADER | vk::PipelineStageFlags::TRANSFER;
         let writes = vk::AccessFlags::SHADER_WRITE | vk::AccessFlags::TRANSFER_WRITE;

@@ -33,7 +33,8 @@ impl RayTracing {
 pub struct Requirements {
     /// What the device lacks; empty if it meets the requirements.
     pub missing: Vec<String>,
-    /// Device extensions to enable: the preferred ones that the device supports.
+    /// Device extensions that the device supports of those that are of use, ray tracing for the baselines included. A host
+    /// enables [`Requirements::extensions_without_rays`].
     pub extensions: Vec<&'static CStr>,
     /// Whether buffers can be passed by address; otherwise descriptors are used.
     pub buffer_addresses: bool,
@@ -48,7 +49,8 @@ pub struct Requirements {
     pub subgroup_sizes: [u32; 3],
     /// Most subgroups of a workgroup if a subgroup size is required.
     pub(crate) workgroup_subgroups: u32,
-    /// A queue family with compute, and the number of valid bits of its timestamps.
+    /// The queue family that this crate would take for itself, preferably one without graphics, and the number of valid
+    /// bits of its timestamps. A host may take any with compute, and a renderer wants one with graphics.
     pub queue_family: Option<(u32, u32)>,
 }
 

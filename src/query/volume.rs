@@ -38,18 +38,19 @@ const BLOCK: u32 = 8;
 /// the device executes the commands, so new contents need no new recording.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderInput {
-    /// Width and height in pixels.
+    /// Width and height in pixels, those of the settings that the view was made with; of a part, its own height.
     pub size: [u32; 2],
     /// [`RenderView`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
     pub view: BufferRef,
-    /// Draws iso-surfaces, for the values that the view has, instead of the volume.
+    /// Draws iso-surfaces, for the values that the view has, instead of the volume. View and table must have been made for
+    /// the same: it is the opposite of `plan.iso.is_empty()`.
     pub iso: bool,
     /// The transfer function: [`TABLE_SIZE`] times four floats, as in [`crate::render::Plan::table`].
     pub table: BufferRef,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
     pub field: (BufferRef, On),
-    /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes
-    /// them. Without normals, samples are not lit.
+    /// A normal per point of the mesh, three floats of length up to 1, as [`crate::render::shading_normals`] makes them, for
+    /// iso-surfaces [`crate::render::gradient_normals`]. Without normals, samples are not lit.
     pub normals: Option<BufferRef>,
     /// A depth buffer, behind which nothing is drawn: a 32-bit float per pixel of this picture or part, row 0 on top, such as
     /// a copy of a depth attachment (`D32_SFLOAT`) has. [`crate::render::RayGrid::depth`] of the view says what its values
@@ -172,7 +173,38 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// Each round takes a limited number of samples of each ray (1,024, fewer if the structure is searched for them) and
 /// skips rays that are finished. After the recorded rounds [`RenderStatus::unfinished`] says how many rays are left, and
 /// the picture holds what has been gathered so far. Recording again with [`Rounds::resume`] (same input, same memory)
-/// continues the work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished.
+/// continues the work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished. A renderer that does not read back
+/// records a fixed number of rounds, and reads the status a few frames later.
+///
+/// A picture in the scene of a renderer; see [`crate::render::Plan::with_projected`] for the plan:
+///
+/// ```no_run
+/// use olbvh::{build::cmd_ranges, gpu::{BufferRef, Recorder}, mesh::On, query::*, render::Plan, Result};
+///
+/// /// Buffers of yours with plan.view(), plan.table and plan.visible_values; with the field and its ranges in the nodes
+/// /// (range_bytes); and with a copy of your depth attachment.
+/// struct Yours { view: BufferRef, table: BufferRef, values: BufferRef, field: BufferRef, ranges: BufferRef, depth: BufferRef }
+///
+/// /// `memory` is that of RenderMemory::carve(arena, size, Some(&scene.tree.capacity)).
+/// fn draw(r: &mut Recorder, scene: &Scene, plan: &Plan, size: [u32; 2], yours: &Yours, memory: &RenderMemory) -> Result<()> {
+///     let field = (yours.field, On::Points);
+///     cmd_ranges(r, &scene.mesh, &scene.tree, field, yours.ranges)?; // for a new tree, or new values; ends with a barrier
+///     // A barrier of yours: what you uploaded, and the copy of the depths, to compute shaders.
+///     let visibility = Visibility { ranges: yours.ranges, values: yours.values, count: plan.visible_values.len() as u32 };
+///     let input = RenderInput {
+///         size,
+///         view: yours.view,
+///         iso: !plan.iso.is_empty(),
+///         table: yours.table,
+///         field,
+///         normals: None,
+///         depth: Some(yours.depth),
+///         visibility: Some(visibility),
+///         part: None,
+///     };
+///     cmd_render(r, &StructureView::from(scene), &input, memory, Rounds::begin(2))
+/// } // then a barrier of yours from compute shaders to the shader that blends memory.colors
+/// ```
 ///
 /// Entry: mesh, structure and input are read by compute shaders; the flags of a structure whose nodes are skipped are
 /// also read by transfers. First use of `memory`: transfer and compute writes; when resumed, a transfer write of the

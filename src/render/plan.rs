@@ -104,6 +104,10 @@ impl Plan {
 
     /// As [`Plan::new`], but with the view of a renderer instead of the camera of the settings.
     ///
+    /// `bounds` contain the mesh in every frame that is drawn with this plan: nothing is drawn that is nearer than their
+    /// nearest corner. The usual step and the unit of opacity are parts of their diagonal. So give a mesh that moves one box
+    /// that holds all its positions.
+    ///
     /// # Errors
     /// As [`Plan::new`], and if the matrix has no inverse, or planes of equal depth that are not parallel to the picture.
     pub fn with_projected(

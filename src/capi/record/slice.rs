@@ -42,8 +42,8 @@ pub struct OlbvhSlicingParts {
     /// A float per voxel: the value, NaN if the voxel is empty; not written without a field.
     pub values: OlbvhBuffer,
     /// Words, counted from 0. Words 0 and 1: runs of voxels, and voxels, that need another round; nothing else may be
-    /// used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are more than twice as
-    /// large as the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
+    /// used until both are 0. Word 2: why all voxels are empty (1: the boxes are flat, 2: they are larger than two to
+    /// four times the mesh), or 0. Words 3 to 5: voxels whose centre lies in the mesh, voxels that the mesh merely
     /// touches, voxels that it does not touch.
     pub status: OlbvhBuffer,
 }
