@@ -4,11 +4,11 @@
 //! # Guide
 //! 1. Make [`OLBVH`] available to your shader compiler as `olbvh.glsl` (it is also checked in as `include/olbvh.glsl`),
 //!    and include it in any stage immediately after `#version` and the macros that are named below. All its names start with
-//!    `olbvh_` or `OLBVH_`. Compile for Vulkan 1.2; glslang wants
-//!    `#extension GL_GOOGLE_include_directive : require`.
+//!    `olbvh_` or `OLBVH_`. Compile for Vulkan 1.2; glslang wants `#extension GL_GOOGLE_include_directive : require`.
 //! 2. Fill a buffer with [`SceneBuffers::addresses`] once; they stay valid as long as the arrays stay where they are.
-//!    Its usage flags are those of [`crate::gpu::Gpu::usage`]. Its device address, a `uvec2` with the low word first, whose
-//!    value is a multiple of 8, identifies the tree: pass it to the shader in any way, call `olbvh_open(tree)` once per invocation, and then use:
+//!    The buffer's usage flags are those of [`crate::gpu::Gpu::usage`]. Its device address, a `uvec2` with the low word
+//!    first, whose value is a multiple of 8, identifies the tree: pass it to the shader in any way, call
+//!    `olbvh_open(tree)` once per invocation, and then use:
 //!
 //!    - `uint olbvh_locate(vec3 place, float tolerance, out vec4 weights)`: owner of a point or `OLBVH_NONE`, and its
 //!      barycentric coordinates; the usual tolerance is 1e-5

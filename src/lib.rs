@@ -79,8 +79,8 @@
 //! # Layers
 //! Dependencies point one way. Without Vulkan: [`layout`], [`grid`], [`mesh`], [`options`] ← [`tree`], [`render`],
 //! [`slicing`] ← [`mod@reference`]. With it: [`gpu`], [`kernels`] and [`primitives`], one layer, because opening a
-//! device runs the self-test, which uses kernels ← [`build`] ← [`query`] ← [`blocks`], [`baseline`], [`conformance`], the C interface ←
-//! `bench` ← `tune` ← program. `tests/rules.rs` has the whole order and holds the code to it.
+//! device runs the self-test, which uses kernels ← [`build`] ← [`query`] ← [`blocks`], [`baseline`], [`conformance`],
+//! the C interface ← `bench` ← `tune` ← program. `tests/rules.rs` has the whole order and holds the code to it.
 //!
 //! - **Recording functions**, named `cmd_*`, append to a [`gpu::Recorder`]: the command buffer and the memory are the
 //!   caller's, and nothing is submitted, waited for or allocated. Counts stay on the device.

@@ -100,9 +100,9 @@ impl BuildScratch {
 /// entries than there are tetrahedra. `tree.status` reports the level that was built, or, where a budget or
 /// [`Capacity::entries`] is too small for the root, that nothing was.
 ///
-/// `scratch` must be carved for that capacity and options with the same `assign`, `lists`, `boxes` and `capacity`. The first use of `tree` and `scratch` is a transfer or
-/// compute write. `mesh` is read by compute shaders and transfers. The last use is a compute write, followed by a
-/// barrier to compute, transfer and indirect reads.
+/// `scratch` must be carved for that capacity and options with the same `assign`, `lists`, `boxes` and `capacity`. The
+/// first use of `tree` and `scratch` is a transfer or compute write. `mesh` is read by compute shaders and transfers. The
+/// last use is a compute write, followed by a barrier to compute, transfer and indirect reads.
 ///
 /// # Errors
 /// [`crate::Error::Invalid`] for α or a level outside 0…10, and for a mesh, a tree or options that `scratch` was not carved

@@ -141,7 +141,8 @@ impl Codec {
                 let appended = self.appended.as_ref().ok_or_else(|| place(source, array, "the file has no appended data"))?;
                 let start = usize::try_from(*offset).ok().and_then(|o| appended.range.start.checked_add(o));
                 let start = start.filter(|&s| s < appended.range.end);
-                let start = start.ok_or_else(|| place(source, array, &format!("offset {offset} lies beyond the end of the file")))?;
+                let beyond = || format!("offset {offset} lies beyond the end of the file, which seems to be cut off; copy it again");
+                let start = start.ok_or_else(|| place(source, array, &beyond()))?;
                 let range = start..appended.range.end;
                 Ok(if appended.base64 { Stream::Base64(source, vec![range]) } else { Stream::Raw(source, range) })
             }

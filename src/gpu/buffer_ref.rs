@@ -25,7 +25,7 @@ pub struct BufferRef {
 impl BufferRef {
     /// A part of the host's buffer: `size` bytes, starting at `offset`. `address` is the device address of the first
     /// byte, or 0 if the device has no buffer addresses. Memory for an [`crate::primitives::Arena`] begins at a multiple of
-    /// [`super::ALIGNMENT`]; so does whatever kernels are given as a descriptor.
+    /// [`super::ALIGNMENT`]; what is bound by descriptors, at one of the device's `minStorageBufferOffsetAlignment`.
     ///
     /// # Safety
     /// The buffer belongs to the device that the part is used on, has the usage flags of [`super::Gpu::usage`], and has
