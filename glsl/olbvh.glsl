@@ -42,7 +42,7 @@ const uint NONE = OLBVH_NONE;
 // Records of four words are read as they are. Kernels of the library can also read them as two 64-bit words.
 uvec4 words(uvec4 record) { return record; }
 vec4 floats(vec4 record) { return record; }
-#include "shared/layout.glsl"
+#include "shared/scene.glsl"
 
 OLBVH_BUFFER(0, 8, SceneAddresses, scene)
 OLBVH_BUFFER(1, 16, Grid, grid)

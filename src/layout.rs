@@ -1,4 +1,4 @@
-//! Structs shared by host and device, generated from `glsl/shared/layout.glsl` by reflection.
+//! Structs shared by host and device, generated from `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection.
 
 #![allow(clippy::doc_markdown)]
 

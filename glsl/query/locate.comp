@@ -6,6 +6,7 @@
 // src/reference/locate.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/tree_buffers.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint GUIDE = 0; // what `guides` holds: 0 (nothing), HINTS or ORDER
@@ -19,12 +20,7 @@ ARGUMENTS(13)
     uint last;   // not 0: lists end in this part
     float tolerance;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, uint, masks)
-BUFFER(2, readonly, uint, co)
-BUFFER(3, readonly, uint, po)
-BUFFER(4, readonly, uint, p)
-BUFFER(5, readonly, uint, flags)
+TREE(0)
 RECORDS(6, uvec4, cells)
 RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)

@@ -3,6 +3,7 @@
 // tests the point's cell, in integers.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/tree_buffers.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/node.glsl"
@@ -14,12 +15,7 @@ ARGUMENTS(12)
     uint stride;
     float tolerance;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, uint, masks)
-BUFFER(2, readonly, uint, co)
-BUFFER(3, readonly, uint, po)
-BUFFER(4, readonly, uint, p)
-BUFFER(5, readonly, uint, flags)
+TREE(0)
 RECORDS(6, uvec4, cells)
 RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, points)

@@ -5,6 +5,7 @@
 // Morton order. Twin of src/reference/nearest.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/tree_buffers.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/separate.glsl"
@@ -19,12 +20,7 @@ ARGUMENTS(13)
     uint first_cell;
     uint last_cell;
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid)
-BUFFER(1, readonly, uint, masks)
-BUFFER(2, readonly, uint, co)
-BUFFER(3, readonly, uint, po)
-BUFFER(4, readonly, uint, p)
-BUFFER(5, readonly, uint, flags)
+TREE(0)
 RECORDS(6, uvec4, cells)
 RECORDS(7, vec4, vertices)
 RECORDS(8, uvec4, neighbours)

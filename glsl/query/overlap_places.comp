@@ -4,6 +4,7 @@
 // PART_LENGTH entries per dispatch. Twin of src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/tree_buffers.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint PART_LENGTH = 16384;
@@ -12,12 +13,7 @@ ARGUMENTS(13)
     uint stride; // floats from one point to the next
     uint part;  // number of this dispatch
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `vertices`
-BUFFER(1, readonly, uint, masks)
-BUFFER(2, readonly, uint, co)
-BUFFER(3, readonly, uint, po)
-BUFFER(4, readonly, uint, p)
-BUFFER(5, readonly, uint, flags)
+TREE(0) // of the other mesh, like all up to `vertices`
 RECORDS(6, uvec4, cells)
 RECORDS(7, vec4, vertices)
 BUFFER(8, readonly, float, own_positions)

@@ -3,6 +3,7 @@
 // non-boundary nodes, then to the lists of boundary leaves. Twin of src/reference/overlap.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/tree_buffers.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 #include "shared/node.glsl"
@@ -16,12 +17,7 @@ layout(constant_id = 5) const uint STRIDE = 3;
 ARGUMENTS(15)
     uint most; // length of `waiting`
 END_ARGUMENTS
-BUFFER16(0, readonly, Grid, grid) // of the other mesh, like all up to `positions`
-BUFFER(1, readonly, uint, masks)
-BUFFER(2, readonly, uint, co)
-BUFFER(3, readonly, uint, po)
-BUFFER(4, readonly, uint, p)
-BUFFER(5, readonly, uint, flags)
+TREE(0) // of the other mesh, like all up to `positions`
 RECORDS(6, uvec4, cells)
 BUFFER(7, readonly, float, positions)
 RECORDS(8, uvec4, own_cells)

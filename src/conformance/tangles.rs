@@ -2,9 +2,11 @@
 //! a point (SPEC 3.1), so answers may differ between trees without any fault of the device.
 
 use super::failure::Verdict;
-use super::twin::Twin;
 use crate::options::{BuildOptions, Lists};
+use crate::mesh::Mesh;
+use crate::reference::boundary::Topology;
 use crate::reference::locate::{Locator, place};
+use crate::reference::vertices::Vertices;
 use rayon::prelude::*;
 
 /// Weights of the sample points of a tetrahedron: its centre, and points between that and each vertex, each edge and
@@ -20,20 +22,20 @@ const SAMPLES: [[f32; 4]; 15] = [
 
 /// Two tetrahedra of a mesh that overlap, in words: both on the same side of the face that they share (a fold), or both
 /// with a sample point strictly inside. `None` if there are none.
-pub(super) fn overlap(twin: &Twin) -> Verdict<Option<String>> {
-    let tets = || (0..twin.mesh.tets.len() as u32).into_par_iter().filter(|&t| twin.topology.is_valid(t));
-    if let Some([s, t]) = tets().find_map_first(|t| folded(twin, t)) {
+pub(super) fn overlap(mesh: &Mesh, topology: &Topology, vertices: &Vertices) -> Verdict<Option<String>> {
+    let tets = || (0..mesh.tets.len() as u32).into_par_iter().filter(|&t| topology.is_valid(t));
+    if let Some([s, t]) = tets().find_map_first(|t| folded(mesh, topology, vertices, t)) {
         return Ok(Some(format!("tetrahedra {s} and {t} lie on the same side of their common face")));
     }
     let full = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
-    let tree = crate::reference::build::build(&twin.mesh, &twin.topology, &full)?;
-    let locator = Locator::new(&twin.mesh, &twin.topology, &tree);
+    let tree = crate::reference::build::build(mesh, topology, &full)?;
+    let locator = Locator::new(mesh, topology, &tree);
     let twice = |t: u32| {
-        let corners = twin.mesh.tets[t as usize].map(|v| twin.mesh.points[v as usize]);
+        let corners = mesh.tets[t as usize].map(|v| mesh.points[v as usize]);
         SAMPLES.iter().find_map(|w| {
             let p = [0, 1, 2].map(|c| (0..4).map(|i| w[i] * corners[i][c]).sum::<f32>());
             let (_, x) = place(&tree.grid, p)?;
-            let clear = |&t: &u32| twin.vertices.tet(twin.mesh.tets[t as usize]).weights(x).clear;
+            let clear = |&t: &u32| vertices.tet(mesh.tets[t as usize]).weights(x).clear;
             let mut inside = locator.owners(p).into_iter().filter(clear);
             Some(format!("tetrahedra {} and {} both contain {p:?}", inside.next()?, inside.next()?))
         })
@@ -42,33 +44,36 @@ pub(super) fn overlap(twin: &Twin) -> Verdict<Option<String>> {
 }
 
 /// Tetrahedron `t` and a neighbour that lies on the same side of their common face.
-fn folded(twin: &Twin, t: u32) -> Option<[u32; 2]> {
+fn folded(mesh: &Mesh, topology: &Topology, vertices: &Vertices, t: u32) -> Option<[u32; 2]> {
     // The side of the face opposite to `vertex` on which that vertex lies, as the sign of a volume.
     let side = |ids: [u32; 4], vertex: u32| {
-        let (rank, volume) = (ids.iter().filter(|&&v| v < vertex).count(), twin.vertices.tet(ids).volume());
+        let (rank, volume) = (ids.iter().filter(|&&v| v < vertex).count(), vertices.tet(ids).volume());
         if rank % 2 == 1 { volume } else { -volume }
     };
-    let ids = twin.mesh.tets[t as usize];
+    let ids = mesh.tets[t as usize];
     let is_fold = |i: &usize| {
-        let theirs = twin.topology.neighbours[t as usize][*i];
-        let theirs = twin.mesh.tets.get(theirs as usize);
+        let theirs = topology.neighbours[t as usize][*i];
+        let theirs = mesh.tets.get(theirs as usize);
         theirs.is_some_and(|&theirs| {
             let opposite = theirs.into_iter().find(|v| !ids.contains(v)).unwrap_or(ids[*i]);
             let (a, b) = (side(ids, ids[*i]), side(theirs, opposite));
             (a > 0.0 && b > 0.0) || (a < 0.0 && b < 0.0)
         })
     };
-    (0..4).find(is_fold).map(|i| [t, twin.topology.neighbours[t as usize][i]])
+    (0..4).find(is_fold).map(|i| [t, topology.neighbours[t as usize][i]])
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::meshes::recipes;
     use super::*;
+    use crate::reference::boundary::topology;
 
     fn of(name: &str) -> Option<String> {
-        let twin = Twin::new(&recipes().find(|r| r.name == name).unwrap());
-        overlap(&twin.unwrap_or_else(|_| panic!("{name}"))).unwrap_or_else(|_| panic!("{name}"))
+        let mesh = recipes().find(|r| r.name == name).unwrap().mesh().unwrap_or_else(|_| panic!("{name}"));
+        let topology = topology(&mesh).unwrap();
+        let vertices = Vertices::new(&mesh, &topology.grid);
+        overlap(&mesh, &topology, &vertices).unwrap_or_else(|_| panic!("{name}"))
     }
 
     #[test]

@@ -88,7 +88,7 @@ impl Twin {
     pub(crate) fn same_unless_tangled(&mut self, verdict: Verdict) -> Verdict {
         let Err(Stop::Failed(failure)) = verdict else { return verdict };
         if self.accepted.is_none() {
-            self.accepted = overlap(self)?.map(|why| format!("{failure}; that may be, since {why}"));
+            self.accepted = overlap(&self.mesh, &self.topology, &self.vertices)?.map(|why| format!("{failure}; that may be, since {why}"));
         }
         if self.accepted.is_some() { Ok(()) } else { Err(Stop::Failed(failure)) }
     }

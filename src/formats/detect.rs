@@ -1,9 +1,7 @@
 //! Detection of a file's format: by its content, or else by its name.
 
-use std::path::Path;
-
 use super::isaac;
-use super::source::{Source, skip_comments};
+use super::source::{Source, ending, skip_comments};
 use crate::error::Result;
 
 /// A format that can be read.
@@ -88,11 +86,6 @@ pub(crate) fn detect(source: &Source) -> Result<Format> {
             other => format!("neither its content nor the ending .{other} is one of {READABLE}; {CONVERT}"),
         })
     })
-}
-
-/// The extension of a path in lower case, without the dot.
-pub(crate) fn ending(path: &Path) -> String {
-    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
 }
 
 fn foreign_binary(bytes: &[u8], ending: &str) -> Option<String> {

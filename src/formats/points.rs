@@ -6,7 +6,8 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::assemble::Assembly;
-use super::detect::{self, ending};
+use super::detect;
+use super::source::ending;
 use super::source::{Source, excerpt};
 use super::tokens::parse_float;
 use super::{LoadOptions, Merge, assembled, npy, procedural};

@@ -27,6 +27,11 @@ pub(crate) struct Source {
     rest: Option<Rest>,
 }
 
+/// The extension of a path in lower case, without the dot.
+pub(crate) fn ending(path: &Path) -> String {
+    path.extension().map(|e| e.to_string_lossy().to_ascii_lowercase()).unwrap_or_default()
+}
+
 /// An open file whose start has been read.
 struct Rest {
     file: File,

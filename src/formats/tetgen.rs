@@ -6,7 +6,7 @@ use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::cells::{CellType, Shape};
-use super::detect::ending;
+use super::source::ending;
 use super::source::{Source, excerpt};
 use super::tags::Tags;
 use super::tokens::{Tokens, parse_float, parse_integer, words};

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use super::LoadOptions;
 use super::budget::Budget;
-use super::detect::ending;
+use super::source::ending;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
 use super::vtu_parser::{Document, List, Piece, Skeleton, parse};

@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tempfile::NamedTempFile;
 
-use super::detect::ending;
+use super::source::ending;
 use super::npy;
 use crate::error::{Error, Result};
 pub use image::write_png;
