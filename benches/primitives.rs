@@ -5,10 +5,8 @@
 mod submit;
 
 use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_main};
-use olbvh::gpu::{Buffer, DeviceKind, Gpu, GpuOptions, Recorder};
-use olbvh::primitives::{
-    Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
-};
+use olbvh::gpu::{Arena, Buffer, DeviceKind, Gpu, GpuOptions, Recorder};
+use olbvh::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
 use std::time::Duration;
 use submit::submit;
 

@@ -8,11 +8,11 @@ use criterion::{BenchmarkId, Criterion, Throughput, criterion_group, criterion_m
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::mesh::{Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, TOLERANCE};
 use olbvh::query::{self, LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene};
 use olbvh::reference::boundary::topology;
-use olbvh::render::{Bounds, Prepared, RenderSettings, ValidTets};
+use olbvh::render::{Prepared, RenderSettings, ValidTets};
 use std::time::Duration;
 use submit::submit;
 

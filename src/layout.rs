@@ -1,6 +1,9 @@
-//! Structs shared by host and device, generated from `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection.
+//! Structs shared by host and device, and how their words are read. The structs are generated from `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection.
 
 #![allow(clippy::doc_markdown)]
+
+/// No tetrahedron: no neighbour, no owner.
+pub const NONE: u32 = u32::MAX;
 
 /// A 64-bit number from the two words of a struct, the lower word first.
 pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {
@@ -10,6 +13,18 @@ pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {
 /// Bit `i` of packed words; false beyond their end.
 pub fn bit(words: &[u32], i: u32) -> bool {
     words.get((i / 32) as usize).is_some_and(|w| w >> (i % 32) & 1 != 0)
+}
+
+/// Indices of the set bits of packed words, ascending.
+pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
+    let of_word = |(w, mut bits): (u32, u32)| {
+        std::iter::from_fn(move || {
+            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
+            bits &= bits - 1;
+            Some(32 * w + bit)
+        })
+    };
+    (0..).zip(words).flat_map(of_word).collect()
 }
 
 include!(concat!(env!("OUT_DIR"), "/layout.rs"));

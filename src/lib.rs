@@ -25,10 +25,10 @@
 //!
 //! # In your own renderer
 //! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], exported
-//! here like [`glam`]). At start-up, compute the sizes ([`primitives::Arena::measure`] runs a `carve` function without memory),
+//! here like [`glam`]). At start-up, compute the sizes ([`gpu::Arena::measure`] runs a `carve` function without memory),
 //! create one buffer, and run the same `carve` over it. Then record the commands in every frame.
 //! ```no_run
-//! use olbvh::{build::*, gpu::{Buffer, BufferRef, Gpu, Recorder}, options::BuildOptions, primitives::Arena, query::*, Result};
+//! use olbvh::{build::*, gpu::{Arena, Buffer, BufferRef, Gpu, Recorder}, options::BuildOptions, query::*, Result};
 //!
 //! struct Frame { input: MeshInput, arrays: MeshArrays, scratch: MeshScratch, tree: TreeMemory, build_scratch: BuildScratch, memory: Buffer }
 //!

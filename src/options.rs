@@ -1,4 +1,4 @@
-//! Options of a build, the same for the device and the CPU. They do not depend on Vulkan.
+//! Options of a build, and limits of queries, the same for the device and the CPU. They do not depend on Vulkan.
 
 use crate::error::{Error, Result};
 use crate::grid::MAX_LEVEL;
@@ -8,6 +8,15 @@ use crate::named::named;
 /// (SPEC 3.1). Whatever the tolerance, it may also be as far as rounding can put a point that the owner contains, which is
 /// farther in thin tetrahedra.
 pub const TOLERANCE: f32 = 1e-5;
+
+/// Number of entries of a list that one dispatch searches.
+pub const LIST_PART: u32 = 16_384;
+
+/// Most points that are sorted and located together.
+pub const POINT_CHUNK: usize = 1 << 20;
+
+/// Most leading bits of the Morton code that points are sorted by.
+pub const POINT_CODE_BITS: u32 = 22;
 
 /// Number of consecutive points that are located together as a run, each starting from the owner of the one before.
 pub const POINT_RUN: u32 = 8;

@@ -4,12 +4,12 @@
 use olbvh::baseline::{Lbvh, LbvhArrays};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
 use olbvh::query::{self, Built, LocateOptions, OverlapInput, Rendered, SILENT};
-use olbvh::reference::boundary::NONE;
-use olbvh::render::{Bounds, Prepared, RenderSettings, TransferFunction, ValidTets};
+use olbvh::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh, and both structures over it.

@@ -6,11 +6,10 @@ mod submit;
 
 use olbvh::Error;
 use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
-use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
+use olbvh::gpu::{Arena, Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::BuildStatus;
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::primitives::Arena;
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, OverlapMemory, PointInput, Rounds, SILENT, Scene, cmd_locate, cmd_overlap, locate,
 };

@@ -8,6 +8,7 @@ mod submit;
 use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
@@ -15,7 +16,7 @@ use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, OverlapInput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render,
     slice,
 };
-use olbvh::reference::boundary::{NONE, Topology, topology};
+use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Location, Locator};
 use olbvh::reference::slice::Slicer;

@@ -3,10 +3,9 @@
 #![allow(clippy::unwrap_used)]
 
 use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, Tree};
-use olbvh::gpu::{Buffer, Gpu, GpuOptions};
+use olbvh::gpu::{Arena, Buffer, Gpu, GpuOptions};
 use olbvh::mesh::kuhn;
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::primitives::Arena;
 
 fn allocated(gpu: &Gpu) -> u64 {
     gpu.allocated().unwrap().total_allocated_bytes

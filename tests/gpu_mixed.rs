@@ -6,14 +6,13 @@
 use olbvh::Error;
 use olbvh::baseline::{Lbvh, RayMethod, Rays};
 use olbvh::build::{BadCells, BuildScratch, Capacity, DeviceMesh, FieldRanges, Tree, TreeMemory, cmd_build};
-use olbvh::gpu::{DescriptorPools, Gpu, GpuOptions, Recorder};
+use olbvh::gpu::{Arena, DescriptorPools, Gpu, GpuOptions, Recorder};
 use olbvh::layout::Grid;
-use olbvh::mesh::{On, kuhn};
+use olbvh::mesh::{Bounds, On, kuhn};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::primitives::Arena;
 use olbvh::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, locate_all, overlap, render, slice};
 use olbvh::render::RayGrid;
-use olbvh::render::{Bounds, Plan, RenderSettings, TABLE_SIZE};
+use olbvh::render::{Plan, RenderSettings, TABLE_SIZE};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use std::any::Any;
 use std::fmt::Debug;

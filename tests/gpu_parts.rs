@@ -6,12 +6,12 @@ mod submit;
 
 use olbvh::build::{BadCells, DeviceMesh, Tree, cmd_ranges, range_bytes};
 use olbvh::error::{Error, Result};
-use olbvh::gpu::{BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::Row;
 use olbvh::layout::RenderView;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
-use olbvh::primitives::{Arena, Count, SortScratch, cmd_sort_pairs};
+use olbvh::primitives::{Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput,
     RenderMemory, Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners,

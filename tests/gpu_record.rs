@@ -11,11 +11,10 @@ use host::Frame;
 use host::queries::Queries;
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, BufferRef, Gpu, GpuOptions};
+use olbvh::gpu::{Arena, Binding, BufferRef, Gpu, GpuOptions};
 use olbvh::layout::{Grid, OverlapStatus, RenderPlan, RenderStatus, RenderView, SliceStatus};
-use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::primitives::Arena;
 use olbvh::query::{
     OverlapInput, PairMemory, RenderInput, RenderMemory, Rounds, SILENT, Scene, SliceInput, SliceMemory, StructureView, cmd_count_pairs,
     cmd_list_pairs, cmd_render, cmd_slice, overlap, render, slice,
@@ -25,7 +24,7 @@ use olbvh::reference::build::build;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{OverlapSide, overlap as reference};
 use olbvh::reference::slice::Slicer;
-use olbvh::render::{Bounds, Plan, RenderSettings, interval_slack};
+use olbvh::render::{Plan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
 use submit::submit;
 

@@ -17,13 +17,11 @@ use olbvh::build::{
     BadCells, BuildScratch, Capacity, DeviceMesh, MeshArrays, MeshScratch, MeshView, Tree, TreeMemory, cmd_build, cmd_prepare_mesh,
     cmd_ranges, range_bytes,
 };
-use olbvh::gpu::{Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
+use olbvh::gpu::{Arena, Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::{Row, SortTarget, Target};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
-use olbvh::primitives::{
-    Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
-};
+use olbvh::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, PointInput, PointOrder, Rounds, Scene, cmd_interpolate, cmd_locate,
     cmd_nearest, cmd_sort_points, cmd_visible, visible_bytes,

@@ -7,10 +7,10 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Error;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::kernels::{Row, Target};
-use olbvh::mesh::{Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{self, LocateMethod, LocateOptions, OverlapInput, SILENT};
-use olbvh::render::{Bounds, Prepared, RenderSettings, ValidTets};
+use olbvh::render::{Prepared, RenderSettings, ValidTets};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
 

@@ -4,13 +4,13 @@
 
 use glam::DVec3;
 use olbvh::grid::CellRange;
-use olbvh::mesh::{Field, Mesh, On, cases, kuhn, kuhn_jittered};
+use olbvh::mesh::{Bounds, Field, Mesh, On, cases, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::SILENT;
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Picture, Scene, brute_force, render};
-use olbvh::render::{Background, Bounds, Clip, ClipPlace, RenderSettings, RenderStats, TransferFunction};
+use olbvh::render::{Background, Clip, ClipPlace, RenderSettings, RenderStats, TransferFunction};
 
 /// A jittered grid with the analytic field, moved away from the origin.
 fn grid(cells: [u32; 3]) -> Mesh {

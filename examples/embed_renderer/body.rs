@@ -9,10 +9,9 @@ use olbvh::build::{
     BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
 };
 use olbvh::glsl::SceneBuffers;
-use olbvh::gpu::{BufferRef, Gpu, Recorder, USAGE};
+use olbvh::gpu::{Arena, BufferRef, Gpu, Recorder, USAGE};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
-use olbvh::primitives::Arena;
 use std::path::Path;
 
 /// What each frame in flight has of its own.

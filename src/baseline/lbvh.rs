@@ -2,10 +2,10 @@
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
+use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
 use crate::layout::LbvhNode;
-use crate::primitives::{Arena, Count, SortScratch, cmd_fill, cmd_sort_pairs};
+use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::sealed::Sealed;
 use crate::query::{BinaryTree, Built, LocateOutput, Located, PointInput, Rounds, Structure, StructureView, numbered};
 

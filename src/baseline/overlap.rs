@@ -4,12 +4,10 @@
 use super::Lbvh;
 use crate::build::DeviceMesh;
 use crate::error::Result;
-use crate::gpu::{Buffer, BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, Buffer, BufferRef, Groups, Recorder};
 use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
-use crate::layout::{NodeFrame, OverlapStatus, wide};
-use crate::primitives::Arena;
+use crate::layout::{NodeFrame, OverlapStatus, set_bits, wide};
 use crate::query::{Overlapped, Progress};
-use crate::reference::boundary::set_bits;
 use crate::reference::overlap::{joint_grid, node_frame};
 use std::mem::offset_of;
 

@@ -8,10 +8,10 @@
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{AccelerationStructure, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
+use crate::gpu::{AccelerationStructure, Arena, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
 use crate::grid::two_to;
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
-use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput, numbered};
 
 /// Factor from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.

@@ -9,10 +9,9 @@ use crate::build::{BadCells, DeviceMesh};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::grid::morton;
-use crate::mesh::{Field, Mesh, On};
+use crate::mesh::{Bounds, Field, Mesh, On, fault_of};
 use crate::query::{self, Rendered, SILENT, Sliced};
-use crate::reference::boundary::fault_of;
-use crate::render::{Bounds, Plan, RenderSettings};
+use crate::render::{Plan, RenderSettings};
 use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
 
 /// Thickness of voxels as a fraction of the largest extent: one cell of the paper's mesh *Jets*.

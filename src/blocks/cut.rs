@@ -299,8 +299,9 @@ impl Block {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::layout::NONE;
     use crate::mesh::kuhn_jittered;
-    use crate::reference::boundary::{NONE, topology};
+    use crate::reference::boundary::topology;
 
     /// Without its neighbours, a core would have boundary tetrahedra at the cuts.
     #[test]

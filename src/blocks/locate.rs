@@ -6,11 +6,11 @@ use super::{ANYWHERE, InBlocks, LEAST, Refused, Tried, check_field, pieces, smal
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;
 use crate::grid::CellRange;
+use crate::layout::NONE;
 use crate::mesh::{Mesh, On};
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, POINT_CHUNK};
 use crate::query::{self, LocateOptions, Located, Progress, SILENT, numbered};
-use crate::reference::boundary::NONE;
-use crate::reference::locate::{CHUNK, place};
+use crate::reference::locate::place;
 use std::slice::from_ref;
 
 /// Bytes of device memory per point during point location, with a reserve.
@@ -143,7 +143,7 @@ impl Job<'_> {
     fn ask(&mut self, placed: &Placed, cells: Option<CellRange>, ids: &[u32]) -> Result<()> {
         let input = placed.mesh.input();
         let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));
-        let most = usize::try_from(left / PER_POINT).unwrap_or(CHUNK).min(CHUNK);
+        let most = usize::try_from(left / PER_POINT).unwrap_or(POINT_CHUNK).min(POINT_CHUNK);
         let few = ids.len().min(if input.tets as usize > LEAST { FEW } else { 1 });
         if most < few {
             let (bytes, reason) = (PER_POINT * few as u64, format!("{left} bytes are left"));

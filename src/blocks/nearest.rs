@@ -4,8 +4,8 @@ use super::InBlocks;
 use super::locate::{Blocks, Points, each};
 use crate::error::Result;
 use crate::gpu::Gpu;
+use crate::layout::NONE;
 use crate::query::{self, Nearest, Progress, SILENT};
-use crate::reference::boundary::NONE;
 
 /// Finds the place of the surface that is closest to each point, at most `within` away, as [`query::nearest`] does, within
 /// `memory` bytes of device memory; [`Points::how`] is not used. `report` receives the number of points done, and of all.

@@ -269,7 +269,8 @@ impl Order {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::render::{Bounds, CameraSpec};
+    use crate::mesh::Bounds;
+    use crate::render::CameraSpec;
 
     const BOUNDS: Bounds = Bounds { lo: [0.0; 3], hi: [10.0, 8.0, 6.0] };
     const SIZE: [u32; 2] = [61, 43];

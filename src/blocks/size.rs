@@ -2,11 +2,10 @@
 
 use crate::build::{Capacity, CountScratch, FilterScratch, MAX_ENTRIES, MAX_TETS, MeshArrays, MeshScratch, SortedScratch, TreeMemory};
 use crate::error::{Error, Result};
-use crate::gpu::Gpu;
+use crate::gpu::{Arena, Gpu};
 use crate::grid::CellRange;
 use crate::mesh::Mesh;
 use crate::options::{BuildOptions, Lists};
-use crate::primitives::Arena;
 
 /// Estimate: of the entries with `Lists::All`, one in this many remains with `Lists::Boundary`. *Jets* has one in 11 at
 /// α = 0, smaller meshes have more. A block that turns out to be larger is cut again.

@@ -2,12 +2,10 @@
 
 use super::prepare::{MeshArrays, MeshInput, MeshScratch, MeshView, Stage0, check_tets};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Recorder, StageTime};
+use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
-use crate::layout::{Grid, MeshStatus};
-use crate::mesh::Mesh;
-use crate::primitives::Arena;
-use crate::reference::boundary::{fault_of, set_bits};
+use crate::layout::{Grid, MeshStatus, set_bits};
+use crate::mesh::{Mesh, fault_of};
 use std::sync::Arc;
 
 /// Meshes of this many tetrahedra are prepared in several submissions, since a system may end one that takes seconds.

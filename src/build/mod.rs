@@ -38,9 +38,8 @@ pub use ranges::{FieldRanges, cmd_ranges, range_bytes};
 pub use tree::Tree;
 
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Recorder};
+use crate::gpu::{Arena, Gpu, Recorder};
 use crate::options::BuildOptions;
-use crate::primitives::Arena;
 use stages::Build;
 
 /// Scratch memory of a whole build.

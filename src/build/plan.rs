@@ -2,11 +2,11 @@
 
 use super::prepare::check_tets;
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Gpu};
+use crate::gpu::{Arena, BufferRef, Gpu};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
-use crate::primitives::{Arena, ScanScratch, SortScratch};
+use crate::primitives::{ScanScratch, SortScratch};
 pub(crate) use crate::reference::depth::SHARE;
 
 /// Most entries of a tree: an index is a signed word to shaders.

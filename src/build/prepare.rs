@@ -2,13 +2,13 @@
 //! boundary bits (SPEC 2.1, 2.3).
 
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::kernels::{
     CheckCells, CheckCellsSpec, FindBoundary, FindBoundarySpec, MakeGrid, MakeGridSpec, MatchFaces, MatchFacesSpec, MatchFacesTiled,
     MatchFacesTiledSpec, MeasureCells, MeasureCellsSpec, NormaliseVertices, NormaliseVerticesSpec,
 };
 use crate::layout::{Grid, MeshStatus};
-use crate::primitives::{Arena, cmd_fill};
+use crate::primitives::cmd_fill;
 use std::mem::offset_of;
 
 /// Most tetrahedra of one mesh: the number of a face must fit 31 bits.

@@ -10,10 +10,9 @@ use crate::kernels::{
     EstimateDepth, EstimateDepthSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves, FlagLeavesSpec, MarkQuarters, MarkQuartersSpec,
     MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
 };
-use crate::layout::{BuildStatus, Grid};
+use crate::layout::{BuildStatus, Grid, NONE};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, Unsorted, cmd_exclusive_scan, cmd_sort};
-use crate::reference::boundary::NONE;
 use crate::reference::quarters::id_mask;
 
 /// A build under way: what its stages share.

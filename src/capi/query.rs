@@ -3,10 +3,10 @@
 use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, tolerance};
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
-use crate::mesh::{Field, Mesh, On};
+use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
-use crate::render::{Bounds, Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
+use crate::render::{Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};

@@ -13,9 +13,8 @@ pub(super) use {locate::*, overlap::*, render::*, scene::*, slice::*};
 
 use super::{OlbvhGpu, OlbvhStatus, border, give, handle, handle_mut, put, release};
 use crate::error::{Error, Result};
-use crate::gpu::{ALIGNMENT, BufferRef, DescriptorPools, DescriptorRoom, Gpu, Recorder};
+use crate::gpu::{ALIGNMENT, Arena, BufferRef, DescriptorPools, DescriptorRoom, Gpu, Recorder};
 use crate::mesh::On;
-use crate::primitives::Arena;
 use crate::query::Rounds;
 use ash::vk::{self, Handle};
 use std::ffi::c_char;

@@ -7,10 +7,9 @@ use super::failure::{Stop, Verdict, compare, compare_one};
 use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_build};
-use crate::gpu::{BufferRef, Gpu};
+use crate::gpu::{Arena, BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::primitives::Arena;
 use crate::reference::quarters::split_entries;
 use crate::tree::{TreeArrays, TreeBytes};
 

@@ -7,16 +7,15 @@ use super::meshes::MeshRecipe;
 use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Error;
-use crate::gpu::Gpu;
+use crate::gpu::{Arena, Gpu};
+use crate::layout::NONE;
 use crate::mesh::{Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::primitives::Arena;
 use crate::query::code_bits;
 use crate::query::{
     LocateMethod, LocateOptions, LocateOutput, PointInput, PointOrder, SILENT, Scene, cmd_locate, cmd_sort_points, locate, locate_all,
     nearest,
 };
-use crate::reference::boundary::NONE;
 use crate::reference::locate::{Location, Locator, order_of};
 use crate::reference::nearest::Surface;
 

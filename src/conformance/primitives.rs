@@ -3,11 +3,9 @@
 use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
-use crate::gpu::Gpu;
+use crate::gpu::{Arena, Gpu};
 use crate::kernels::{Row, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
-use crate::primitives::{
-    Arena, Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs,
-};
+use crate::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
 
 /// The target with which a case runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]

@@ -6,11 +6,10 @@ use super::twin::Twin;
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Error;
 use crate::gpu::Gpu;
-use crate::mesh::{Field, Mesh, On};
+use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{SILENT, slice};
 use crate::reference::slice::Slicer;
-use crate::render::Bounds;
 use crate::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A small stack of layers.

@@ -2,8 +2,8 @@
 //! a point (SPEC 3.1), so answers may differ between trees without any fault of the device.
 
 use super::failure::Verdict;
-use crate::options::{BuildOptions, Lists};
 use crate::mesh::Mesh;
+use crate::options::{BuildOptions, Lists};
 use crate::reference::boundary::Topology;
 use crate::reference::locate::{Locator, place};
 use crate::reference::vertices::Vertices;

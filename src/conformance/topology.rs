@@ -4,9 +4,8 @@
 use super::failure::{Verdict, compare, compare_one};
 use super::twin::Twin;
 use crate::build::{DeviceMesh, MeshArrays, MeshInput, MeshScratch, cmd_move_mesh, cmd_prepare_mesh};
-use crate::gpu::Gpu;
+use crate::gpu::{Arena, Gpu};
 use crate::layout::{Grid, MeshStatus};
-use crate::primitives::Arena;
 
 /// Compares a prepared mesh with its topology.
 pub(crate) fn check(twin: &Twin, found: &DeviceMesh) -> Verdict {

@@ -24,7 +24,7 @@ pub struct BufferRef {
 
 impl BufferRef {
     /// A part of the host's buffer: `size` bytes, starting at `offset`. `address` is the device address of the first
-    /// byte, or 0 if the device has no buffer addresses. Memory for an [`crate::primitives::Arena`] begins at a multiple of
+    /// byte, or 0 if the device has no buffer addresses. Memory for an [`crate::gpu::Arena`] begins at a multiple of
     /// [`super::ALIGNMENT`]; what is bound by descriptors, at one of the device's `minStorageBufferOffsetAlignment`.
     ///
     /// # Safety

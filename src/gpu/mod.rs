@@ -3,6 +3,7 @@
 #![allow(unsafe_code)]
 
 mod acceleration;
+mod arena;
 mod buffer_ref;
 mod constants;
 mod context;
@@ -27,6 +28,7 @@ mod submit;
 
 pub use acceleration::AccelerationStructure;
 pub(crate) use acceleration::Triangles;
+pub use arena::Arena;
 pub use buffer_ref::{BufferRef, USAGE};
 pub use context::{Binding, Gpu, GpuOptions};
 pub use descriptors::{DescriptorPools, DescriptorRoom};

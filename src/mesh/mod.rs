@@ -1,13 +1,20 @@
 //! Tetrahedral meshes in host memory: points, tetrahedra and scalar fields. Does not depend on Vulkan.
 
+mod along_curve;
+mod bounds;
 pub mod cases;
 mod kuhn;
 mod measure;
 mod procedural;
+mod validity;
 mod warp;
+
+pub use bounds::Bounds;
 pub(crate) use kuhn::hash;
 pub use kuhn::{kuhn, kuhn_jittered};
 pub use procedural::{graded, shell, slivers};
+pub use validity::{Fault, fault_of, is_usable, valid_grid};
+pub(crate) use validity::{bounds, words};
 
 use crate::error::{Error, Result};
 

@@ -1,8 +1,8 @@
 //! Exclusive prefix sums of u32 values: reduce, then scan.
 
-use super::{Arena, Count};
+use super::Count;
 use crate::error::Result;
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LONGEST_LOOP, ScanApply, ScanApplySpec, ScanSpine, ScanSpineSpec, ScanTiles, ScanTilesSpec};
 
 /// Scratch memory of a scan.

@@ -1,8 +1,8 @@
 //! The self-test: computations with known answers that a device must pass before it is used (a few milliseconds).
 
-use super::{Arena, Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
+use super::{Count, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_sort_pairs};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Groups};
+use crate::gpu::{Arena, Gpu, Groups};
 use crate::kernels::{LONGEST_LOOP, SelfTest, SelfTestSpec};
 use std::fmt::Debug;
 

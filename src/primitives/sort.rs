@@ -1,8 +1,8 @@
 //! Stable radix sort of u32 keys with u32 values, least significant digit first, by the low bits of the keys only.
 
-use super::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+use super::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::error::{Error, Result};
-use crate::gpu::{ALIGNMENT, BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{
     SortDigitsBallot, SortDigitsBallotSpec, SortHistogramSerial, SortHistogramSerialSpec, SortPlan, SortPlanSpec, SortScatterBallot,
     SortScatterBallotSpec, SortScatterSerial, SortScatterSerialSpec, SortSplitPairs, SortSplitPairsSpec, SortTarget,

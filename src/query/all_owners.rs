@@ -4,10 +4,10 @@ use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
 use super::{Progress, Scene, capacity_of, list_parts};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
-use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
-use crate::reference::locate::CHUNK;
+use crate::options::POINT_CHUNK;
+use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::reference::walk::STAR;
 
 /// Answers and scratch memory for all owners: 28 bytes per point, and the scratch memory of a scan.
@@ -137,7 +137,7 @@ pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance
     let gpu = tree.gpu();
     let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
     let mut all = Vec::with_capacity(points.len());
-    for chunk in points.chunks(CHUNK.min(OwnersMemory::most_points(scene.longest_leaf) as usize)) {
+    for chunk in points.chunks(POINT_CHUNK.min(OwnersMemory::most_points(scene.longest_leaf) as usize)) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
@@ -172,6 +172,6 @@ mod tests {
             assert!(i32::try_from(u64::from(points + 1) * each).is_err(), "{points} points in lists of {longest}");
         }
         // Usual lists do not shorten the chunks.
-        assert!(OwnersMemory::most_points(2047) as usize >= CHUNK);
+        assert!(OwnersMemory::most_points(2047) as usize >= POINT_CHUNK);
     }
 }

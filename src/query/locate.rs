@@ -4,13 +4,11 @@ use super::order::{PointOrder, cmd_sort_points};
 use super::{Progress, Scene, list_parts, upload_field};
 use crate::build::{DeviceMesh, Tree, check_field, check_points};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, DeviceKind, Gpu, Groups, Recorder, StageTime};
+use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
-use crate::options::{POINT_RUN, TOLERANCE};
-use crate::primitives::Arena;
-use crate::reference::locate::CHUNK;
+use crate::options::{POINT_CHUNK, POINT_RUN, TOLERANCE};
 use crate::reference::traverse::full_stack;
 
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
@@ -48,7 +46,7 @@ impl LocateMethod {
     /// a Z curve take 0.13 ms, and in runs 0.30 ms: a GPU is better used if every point has an invocation.
     pub fn suited(points: usize, tets: usize, in_order: bool) -> Self {
         // Only points that are sorted together get nearer to each other.
-        let few = points.min(CHUNK).saturating_mul(4) < tets;
+        let few = points.min(POINT_CHUNK).saturating_mul(4) < tets;
         if in_order || few { Self::Descent } else { Self::Sorted }
     }
 
@@ -272,7 +270,7 @@ const WORK: usize = 1 << 31;
 
 /// Points that one submission locates.
 fn points_at_once(longest_leaf: u32) -> usize {
-    (WORK / (longest_leaf as usize).max(1)).clamp(1024, CHUNK)
+    (WORK / (longest_leaf as usize).max(1)).clamp(1024, POINT_CHUNK)
 }
 
 /// Answers in host memory.
@@ -349,7 +347,7 @@ mod tests {
 
     #[test]
     fn submissions_get_shorter_where_lists_get_longer() {
-        assert_eq!([0, 1, 2048].map(points_at_once), [CHUNK; 3]);
-        assert_eq!([4096, 1 << 20, u32::MAX].map(points_at_once), [CHUNK / 2, 2048, 1024]);
+        assert_eq!([0, 1, 2048].map(points_at_once), [POINT_CHUNK; 3]);
+        assert_eq!([4096, 1 << 20, u32::MAX].map(points_at_once), [POINT_CHUNK / 2, 2048, 1024]);
     }
 }

@@ -27,7 +27,7 @@ use crate::build::{DeviceMesh, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef};
 use crate::mesh::On;
-use crate::reference::locate::LIST_PART;
+use crate::options::LIST_PART;
 
 /// Receives the progress of an owning call: how much is done, and the total. Each call says what it counts.
 pub type Progress<'a> = &'a dyn Fn(u64, u64);

@@ -4,17 +4,15 @@ use super::locate::numbered;
 use super::{PointInput, Progress, Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::{CellRange, canonical};
 use crate::kernels::{Nearest as NearestKernel, NearestSpec};
-use crate::layout::NearState;
-use crate::primitives::Arena;
-use crate::reference::boundary::NONE;
-use crate::reference::locate::CHUNK;
+use crate::layout::{NONE, NearState};
+use crate::options::POINT_CHUNK;
 use crate::reference::nearest::distance;
 
 /// Points of one submission. Each may take thousands of tests, so they are fewer than in other queries.
-const AT_ONCE: usize = CHUNK / 8;
+const AT_ONCE: usize = POINT_CHUNK / 8;
 
 /// Answers and scratch memory: 32 bytes per point.
 #[derive(Clone, Copy, Debug)]

@@ -2,10 +2,10 @@
 
 use super::PointInput;
 use crate::error::Result;
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{PointCodes, PointCodesSpec};
-use crate::primitives::{Arena, Count, SortScratch, Unsorted, cmd_sort};
-use crate::reference::locate::CODE_BITS;
+use crate::options::POINT_CODE_BITS;
+use crate::primitives::{Count, SortScratch, Unsorted, cmd_sort};
 
 /// An order of points, and the scratch memory of the sort: 16 bytes per point, and the sort's tables of counts.
 #[derive(Clone, Copy, Debug)]
@@ -35,7 +35,7 @@ const LEAST_CODE_BITS: u32 = 16;
 /// [`LEAST_CODE_BITS`] take. 16 on most GPUs, 22 on processors.
 pub(crate) fn code_bits(gpu: &Gpu) -> u32 {
     let digit = gpu.target().sort.digit_bits.max(1);
-    LEAST_CODE_BITS.next_multiple_of(digit).min(CODE_BITS)
+    LEAST_CODE_BITS.next_multiple_of(digit).min(POINT_CODE_BITS)
 }
 
 /// Records the sorting of points along the Morton curve over a mesh's `grid` ([`crate::build::MeshArrays::grid`]);

@@ -21,10 +21,8 @@ pub use sets::{OverlapMemory, cmd_overlap};
 use super::{Progress, Rounds, Scene};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, Recorder, StageTime};
-use crate::layout::{OverlapStatus, wide};
-use crate::primitives::Arena;
-use crate::reference::boundary::set_bits;
+use crate::gpu::{Arena, Gpu, Recorder, StageTime};
+use crate::layout::{OverlapStatus, set_bits, wide};
 use crate::reference::overlap::{Effort, Overlap, members};
 
 /// Rounds of the search per submission; for large meshes one, so that no submission takes long.

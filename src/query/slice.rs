@@ -16,7 +16,7 @@ pub use stack::{Sliced, slice};
 use super::{Rounds, Structure, StructureView, dispatch};
 use crate::build::check_field;
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
 use crate::kernels::{
     LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceCollect, SliceCollectSpec, SliceLocate, SliceLocateSpec,
@@ -25,7 +25,7 @@ use crate::kernels::{
 use crate::layout::{RunState, SlicePlan, SliceStatus, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
-use crate::primitives::{Arena, Count};
+use crate::primitives::Count;
 use crate::slicing::{Extrapolate, Rows, VOXEL_RUN, VoxelGrid, WALK};
 use std::mem::offset_of;
 

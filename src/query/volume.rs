@@ -15,7 +15,7 @@ pub use picture::{Rendered, render};
 use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_bytes};
 use crate::build::{Capacity, MeshInput, check_field};
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
@@ -23,7 +23,6 @@ use crate::kernels::{
 };
 use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
 use crate::mesh::On;
-use crate::primitives::Arena;
 use crate::render::TABLE_SIZE;
 use std::mem::offset_of;
 

@@ -4,14 +4,11 @@
 use super::corners::{MOST_THIN, thin_corners_at};
 use super::tet::Tet;
 use crate::error::{Error, Result};
-use crate::grid::{COORDINATE_LIMIT, Grid, canonical, per_axis};
-use crate::layout::bit;
-use crate::mesh::Mesh;
+use crate::grid::Grid;
+use crate::layout::{NONE, bit};
+use crate::mesh::{Fault, Mesh, bounds, fault_of, words};
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering};
-
-/// No tetrahedron: no neighbour, no owner.
-pub const NONE: u32 = u32::MAX;
 
 /// Numbers of tetrahedra of a mesh by kind.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -32,27 +29,6 @@ pub struct Counts {
     pub branched: u32,
 }
 
-/// Why a tetrahedron is bad.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Fault {
-    /// This vertex index is not below the number of points.
-    Index(u32),
-    /// This vertex occurs twice.
-    Repeated(u32),
-    /// This vertex has a coordinate that is NaN, infinite, or too large to compute with.
-    Coordinate(u32),
-}
-
-impl std::fmt::Display for Fault {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Index(v) => write!(f, "vertex {v} does not exist"),
-            Self::Repeated(v) => write!(f, "vertex {v} occurs twice"),
-            Self::Coordinate(v) => write!(f, "vertex {v} is not finite or beyond ±{COORDINATE_LIMIT:e}"),
-        }
-    }
-}
-
 /// Topology of a mesh, computed before any tree is built over it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Topology {
@@ -69,18 +45,6 @@ pub struct Topology {
     pub counts: Counts,
     /// The bad tetrahedra in ascending order, each with the first fault found.
     pub bad: Vec<(u32, Fault)>,
-}
-
-/// Indices of the set bits of packed words, ascending.
-pub(crate) fn set_bits(words: Vec<u32>) -> Vec<u32> {
-    let of_word = |(w, mut bits): (u32, u32)| {
-        std::iter::from_fn(move || {
-            let bit = (bits != 0).then(|| bits.trailing_zeros())?;
-            bits &= bits - 1;
-            Some(32 * w + bit)
-        })
-    };
-    (0..).zip(words).flat_map(of_word).collect()
 }
 
 impl Topology {
@@ -139,44 +103,6 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
         ..counts
     };
     Ok(Topology { neighbours, boundary, valid, grid, counts, bad })
-}
-
-/// Packs `n` answers into words.
-fn words(n: usize, answer: &(dyn Fn(u32) -> bool + Sync)) -> Vec<u32> {
-    let word = |w: usize| (w * 32..n.min(w * 32 + 32)).fold(0, |word, t| word | u32::from(answer(t as u32)) << (t % 32));
-    (0..n.div_ceil(32)).into_par_iter().map(word).collect()
-}
-
-/// The grid over the vertices that valid tetrahedra use, at the finest level: [`Topology::grid`].
-pub fn valid_grid(mesh: &Mesh) -> Grid {
-    let (lo, hi) = bounds(mesh, &words(mesh.tets.len(), &|t| fault_of(mesh, t).is_none()));
-    Grid::new(lo, hi)
-}
-
-/// Whether all coordinates of a point are finite and small enough to compute with.
-pub fn is_usable(p: [f32; 3]) -> bool {
-    p.iter().all(|x| x.abs() < COORDINATE_LIMIT)
-}
-
-/// Why a tetrahedron is bad, with vertices numbered as in the source; `None` if it is valid.
-pub fn fault_of(mesh: &Mesh, tet: u32) -> Option<Fault> {
-    let ids = mesh.tets.get(tet as usize)?;
-    let repeated = |i: usize| ids[..i].contains(&ids[i]);
-    let point = |v: u32| mesh.points.get(v as usize);
-    let range = ids.iter().find(|&&v| point(v).is_none()).map(|&v| Fault::Index(v));
-    let range = range.or_else(|| (1..4).find(|&i| repeated(i)).map(|i| Fault::Repeated(mesh.point_id(ids[i]))));
-    let usable = |v: u32| point(v).is_some_and(|&p| is_usable(p));
-    range.or_else(|| ids.iter().find(|&&v| !usable(v)).map(|&v| Fault::Coordinate(mesh.point_id(v))))
-}
-
-fn bounds(mesh: &Mesh, valid: &[u32]) -> ([f32; 3], [f32; 3]) {
-    let empty = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
-    let join = |a: ([f32; 3], [f32; 3]), b: ([f32; 3], [f32; 3])| (per_axis(|c| a.0[c].min(b.0[c])), per_axis(|c| a.1[c].max(b.1[c])));
-    let of = |bounds, (t, ids): (usize, &[u32; 4])| {
-        let points = ids.iter().filter(|_| bit(valid, t as u32)).map(|&v| mesh.points[v as usize].map(canonical));
-        points.fold(bounds, |b, p| join(b, (p, p)))
-    };
-    mesh.tets.par_iter().enumerate().fold(|| empty, of).reduce(|| empty, join)
 }
 
 /// The vertices of face `i` (opposite to vertex `i`) in ascending order.

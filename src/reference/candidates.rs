@@ -1,7 +1,7 @@
 //! Choice of the owner of a point among candidate tetrahedra (SPEC 3.1). Twin of `glsl/shared/candidates.glsl`.
 
-use super::boundary::NONE;
 use super::tet::{Tet, Weights};
+use crate::layout::NONE;
 
 /// The best candidate so far.
 #[derive(Clone, Copy, Debug, PartialEq)]

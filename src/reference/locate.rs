@@ -1,7 +1,7 @@
 //! Point location by lists and by walks: every point of the mesh has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
 
 use super::assign::{cell_centre, half_cell};
-use super::boundary::{NONE, Topology};
+use super::boundary::Topology;
 use super::candidates::Best;
 use super::quarters::{is_near, reach};
 use super::tet::{Tet, Vec3, Weights};
@@ -9,25 +9,17 @@ use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
 use super::walk::{HINTED, LeafCell, STRIDE, Walked, Walker, weighed};
 use crate::grid::{Grid, MAX_LEVEL, canonical, morton};
+use crate::layout::NONE;
 use crate::mesh::{Field, Mesh, On};
-use crate::options::{Lists, POINT_RUN, TOLERANCE};
+use crate::options::{LIST_PART, Lists, POINT_CODE_BITS, POINT_RUN, TOLERANCE};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::ops::ControlFlow;
 
-/// Number of entries of a list that one dispatch searches.
-pub const LIST_PART: u32 = 16_384;
-
-/// Most points that are sorted and located together.
-pub const CHUNK: usize = 1 << 20;
-
-/// Most leading bits of the Morton code that points are sorted by.
-pub const CODE_BITS: u32 = 22;
-
 /// The order of points along the Morton curve, as [`crate::query::cmd_sort_points`] computes it with this many leading
-/// bits of the code, at most [`CODE_BITS`]. Points too far outside the bounds for any mesh come last.
+/// bits of the code, at most [`POINT_CODE_BITS`]. Points too far outside the bounds for any mesh come last.
 pub fn order_of(grid: &Grid, points: &[[f32; 3]], bits: u32) -> Vec<u32> {
-    let bits = bits.min(CODE_BITS);
+    let bits = bits.min(POINT_CODE_BITS);
     let code = |p: [f32; 3]| place(grid, p).map_or(NONE, |(cell, _)| morton(cell)) >> (3 * MAX_LEVEL - bits) & ((1 << bits) - 1);
     let mut order: Vec<u32> = (0..points.len() as u32).collect();
     order.sort_by_cached_key(|&i| code(points[i as usize]));

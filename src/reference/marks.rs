@@ -6,11 +6,10 @@
 //! rounding the centre may lie in a gap between tetrahedra. Then the tetrahedra that have it within the margin of their
 //! faces, at least one, are listed in place of the owner.
 
-use super::boundary::NONE;
 use super::tet::{Tet, Vec3};
 use super::walk::Walker;
 use crate::grid::morton;
-use crate::layout::bit;
+use crate::layout::{NONE, bit};
 
 /// One bit per cell at the level of the leaves, by Morton code.
 #[derive(Clone, Debug)]

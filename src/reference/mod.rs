@@ -1,7 +1,6 @@
 //! The reference implementation of every stage and query, in plain safe Rust; files name the kernels they are twins of.
 //! It is the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
-pub mod along_curve;
 pub mod assign;
 pub mod boundary;
 pub mod brute;

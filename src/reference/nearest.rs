@@ -1,12 +1,13 @@
 //! The place of the surface that is closest to a point. Twin of `glsl/query/nearest`.
 
 use super::assign::{cell_centre, half_cell};
-use super::boundary::{NONE, Topology};
+use super::boundary::Topology;
 use super::locate::{Location, place};
 use super::separate::{Closest, box_square, closest_on};
 use super::tet::{Tet, Vec3, dot, sub};
 use super::vertices::Vertices;
 use crate::grid::{canonical, per_axis, two_to, unmorton};
+use crate::layout::NONE;
 use crate::mesh::Mesh;
 use crate::tree::TreeArrays;
 use std::cmp::Reverse;

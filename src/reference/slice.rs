@@ -1,7 +1,7 @@
 //! Conservative slicing (SPEC 3.4): value, kind and owner of every voxel. Twin of `glsl/query/slice_locate` and
 //! `slice_touch`.
 
-use super::boundary::{NONE, Topology};
+use super::boundary::Topology;
 use super::leaf_walk::{meets, reached_cells, walk_leaves};
 use super::locate::{Location, Locator};
 use super::separate::{Closest, box_square, box_touches, closest, touch_slack};
@@ -9,7 +9,7 @@ use super::tet::{Tet, Vec3, sub};
 use super::walk::Stand;
 use crate::error::Result;
 use crate::grid::CellRange;
-use crate::layout::SlicePlan;
+use crate::layout::{NONE, SlicePlan};
 use crate::mesh::{Field, Mesh, On};
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, VoxelGrid, WALK};
 use crate::tree::TreeArrays;

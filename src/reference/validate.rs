@@ -1,6 +1,6 @@
 //! Checks the rules that every tree must satisfy (SPEC 2.5).
 
-use super::boundary::{NONE, Topology};
+use super::boundary::Topology;
 use super::codes::Stage;
 use super::leaves::{cell_box, flag, octants};
 use super::levels::union;
@@ -9,6 +9,7 @@ use super::quarters::{id_mask, quarters_near};
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
 use crate::grid::{MAX_LEVEL, unmorton};
+use crate::layout::NONE;
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use crate::tree::{TreeArrays, TreeStats};

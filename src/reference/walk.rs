@@ -16,10 +16,10 @@
 //! is lost. A walk that comes near x ends with the *star* of x: the tetrahedra reached across faces that are so near x
 //! that rounding could put it on either side. The owner is chosen among them, so it does not depend on the way taken.
 
-use super::boundary::NONE;
 use super::candidates::Best;
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::grid::{per_axis, reciprocal, two_to};
+use crate::layout::NONE;
 use crate::mesh::{Field, Mesh, On};
 
 /// Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see [`super::corners`].

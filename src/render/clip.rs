@@ -1,7 +1,7 @@
 //! Clips: half-spaces that a picture leaves out, so that the inside is seen.
 
-use super::Bounds;
 use crate::error::{Error, Result};
+use crate::mesh::Bounds;
 use glam::DVec3;
 
 /// Most clips of a picture.

@@ -41,7 +41,7 @@ mod valid;
 mod visible_values;
 
 pub use auto::auto_opacity;
-pub use camera::{Bounds, Camera, CameraSpec, ProjectedView, Projection};
+pub use camera::{Camera, CameraSpec, ProjectedView, Projection};
 pub use clip::{Clip, ClipPlace};
 pub use plan::{Plan, Prepared, TABLE_SIZE, interval_slack};
 pub use rays::{MAX_SAMPLES, RayGrid};

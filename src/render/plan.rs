@@ -7,13 +7,13 @@ use super::settings::{DEFAULT_STEPS, MAX_ISO};
 use super::shading::SKIN;
 use super::visible_values::visible_values;
 use super::{
-    Background, Bounds, Camera, Lighting, OPACITY_UNIT, ProjectedView, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity,
+    Background, Camera, Lighting, OPACITY_UNIT, ProjectedView, Projection, RayGrid, RenderSettings, ValidTets, auto_opacity,
     gradient_normals, shading_normals,
 };
 use crate::error::{Error, Result};
 use crate::grid::{canonical, reciprocal, two_to};
 use crate::layout::{Grid, RenderView};
-use crate::mesh::{Field, Mesh, On};
+use crate::mesh::{Bounds, Field, Mesh, On};
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.

@@ -159,8 +159,7 @@ fn normals(mesh: &Mesh, valid: &ValidTets<'_>, is_outside: impl Fn(usize, usize)
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::kuhn;
-    use crate::render::Bounds;
+    use crate::mesh::{Bounds, kuhn};
 
     #[test]
     fn normals_of_a_corner_tetrahedron_point_outwards() {

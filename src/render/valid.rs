@@ -1,7 +1,6 @@
 //! The tetrahedra that count.
 
-use super::Bounds;
-use crate::mesh::Mesh;
+use crate::mesh::{Bounds, Mesh};
 
 /// The valid tetrahedra of a mesh, the only ones that are drawn.
 #[derive(Clone, Copy)]

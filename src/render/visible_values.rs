@@ -28,7 +28,8 @@ pub(super) fn visible_values(table: &[[f32; 4]], value_lo: f32, value_scale: f32
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Bounds, Plan, RenderSettings, TransferFunction};
+    use super::super::{Plan, RenderSettings, TransferFunction};
+    use crate::mesh::Bounds;
 
     const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
 

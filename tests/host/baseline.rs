@@ -2,9 +2,8 @@
 
 use olbvh::baseline::{LbvhScratch, RayMethod, Rays, cmd_build_lbvh, cmd_locate_lbvh};
 use olbvh::build::{BadCells, DeviceMesh};
-use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
+use olbvh::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::Mesh;
-use olbvh::primitives::Arena;
 use olbvh::query::{BinaryTree, LocateOutput, PointInput, Rounds};
 
 /// The memory of both baselines over a mesh, whose points are located.

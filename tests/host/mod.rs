@@ -11,10 +11,9 @@ use ash::vk;
 use olbvh::build::{
     BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
 };
-use olbvh::gpu::{Buffer, Enabled, Gpu, HostDevice, RayTracing, Recorder, Requirements};
+use olbvh::gpu::{Arena, Buffer, Enabled, Gpu, HostDevice, RayTracing, Recorder, Requirements};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
-use olbvh::primitives::Arena;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate};
 use std::ffi::c_void;
 use std::sync::{Arc, Mutex};

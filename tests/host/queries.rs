@@ -3,16 +3,15 @@
 
 use super::Frame;
 use olbvh::build::{BadCells, DeviceMesh, MeshView, Tree, cmd_ranges, range_bytes};
-use olbvh::gpu::{Buffer, BufferRef, Gpu, Recorder};
-use olbvh::mesh::{Mesh, On};
+use olbvh::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder};
+use olbvh::mesh::{Bounds, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::primitives::Arena;
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput, RenderMemory,
     Rounds, Scene, SliceInput, SliceMemory, StructureView, Visibility, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
     cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
-use olbvh::render::{Bounds, Plan, RenderSettings, TransferFunction};
+use olbvh::render::{Plan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 
 /// The memory of the queries of a frame, and their input.

@@ -1,9 +1,10 @@
 //! Neighbours, boundary tetrahedra and bad tetrahedra.
 
 use super::prepared;
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
-use olbvh::reference::boundary::{Fault, NONE, Topology, topology};
+use olbvh::mesh::{Fault, Mesh, kuhn, kuhn_jittered};
+use olbvh::reference::boundary::{Topology, topology};
 use std::collections::HashMap;
 
 fn named(name: &str) -> (Mesh, Topology) {

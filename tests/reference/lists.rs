@@ -1,10 +1,11 @@
 //! `Lists::Boundary`: its trees keep every rule, and walks find the same owners as `Lists::All`.
 
 use super::{Random, options, prepared};
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::{axle, cases};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::reference::boundary::{NONE, Topology};
+use olbvh::reference::boundary::Topology;
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Locator, order_of};
 use olbvh::reference::tet::Tet;

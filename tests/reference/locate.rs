@@ -2,10 +2,11 @@
 
 use super::{Random, prepared, tree};
 use olbvh::formats::{LoadOptions, load};
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::reference::boundary::{NONE, Topology};
+use olbvh::reference::boundary::Topology;
 use olbvh::reference::brute;
 use olbvh::reference::build::build;
 use olbvh::reference::locate::{Location, Locator};

@@ -3,10 +3,10 @@
 use super::oracle::{P, distance};
 use super::slice::wide;
 use super::{ALPHAS, prepared, tree};
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::{Case, cases};
 use olbvh::mesh::{kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
-use olbvh::reference::boundary::NONE;
 use olbvh::reference::build::build;
 use olbvh::reference::nearest::Surface;
 

@@ -3,9 +3,9 @@
 use super::{Random, options, prepared};
 use olbvh::grid::morton;
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Field, Mesh, On, fault_of, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::reference::boundary::{Topology, fault_of};
+use olbvh::reference::boundary::Topology;
 use olbvh::reference::build::build;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{OverlapSide, overlap};

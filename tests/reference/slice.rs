@@ -4,10 +4,11 @@
 use super::oracle::{P, box_gap, distance};
 use super::{prepared, tree};
 use olbvh::grid::CellRange;
+use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::Assign;
-use olbvh::reference::boundary::{NONE, Topology};
+use olbvh::reference::boundary::Topology;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::slice::Slicer;
 use olbvh::slicing::{Band, EMPTY, Extrapolate, INSIDE, Plane, Rows, SliceSettings, TOUCHED, Tally, VoxelGrid, bands};

@@ -2,10 +2,9 @@
 
 use anyhow::{Context, Result};
 use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh};
-use olbvh::gpu::{Buffer, Gpu, Recorder};
+use olbvh::gpu::{Arena, Buffer, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
 use olbvh::options::BuildOptions;
-use olbvh::primitives::Arena;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_interpolate, cmd_locate};
 
 /// The size of the picture. Its rows are multiples of 256 bytes, as wgpu copies them.

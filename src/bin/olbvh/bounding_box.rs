@@ -2,7 +2,8 @@
 
 use crate::legend::ink;
 use glam::{DMat3, DVec2, DVec3};
-use olbvh::render::{Bounds, Plan, RayGrid};
+use olbvh::mesh::Bounds;
+use olbvh::render::{Plan, RayGrid};
 
 /// Opacity of a line.
 const OPACITY: f32 = 0.6;

@@ -10,12 +10,11 @@ use crate::common::{Common, Failure, Outcome};
 use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::mesh::Mesh;
+use olbvh::mesh::{Bounds, Fault, Mesh};
 use olbvh::options::BuildOptions;
 use olbvh::query::{Located, Nearest};
-use olbvh::reference::boundary::{Counts, Fault};
+use olbvh::reference::boundary::Counts;
 use olbvh::reference::overlap::Overlap;
-use olbvh::render::Bounds;
 use olbvh::slicing::{Band, Tally};
 use olbvh::tree::TreeBytes;
 

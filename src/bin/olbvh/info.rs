@@ -7,9 +7,8 @@ use crate::output::{self, Progress};
 use crate::text::{Page, bytes, grouped, joined, milliseconds, single};
 use olbvh::formats::{Fate, Loaded, printable};
 use olbvh::grid::MAX_LEVEL;
-use olbvh::mesh::{Field, Mesh, On};
+use olbvh::mesh::{Fault, Field, Mesh, On, fault_of};
 use olbvh::options::{Fineness, Lists};
-use olbvh::reference::boundary::{Fault, fault_of};
 use serde_json::{Value, json};
 use std::path::PathBuf;
 

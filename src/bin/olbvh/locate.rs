@@ -10,12 +10,10 @@ use olbvh::formats::{
     LoadOptions, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json, write_located,
     write_npy,
 };
-use olbvh::mesh::{Field, Mesh};
+use olbvh::mesh::{Bounds, Field, Mesh, valid_grid};
 use olbvh::options::Fineness;
 use olbvh::query::{self, LocateMethod, LocateOptions};
-use olbvh::reference::boundary::valid_grid;
 use olbvh::reference::locate::Location;
-use olbvh::render::Bounds;
 use rayon::prelude::*;
 use serde_json::json;
 use std::collections::HashSet;

@@ -1,8 +1,7 @@
 //! Where the voxels of `olbvh slice` lie, in the coordinates of the mesh file.
 
 use crate::text::{joined, number};
-use olbvh::mesh::Mesh;
-use olbvh::render::Bounds;
+use olbvh::mesh::{Bounds, Mesh};
 use olbvh::slicing::VoxelGrid;
 
 /// Placement of a stack of voxels.

@@ -6,10 +6,11 @@ use crate::build::{cmd_ranges, range_bytes};
 use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::error::Result;
+use crate::gpu::Arena;
 use crate::layout::RenderView;
-use crate::primitives::Arena;
+use crate::mesh::Bounds;
 use crate::query::{RenderInput, RenderMemory, Scene, StructureView, Visibility, cmd_render};
-use crate::render::{Bounds, Plan, ProjectedView};
+use crate::render::{Plan, ProjectedView};
 use glam::DMat4;
 use std::mem::offset_of;
 

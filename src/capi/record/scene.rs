@@ -8,9 +8,8 @@ use crate::build::{
 use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, check_level, give, handle, put, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, Gpu, Recorder};
+use crate::gpu::{ALIGNMENT, Arena, Gpu, Recorder};
 use crate::options::{BuildOptions, Lists, usual_capacity};
-use crate::primitives::Arena;
 use crate::query::Scene;
 
 /// Entries per tetrahedron for which there is room by default, if all leaves have full lists.

@@ -3,9 +3,9 @@
 use super::queries::{Stage, place, plan, read};
 use super::*;
 use crate::build::{Capacity, TreeMemory};
+use crate::gpu::Arena;
 use crate::layout::{BuildStatus, MeshStatus};
 use crate::mesh::kuhn;
-use crate::primitives::Arena;
 use crate::reference::build::build as build_tree;
 use std::mem::offset_of;
 

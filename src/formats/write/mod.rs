@@ -16,8 +16,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use tempfile::NamedTempFile;
 
-use super::source::ending;
 use super::npy;
+use super::source::ending;
 use crate::error::{Error, Result};
 pub use image::write_png;
 pub use located::{Located, write_located};

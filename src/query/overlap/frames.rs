@@ -1,11 +1,10 @@
 //! What sets and pairs share: counters, and both trees in one frame.
 
 use crate::error::Result;
-use crate::gpu::{ALIGNMENT, Buffer, BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{ALIGNMENT, Arena, Buffer, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{OverlapFrames, OverlapFramesSpec};
 use crate::layout::{NodeFrame, OverlapStatus};
 use crate::options::Assign;
-use crate::primitives::Arena;
 use crate::query::Scene;
 use std::mem::offset_of;
 

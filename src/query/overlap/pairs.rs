@@ -4,11 +4,11 @@
 use super::frames::{Frames, each_once, unfinished};
 use super::sets::BUDGET;
 use crate::error::{Error, Result};
-use crate::gpu::{BufferRef, Gpu, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{OverlapPairs, OverlapPairsSpec};
 use crate::layout::{OverlapStatus, SearchState};
 use crate::options::Lists;
-use crate::primitives::{Arena, Count, ScanScratch, cmd_exclusive_scan};
+use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{Rounds, Scene, capacity_of};
 use std::mem::offset_of;
 

@@ -2,12 +2,12 @@
 
 use super::frames::{Frames, each_once, unfinished};
 use crate::error::Result;
-use crate::gpu::{BufferRef, Groups, Recorder};
+use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::kernels::{
     OverlapCollect, OverlapCollectSpec, OverlapPlaces, OverlapPlacesSpec, OverlapSearch, OverlapSearchSpec, OverlapUsed, OverlapUsedSpec,
 };
 use crate::layout::SearchState;
-use crate::primitives::{Arena, Count};
+use crate::primitives::Count;
 use crate::query::{Rounds, Scene, list_parts};
 
 /// Nodes and entries that one tetrahedron may visit in one dispatch.

@@ -4,11 +4,10 @@
 use super::{SliceInput, SliceMemory, cmd_slice};
 use crate::build::DeviceMesh;
 use crate::error::Result;
-use crate::gpu::{Buffer, Gpu};
+use crate::gpu::{Arena, Buffer, Gpu};
 use crate::grid::CellRange;
 use crate::layout::{RunState, SliceStatus};
 use crate::mesh::On;
-use crate::primitives::Arena;
 use crate::query::{Built, Progress, Rounds, StructureView, upload_field};
 use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 

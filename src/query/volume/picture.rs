@@ -4,11 +4,10 @@
 use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render, cmd_render_marked};
 use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu, Recorder};
+use crate::gpu::{Arena, Buffer, BufferRef, DeviceKind, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
-use crate::primitives::Arena;
 use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, upload_field};
 use crate::render::{Plan, RenderStats, TABLE_SIZE};
 use bytemuck::Pod;

@@ -2,9 +2,9 @@
 //! precision, and has neither tree nor table.
 
 use super::Scene;
-use crate::mesh::On;
+use crate::mesh::{Bounds, On};
 use crate::render::shading::SKIN;
-use crate::render::{Bounds, OPACITY_UNIT, Projection, RenderSettings, Shade};
+use crate::render::{OPACITY_UNIT, Projection, RenderSettings, Shade};
 use glam::{DMat3, DVec3};
 use rayon::prelude::*;
 

@@ -1,7 +1,7 @@
 //! Views given by a matrix, as renderers have them.
 
-use super::Bounds;
 use crate::error::{Error, Result};
+use crate::mesh::Bounds;
 use crate::render::RayGrid;
 use crate::render::rays::View;
 use glam::{DMat4, DVec2, DVec3, DVec4};

@@ -1,7 +1,8 @@
 //! The textual form of a camera.
 
-use super::{Bounds, Camera, DEFAULT_FOV, Projection, three_quarter, upright};
+use super::{Camera, DEFAULT_FOV, Projection, three_quarter, upright};
 use crate::error::{Error, Result};
+use crate::mesh::Bounds;
 use glam::{DMat3, DVec3};
 
 /// A camera as a user describes it, in the coordinates of the mesh's source. Whatever is left open is chosen so that

@@ -4,7 +4,7 @@ use super::{Engine, OnProgress, Sink, Summary};
 use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::Mesh;
-use olbvh::options::BuildOptions;
+use olbvh::options::{BuildOptions, POINT_CHUNK, POINT_CODE_BITS};
 use olbvh::query::{LocateMethod, LocateOptions, Located, Nearest, Rendered};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
@@ -164,10 +164,10 @@ impl<'a> CpuTree<'a> {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Located::default();
         // Chunks and runs are those of a device (sorted ones, those of a processor), so that owners are equal even where tetrahedra overlap.
-        for chunk in points.chunks(locate::CHUNK) {
+        for chunk in points.chunks(POINT_CHUNK) {
             let found = match options.method {
                 LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
-                LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk, locate::CODE_BITS)),
+                LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk, POINT_CODE_BITS)),
                 LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => locator.locate_each(chunk),
             };
             all.owners.extend(found.iter().map(|l| l.owner));

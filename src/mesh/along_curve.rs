@@ -1,9 +1,8 @@
 //! Reordering of a mesh in memory along the Morton curve.
 
-use super::boundary::{fault_of, is_usable, valid_grid};
+use super::{Mesh, On, fault_of, is_usable, valid_grid};
 use crate::error::{Error, Result};
 use crate::grid::{morton, per_axis};
-use crate::mesh::{Mesh, On};
 use rayon::prelude::*;
 
 impl Mesh {
