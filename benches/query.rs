@@ -44,7 +44,7 @@ fn location(c: &mut Criterion) {
     let mut expected: Option<Vec<u32>> = None;
     for assign in Assign::EVERY {
         let tree = Tree::build(&gpu, &on_device, &BuildOptions { assign, ..BuildOptions::default() }).expect("a tree");
-        let scene = Scene::new(&on_device, &tree).expect("its mesh");
+        let scene = Scene::of(&tree);
         for (name, method) in [("descent", LocateMethod::Descent), ("traversal", LocateMethod::Traversal(8))] {
             let options = LocateOptions { method, ..LocateOptions::default() };
             let run = |iterations: u64| -> Duration {
@@ -63,7 +63,7 @@ fn location(c: &mut Criterion) {
         }
     }
     let lbvh = Lbvh::build(&gpu, &on_device).expect("a tree");
-    let locate = || lbvh.locate(&on_device, &points, TOLERANCE).expect("owners");
+    let locate = || lbvh.locate(&points, TOLERANCE).expect("owners");
     let run = |iterations: u64| -> Duration {
         let milliseconds = (0..iterations).flat_map(|_| locate().stages).map(|s| s.milliseconds).sum::<f64>();
         Duration::from_secs_f64(milliseconds * 1e-3)
@@ -85,9 +85,7 @@ fn rendering(c: &mut Criterion) {
     let field = &mesh.fields[0];
     let valid = ValidTets { bounds, neighbours: &topology.neighbours, is_valid: &|_| true };
     let prepared = Prepared::new(&settings, &mesh, &valid, field).expect("a plan");
-    let draw = || {
-        query::render(&on_device, &tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), SILENT).expect("a picture")
-    };
+    let draw = || query::render(&tree, &prepared.plan, (&field.values, On::Points), Some(&prepared.normals), SILENT).expect("a picture");
     let first = draw();
     assert!(first.stats.found_samples > 0 && first.colors == draw().colors, "two pictures differ");
     let mut group = c.benchmark_group("render");

@@ -15,7 +15,7 @@
 //! let gpu = Gpu::new(&GpuOptions::default())?;
 //! let on_device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip)?;
 //! let tree = Tree::build(&gpu, &on_device, &BuildOptions::default())?;
-//! let found = query::locate(&on_device, &tree, &[[0.5, 1.5, 2.5]], None, &query::LocateOptions::default(), query::SILENT)?;
+//! let found = query::locate(&tree, &[[0.5, 1.5, 2.5]], None, &query::LocateOptions::default(), query::SILENT)?;
 //! println!("the point lies in tetrahedron {}", found.owners[0]);
 //! # Ok(()) }
 //! ```
@@ -55,7 +55,7 @@
 //!     r.barrier("mesh → tree");
 //!     let mesh = MeshView { input: frame.input, arrays: frame.arrays };
 //!     cmd_build(r, &mesh, &frame.tree, &BuildOptions::default(), &frame.build_scratch)?; // ends with a barrier
-//!     let scene = Scene { mesh, tree: frame.tree, longest_leaf: frame.input.tets };
+//!     let scene = Scene::recorded(mesh, frame.tree);
 //!     cmd_locate(r, &scene, asked, found, &LocateOptions::default())
 //! } // then a barrier from compute writes to the reader of `found`, and `Recorder::finish`
 //! ```

@@ -8,7 +8,7 @@ use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
-use olbvh::query::{self, Built, LocateOptions, OverlapInput, Rendered, SILENT};
+use olbvh::query::{self, LocateOptions, Rendered, SILENT};
 use olbvh::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
@@ -111,8 +111,8 @@ fn check_owners(name: &str, b: &HostAndDevice) {
     if name == "identical-9000" {
         points = points.into_iter().step_by(97).collect(); // every point tests all tetrahedra
     }
-    let expected = query::locate(&b.device, &b.tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
-    let found = b.lbvh.locate(&b.device, &points, TOLERANCE).unwrap();
+    let expected = query::locate(&b.tree, &points, None, &LocateOptions::default(), SILENT).unwrap();
+    let found = b.lbvh.locate(&points, TOLERANCE).unwrap();
     for (i, p) in points.iter().enumerate() {
         let of = |l: &query::Located| (l.owners[i], l.barycentrics[i]);
         assert_eq!(of(&expected), of(&found), "{name}: point {i} {p:?}");
@@ -141,8 +141,9 @@ fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field:
     let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|t| bad.binary_search(&t).is_err() };
     let prepared = Prepared::new(settings, &b.mesh, &valid, field).ok()?;
     let normals = settings.shading.then_some(&prepared.normals[..]);
-    let draw = |built: &dyn Built| query::render(&b.device, built, &prepared.plan, (&field.values, field.on), normals, SILENT).unwrap();
-    let (expected, drawn) = (draw(&b.tree), draw(&b.lbvh));
+    let (plan, field) = (&prepared.plan, (&field.values[..], field.on));
+    let expected = query::render(&b.tree, plan, field, normals, SILENT).unwrap();
+    let drawn = b.lbvh.render(plan, field, normals, SILENT).unwrap();
     let camera = &settings.camera;
     // With a surface, the octree skips what does not show it. With a function that shows every value, it skips nothing.
     assert!(
@@ -174,28 +175,31 @@ fn check_slices(name: &str, b: &HostAndDevice) -> u64 {
     for (plane, layers) in [(Plane::Axis(0), 1), (Plane::Axis(2), 3), (Plane::Normal([1.0, -2.0, 0.7]), 2)] {
         let settings = SliceSettings { plane, layers, size: size(name, [17, 13]), ..SliceSettings::default() };
         let Ok(voxels) = settings.voxels(lo, hi, b.mesh.origin) else { continue };
-        let slice = |built: &dyn Built| {
+        let slice = |by_tree: bool| {
             let (mut kinds, mut owners) = (Vec::new(), Vec::new());
             let mut sink = |band: Band| {
                 kinds.extend(band.kinds);
                 owners.extend(band.owners);
                 Ok(())
             };
-            let sliced = query::slice(&b.device, built, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
-            touched += sliced.tally.touched;
+            let sliced = if by_tree {
+                query::slice(&b.tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink)
+            } else {
+                b.lbvh.slice(None, &voxels, Extrapolate::Nearest, SILENT, &mut sink)
+            };
+            touched += sliced.unwrap().tally.touched;
             (kinds, owners)
         };
-        let [expected, found] = [&b.tree as &dyn Built, &b.lbvh].map(slice);
+        let [expected, found] = [true, false].map(slice);
         assert!(expected.0 == found.0, "{name}: kinds of {plane:?}");
         assert!(expected.1 == found.1, "{name}: owners of {plane:?}");
     }
     touched
 }
 
-fn check_overlap<'a>(name: &str, a: &'a HostAndDevice, b: &'a HostAndDevice) -> usize {
-    let input = |b: &'a HostAndDevice| OverlapInput { mesh: &b.device, tree: &b.tree };
-    let expected = query::overlap(input(a), input(b), false, SILENT).unwrap();
-    let found = a.lbvh.overlap(&a.device, &b.lbvh, &b.device, SILENT).unwrap();
+fn check_overlap(name: &str, a: &HostAndDevice, b: &HostAndDevice) -> usize {
+    let expected = query::overlap(&a.tree, &b.tree, false, SILENT).unwrap();
+    let found = a.lbvh.overlap(&b.lbvh, SILENT).unwrap();
     assert_eq!(expected.overlap.a, found.overlap.a, "{name}: a");
     assert_eq!(expected.overlap.b, found.overlap.b, "{name}: b");
     if name == "identical-9000" {

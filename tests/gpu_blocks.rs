@@ -8,7 +8,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
-use olbvh::query::{self, LocateMethod, LocateOptions, OverlapInput, SILENT};
+use olbvh::query::{self, LocateMethod, LocateOptions, SILENT};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume;
@@ -42,7 +42,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     let mut most = 0;
     for field in mesh.fields.iter().filter(|f| f.on == on) {
         let field = (&field.values[..], field.on);
-        let whole = query::locate(&device, &tree, &points, Some(field), &how, SILENT).unwrap();
+        let whole = query::locate(&tree, &points, Some(field), &how, SILENT).unwrap();
         let found = locate(gpu, memory, &asked, Some(field), SILENT).unwrap();
         let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
         let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
@@ -54,10 +54,10 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         println!("{} tetrahedra, {memory} bytes: {} trees, peak {}", mesh.tets.len(), found.trees, found.peak);
         most = most.max(found.trees);
     }
-    let whole = query::locate_all(&device, &tree, &points, how.tolerance, SILENT).unwrap();
+    let whole = query::locate_all(&tree, &points, how.tolerance, SILENT).unwrap();
     assert_eq!(locate_all(gpu, memory, &asked, SILENT).unwrap().answer, whole);
     for within in [0.7, f32::INFINITY] {
-        let whole = query::nearest(&device, &tree, &points, within, None, SILENT).unwrap();
+        let whole = query::nearest(&tree, &points, within, SILENT).unwrap();
         let found = nearest(gpu, memory, &asked, within, SILENT).unwrap();
         assert!(found.answer.owners == whole.owners && found.answer.barycentrics == whole.barycentrics && found.trees > 4);
         assert_eq!(bits(&found.answer.distances()), bits(&whole.distances()));
@@ -175,7 +175,7 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let options = BuildOptions { lists, ..BuildOptions::default() };
         let devices = [a, &b].map(|mesh| DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap());
         let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
-        let [x, y] = [0, 1].map(|i| OverlapInput { mesh: &devices[i], tree: &trees[i] });
+        let [x, y] = [&trees[0], &trees[1]];
         let told = RefCell::new(Vec::new());
         let report = |done, all| told.borrow_mut().push((done, all));
         let whole = query::overlap(x, y, pairs, &report).unwrap().overlap;
@@ -245,7 +245,7 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
             gather(&mut all[0], band);
             Ok(())
         };
-        query::slice(&device, &tree, values, voxels, extrapolate, SILENT, &mut sink).unwrap();
+        query::slice(&tree, values, voxels, extrapolate, SILENT, &mut sink).unwrap();
         let memory = 640 << 10;
         let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate };
         let mut sink = |band: Band| {
@@ -381,7 +381,7 @@ fn large_pictures_are_drawn_in_strips() {
     let tree = Tree::build(&gpu, &device, &options).unwrap();
     let told = RefCell::new(Vec::new());
     let report = |done, all| told.borrow_mut().push((done, all));
-    let drawn = query::render(&device, &tree, scene.plan(), (&field.values, field.on), None, &report).unwrap();
+    let drawn = query::render(&tree, scene.plan(), (&field.values, field.on), None, &report).unwrap();
     let [samples, expected_samples] = [drawn.stats, expected.stats].map(|stats| [stats.samples, stats.found_samples]);
     assert_eq!(samples, expected_samples);
     let pixels = |colors: &[[f32; 4]]| scene.plan().pixels(colors, 1);

@@ -88,7 +88,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
     // Every point is found in a tree of a small budget, with the lowest tetrahedron that contains it.
     let of = |budget: Option<u64>| {
         let tree = Tree::build(gpu, &device, &BuildOptions { budget, ..BuildOptions::default() }).unwrap();
-        let found = locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
+        let found = locate(&tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
         (tree.status().level, found.owners)
     };
     let ((coarse, found), (fine, expected)) = (of(Some(TreeBytes::most(&sizes.entries, 1, false).total())), of(None));
@@ -228,7 +228,7 @@ fn every_capacity() {
             submit(&gpu, "olbvh.test.sweep", |r| {
                 built.iter().zip(rooms).try_for_each(|(Built { tree, owners }, &room)| {
                     cmd_build(r, &view, tree, &options, &plan(&mut Arena::new(scratch.all()), room)?)?;
-                    let scene = Scene { mesh: view, tree: *tree, longest_leaf: tets };
+                    let scene = Scene::recorded(view, *tree);
                     cmd_locate(r, &scene, &points, &LocateOutput { owners: *owners, barycentrics }, &LocateOptions::default())?;
                     r.barrier("locate → build");
                     Ok(())
@@ -269,12 +269,13 @@ fn what_does_not_fit_answers_as_empty() {
     let mesh = kuhn([4; 3]).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let (tets, count, view, options) = (mesh.tets.len() as u32, mesh.points.len() as u32, device.view(), BuildOptions::default());
-    let whole = Scene::new(&device, &Tree::build(&gpu, &device, &options).unwrap()).unwrap();
+    let tree = Tree::build(&gpu, &device, &options).unwrap();
+    let whole = Scene::of(&tree);
     for level in [0, 2] {
         let capacity = Capacity { candidates: 64 * tets, ..Capacity::for_entries(tets / 2, level) };
         let carve = |a: &mut Arena| {
             let tree = TreeMemory::carve(a, &capacity, &options)?;
-            let scene = Scene { mesh: view, tree, longest_leaf: tets };
+            let scene = Scene::recorded(view, tree);
             let output = LocateOutput { owners: a.words(u64::from(count))?, barycentrics: a.take(16 * u64::from(count))? };
             Ok((BuildScratch::carve(&gpu, a, tets, &capacity, &options)?, scene, output, OverlapMemory::carve(a, &whole, &scene)?))
         };

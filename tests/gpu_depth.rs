@@ -10,7 +10,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Arena, Gpu, GpuOptions};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, StructureView, cmd_render};
+use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene as OnDevice, cmd_render};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Scene, render};
@@ -61,7 +61,7 @@ fn what_lies_behind_is_not_drawn() {
     let arrays = build(&mesh, &topology, &BuildOptions::default()).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let searched = StructureView::new(&device, &tree).unwrap();
+    let on_device = OnDevice::of(&tree);
     let is_valid = |tet| topology.is_valid(tet);
     let valid = ValidTets { bounds: (&arrays.grid).into(), neighbours: &topology.neighbours, is_valid: &is_valid };
     let values = gpu.upload("olbvh.test.field", &field.values).unwrap();
@@ -79,18 +79,9 @@ fn what_lies_behind_is_not_drawn() {
             let carve = |a: &mut Arena| RenderMemory::carve(a, SIZE, None);
             let buffer = gpu.upload("olbvh.test.picture", &vec![0u8; Arena::measure(carve).unwrap() as usize]).unwrap();
             let memory = carve(&mut Arena::new(buffer.all())).unwrap();
-            let input = RenderInput {
-                size: SIZE,
-                view: view.all(),
-                iso: !settings.iso.is_empty(),
-                table: table.all(),
-                field: (values.all(), On::Points),
-                normals: Some(normals.all()),
-                depth: Some(depth.all()),
-                visibility: None,
-                part: None,
-            };
-            submit(&gpu, "olbvh.test.picture", |r| cmd_render(r, &searched, &input, &memory, Rounds::begin(8))).unwrap();
+            let whole = RenderInput::of(&plan, view.all(), table.all(), (values.all(), On::Points));
+            let input = RenderInput { normals: Some(normals.all()), depth: Some(depth.all()), ..whole };
+            submit(&gpu, "olbvh.test.picture", |r| cmd_render(r, &on_device, &input, &memory, Rounds::begin(8))).unwrap();
             let hidden: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 16 * u64::from(SIZE[0] * SIZE[1]))).unwrap();
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|color| color.map(f32::to_bits)).collect::<Vec<_>>();
             assert!(bits(&hidden) == bits(&render(&scene().before(&depths), SILENT).colors));

@@ -262,8 +262,8 @@ fn check(binding: Binding) {
         let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())));
         let found = run::<9>(&gpu, ANSWERS, &scene, level, &points);
         let options = LocateOptions::default();
-        let expected = locate(&device, &tree, &points, Some((&values, On::Points)), &options, SILENT).unwrap();
-        let all = locate_all(&device, &tree, &points, options.tolerance, SILENT).unwrap();
+        let expected = locate(&tree, &points, Some((&values, On::Points)), &options, SILENT).unwrap();
+        let all = locate_all(&tree, &points, options.tolerance, SILENT).unwrap();
         for (i, [owner, owners, value, slope, met, weights @ ..]) in found.into_iter().enumerate() {
             let what = format!("{binding:?} {lists:?}: point {i} {:?}", points[i]);
             assert_eq!(owner, expected.owners[i], "{what}");

@@ -27,7 +27,7 @@ use submit::submit;
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, &BuildOptions::default()).unwrap();
-    locate(&device, &tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap().owners
+    locate(&tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap().owners
 }
 
 #[test]

@@ -13,8 +13,7 @@ use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use olbvh::query::{
-    LocateMethod, LocateOptions, LocateOutput, OverlapInput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render,
-    slice,
+    LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render, slice,
 };
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
@@ -86,12 +85,12 @@ impl Subject {
         let expected = locator.locate_each(&points);
         let what = |i: usize| format!("{} {options:?} point {i} {:?}", self.name, points[i]);
         for method in [LocateMethod::Descent, LocateMethod::Traversal(3)] {
-            let found = locate(&self.device, &tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
+            let found = locate(&tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
             for (i, e) in expected.iter().enumerate() {
                 assert_eq!((e.owner, e.barycentric), (found.owners[i], found.barycentrics[i]), "{method:?} {}", what(i));
             }
         }
-        let lists = locate_all(&self.device, &tree, &points, TOLERANCE, SILENT).unwrap();
+        let lists = locate_all(&tree, &points, TOLERANCE, SILENT).unwrap();
         for (i, list) in lists.iter().enumerate() {
             assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
         }
@@ -103,7 +102,7 @@ impl Subject {
         let barycentrics = gpu.buffer("olbvh.test.barycentrics", 16 * count).unwrap();
         let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()), order: None };
         let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
-        let scene = Scene::new(&self.device, &tree).unwrap();
+        let scene = Scene::of(&tree);
         submit(gpu, "olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
         let found: Vec<u32> = gpu.download(&owners, owners.all()).unwrap();
         for (i, owner) in found.into_iter().enumerate() {
@@ -126,7 +125,7 @@ impl Subject {
             bands.push((band.kinds, band.owners));
             Ok(())
         };
-        slice(&self.device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut take).unwrap();
+        slice(&tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut take).unwrap();
         bands
     }
 
@@ -136,7 +135,7 @@ impl Subject {
         let field = Field { name: "x".into(), on: On::Points, values: self.mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect() };
         let settings = RenderSettings { size: [60, 45], ..RenderSettings::default() };
         let scene = volume::Scene::new(&self.mesh, &self.topology, &host, &field, &settings).unwrap();
-        let drawn = render(&self.device, &tree, scene.plan(), (&field.values, field.on), None, SILENT).unwrap();
+        let drawn = render(&tree, scene.plan(), (&field.values, field.on), None, SILENT).unwrap();
         (drawn.colors.into_iter().map(|c| c.map(f32::to_bits)).collect(), drawn.stats.found_samples)
     }
 }
@@ -215,7 +214,7 @@ fn overlaps() {
     let (a, b) = (Subject::new(&gpu, "a", kuhn_jittered([14; 3], 0.12, 3).unwrap()), Subject::new(&gpu, "b", moved));
     let sets = Lists::EVERY.map(|lists| {
         let trees = [&a, &b].map(|s| Tree::build(&gpu, &s.device, &options(0.0, Assign::Aabb, lists)).unwrap());
-        let inputs = [(&a, &trees[0]), (&b, &trees[1])].map(|(s, tree)| OverlapInput { mesh: &s.device, tree });
+        let inputs = [&trees[0], &trees[1]];
         if lists == Lists::Boundary {
             assert!(overlap(inputs[0], inputs[1], true, SILENT).is_err_and(|e| e.to_string().contains("Lists::All")));
         }

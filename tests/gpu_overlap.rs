@@ -63,6 +63,6 @@ fn long_lists_take_several_submissions() {
     let apart = HostAndDevice::new(&gpu, apart, &options).unwrap();
     check_overlap(&apart, &many).unwrap();
     check_overlap(&many, &apart).unwrap();
-    let found = overlap(apart.input(), many.input(), true, SILENT).unwrap();
+    let found = overlap(&apart.tree, &many.tree, true, SILENT).unwrap();
     assert!(found.submissions > 10, "{}", found.submissions);
 }

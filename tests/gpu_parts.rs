@@ -14,8 +14,8 @@ use olbvh::options::BuildOptions;
 use olbvh::primitives::{Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput,
-    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, StructureView, cmd_count_owners, cmd_interpolate, cmd_list_owners,
-    cmd_list_pairs, cmd_locate, cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
+    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_list_pairs, cmd_locate,
+    cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
 };
 use olbvh::render::TABLE_SIZE;
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -64,7 +64,7 @@ impl Lab {
 #[test]
 fn points_and_their_answers() {
     let lab = Lab::new();
-    let scene = Scene::new(&lab.device, &lab.tree).unwrap();
+    let scene = Scene::of(&lab.tree);
     let count = 100;
     let n = u64::from(count);
     // The last point ends before the next one would begin.
@@ -106,7 +106,7 @@ fn points_and_their_answers() {
     owners(count - 1).into_iter().for_each(|result| refused(result, "owners"));
 
     let memory = NearestMemory::carve(&mut Arena::new(lab.memory.all()), count).unwrap();
-    let near = |input, memory, rounds| lab.rehearse(|r| cmd_nearest(r, &scene, &input, 1.0, None, &memory, rounds));
+    let near = |input, memory, rounds| lab.rehearse(|r| cmd_nearest(r, &scene, &input, 1.0, &memory, rounds));
     near(input, memory, Rounds::begin(1)).unwrap();
     too_few_rounds(&near(input, memory, Rounds::begin(0)));
     refused(near(PointInput { points: less(input.points), ..input }, memory, Rounds::begin(1)), "points");
@@ -117,12 +117,12 @@ fn points_and_their_answers() {
 #[test]
 fn fields_and_their_values() {
     let lab = Lab::new();
-    let (scene, view, tree) = (Scene::new(&lab.device, &lab.tree).unwrap(), lab.device.view(), lab.tree.memory());
+    let (scene, view, tree) = (Scene::of(&lab.tree), lab.device.view(), lab.tree.memory());
     let (points, tets) = (u64::from(view.input.points), u64::from(view.input.tets));
     let (count, nodes) = (100, tree.capacity.nodes);
     let (located, values) = (LocateOutput { owners: lab.part(400), barycentrics: lab.part(1600) }, lab.part(400));
     for (on, field) in [(On::Points, lab.part(4 * points)), (On::Cells, lab.part(4 * tets))] {
-        let interpolate = |field, located, values| lab.rehearse(|r| cmd_interpolate(r, &scene, field, on, &located, values, count));
+        let interpolate = |field, located, values| lab.rehearse(|r| cmd_interpolate(r, &scene, (field, on), &located, values, count));
         interpolate(field, located, values).unwrap();
         refused(interpolate(less(field), located, values), "a field");
         refused(interpolate(field, LocateOutput { owners: less(located.owners), ..located }, values), "owners");
@@ -146,14 +146,14 @@ fn fields_and_their_values() {
 #[test]
 fn pictures_and_slices() {
     let lab = Lab::new();
-    let (searched, points) = (StructureView::new(&lab.device, &lab.tree).unwrap(), u64::from(lab.device.input().points));
+    let (scene, points) = (Scene::of(&lab.tree), u64::from(lab.device.input().points));
     let memory = RenderMemory::carve(&mut Arena::new(lab.memory.all()), [16; 2], None).unwrap();
     let field = (lab.part(4 * points), On::Points);
     let short = (less(field.0), On::Points);
     let (view, table) = (lab.part(size_of::<RenderView>() as u64), lab.part(16 * TABLE_SIZE as u64));
     let (normals, depth) = (Some(lab.part(12 * points)), Some(lab.part(4 * 16 * 16)));
-    let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, depth, visibility: None, part: None };
-    let draw = |input: RenderInput| lab.rehearse(|r| cmd_render(r, &searched, &input, &memory, Rounds::begin(1)));
+    let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, depth, visibility: None, row: 0 };
+    let draw = |input: RenderInput| lab.rehearse(|r| cmd_render(r, &scene, &input, &memory, Rounds::begin(1)));
     draw(input).unwrap();
     refused(draw(RenderInput { view: less(view), ..input }), "a view");
     refused(draw(RenderInput { table: less(table), ..input }), "a transfer function");
@@ -167,8 +167,8 @@ fn pictures_and_slices() {
     let memory = SliceMemory::carve(&mut Arena::new(lab.memory.all()), [5, 5], 5).unwrap();
     let slice = |field, rounds| {
         let rows = Rows { layer: 0, first: 0, count: 5 };
-        let input = SliceInput { voxels: &voxels, rows, field: Some(field), extrapolate: Extrapolate::Nearest, part: None };
-        lab.rehearse(|r| cmd_slice(r, &searched, &input, &memory, rounds))
+        let input = SliceInput { voxels: &voxels, rows, field: Some(field), extrapolate: Extrapolate::Nearest };
+        lab.rehearse(|r| cmd_slice(r, &scene, &input, &memory, rounds))
     };
     slice(field, Rounds::begin(1)).unwrap();
     refused(slice(short, Rounds::begin(1)), "a field");
@@ -180,7 +180,7 @@ fn pictures_and_slices() {
 #[test]
 fn searches_begin_with_a_round() {
     let lab = Lab::new();
-    let scene = Scene::new(&lab.device, &lab.tree).unwrap();
+    let scene = Scene::of(&lab.tree);
     let memory = OverlapMemory::carve(&mut Arena::new(lab.memory.all()), &scene, &scene).unwrap();
     too_few_rounds(&lab.rehearse(|r| cmd_overlap(r, &scene, &scene, &memory, Rounds::begin(0))));
     lab.rehearse(|r| cmd_overlap(r, &scene, &scene, &memory, Rounds::begin(1))).unwrap();

@@ -100,7 +100,7 @@ fn no_point_is_lost(binding: Binding, n: usize, which: usize) {
     for (k, assign) in Assign::EVERY.into_iter().enumerate() {
         let from = begin + k * third;
         let points: Vec<_> = (from..(from + third).min(begin + count)).map(|i| point(&mesh, side as f32, i)).collect();
-        let find = |tree: &Tree| locate(&device, tree, &points, None, &LocateOptions::default(), SILENT).unwrap().owners;
+        let find = |tree: &Tree| locate(tree, &points, None, &LocateOptions::default(), SILENT).unwrap().owners;
         let expected = find(&first);
         for lists in Lists::EVERY {
             let found = find(&build(alpha, assign, lists));
@@ -164,7 +164,7 @@ fn all_owners_of_points_on_a_crowded_edge() {
     let on_edge = |i: usize| i % (at_once / 2) == 7;
     let points: Vec<_> = (0..2 * at_once + 9).map(|i| if on_edge(i) { [0.0, 0.0, 0.25] } else { [90.0; 3] }).collect();
     let told = RefCell::new(Vec::new());
-    let found = locate_all(&device, &tree, &points, 0.0, &|done, all| told.borrow_mut().push((done, all))).unwrap();
+    let found = locate_all(&tree, &points, 0.0, &|done, all| told.borrow_mut().push((done, all))).unwrap();
     let all = points.len() as u64;
     assert_eq!(told.into_inner(), [at_once as u64, 2 * at_once as u64, all].map(|done| (done, all)));
     assert_eq!((0..points.len()).filter(|&i| on_edge(i)).count(), 5);
@@ -231,7 +231,7 @@ fn no_point_strictly_inside_a_sliver_is_lost() {
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
-        let found = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..LocateOptions::default() }, SILENT).unwrap();
+        let found = locate(&tree, &points, None, &LocateOptions { tolerance: 0.0, ..LocateOptions::default() }, SILENT).unwrap();
         let lost: Vec<usize> = (0..points.len()).filter(|&i| found.owners[i] != owners[i]).collect();
         assert!(lost.is_empty(), "{lists:?}: {} of {} points are lost, first {:?}", lost.len(), points.len(), points[lost[0]]);
     }

@@ -27,7 +27,7 @@ fn has_rays(gpu: &Gpu, method: RayMethod) -> bool {
 
 fn by_rays(gpu: &Gpu, mesh: &DeviceMesh, method: RayMethod, points: &[[f32; 3]]) -> (Rays, Vec<u32>, Vec<[f32; 4]>) {
     let rays = Rays::build(gpu, mesh, method).unwrap().unwrap();
-    let found = rays.locate(mesh, points).unwrap();
+    let found = rays.locate(points).unwrap();
     (rays, found.owners, found.barycentrics)
 }
 
@@ -61,7 +61,7 @@ fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
         points.extend([[f32::NAN; 3], [f32::INFINITY; 3], [-1e38; 3]]);
         let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
         let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-        let expected = locate(&device, &tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, SILENT).unwrap();
+        let expected = locate(&tree, &points, None, &LocateOptions { tolerance: 0.0, ..Default::default() }, SILENT).unwrap();
         let (rays, owners, weights) = by_rays(&gpu, &device, method, &points);
         let host = tree.download().unwrap();
         let topology = topology(&mesh).unwrap();

@@ -16,8 +16,8 @@ use olbvh::layout::{Grid, OverlapStatus, RenderPlan, RenderStatus, RenderView, S
 use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{
-    OverlapInput, PairMemory, RenderInput, RenderMemory, Rounds, SILENT, Scene, SliceInput, SliceMemory, StructureView, cmd_count_pairs,
-    cmd_list_pairs, cmd_render, cmd_slice, overlap, render, slice,
+    PairMemory, RenderInput, RenderMemory, Rounds, SILENT, Scene, SliceInput, SliceMemory, cmd_count_pairs, cmd_list_pairs, cmd_render,
+    cmd_slice, overlap, render, slice,
 };
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
@@ -50,7 +50,7 @@ fn bits(words: &[u32]) -> Vec<u32> {
     (0..32 * words.len() as u32).filter(|i| words[(i / 32) as usize] >> (i % 32) & 1 != 0).collect()
 }
 
-fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f32], device: &DeviceMesh, tree: &Tree) -> SliceStatus {
+fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f32], tree: &Tree) -> SliceStatus {
     let n = (queries.rows.count * 37) as usize;
     let (answers, found): (Vec<u32>, Vec<f32>) =
         (read(gpu, queries, queries.slice.answers, n), read(gpu, queries, queries.slice.values, n));
@@ -67,7 +67,7 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
         owned.owners.extend(band.owners);
         Ok(())
     };
-    slice(device, tree, Some((values, On::Points)), &queries.voxels, Extrapolate::Nearest, SILENT, &mut keep).unwrap();
+    slice(tree, Some((values, On::Points)), &queries.voxels, Extrapolate::Nearest, SILENT, &mut keep).unwrap();
     assert_eq!(owned.owners, expected.owners);
     let to_bits = |values: &[f32]| values.iter().map(|x| if x.is_nan() { u32::MAX } else { x.to_bits() }).collect::<Vec<_>>();
     assert_eq!(to_bits(&owned.values), to_bits(&found), "values of the recorded and the owning form");
@@ -80,9 +80,9 @@ fn compare_slice(gpu: &Gpu, queries: &Queries, slicer: &Slicer<'_>, values: &[f3
 
 /// Compares the picture with that of the owning call, and its plan with that of the host. Returns the number of samples
 /// found, and skipped.
-fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], device: &DeviceMesh, tree: &Tree, grid: &Grid) -> [u64; 2] {
+fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], tree: &Tree, grid: &Grid) -> [u64; 2] {
     let (plan, picture) = (&queries.plan, &queries.picture);
-    let owned = render(device, tree, plan, (values, On::Points), Some(&queries.normals), SILENT).unwrap();
+    let owned = render(tree, plan, (values, On::Points), Some(&queries.normals), SILENT).unwrap();
     let found: Vec<[f32; 4]> = read(gpu, queries, picture.colors, owned.colors.len());
     assert!(found == owned.colors, "colours of the recorded and the owning form");
     let status: RenderStatus = read(gpu, queries, picture.status, 1)[0];
@@ -141,8 +141,8 @@ fn frames(binding: Binding) {
         let field = Field { name: "x".into(), on: On::Points, values: values.clone() };
         let slicer = Slicer::new(&shown, &topology, &host, Some(&field), queries.voxels, Extrapolate::Nearest).unwrap();
         listed += compare_owners(&gpu, &queries, &Locator::new(&shown, &topology, &host), &shown.points);
-        touched += compare_slice(&gpu, &queries, &slicer, &values, &device, &tree).touched;
-        let seen = compare_picture(&gpu, &queries, &values, &device, &tree, &host.grid);
+        touched += compare_slice(&gpu, &queries, &slicer, &values, &tree).touched;
+        let seen = compare_picture(&gpu, &queries, &values, &tree, &host.grid);
         drawn = [drawn[0] + seen[0], drawn[1] + seen[1]];
 
         let (a, b) = (
@@ -152,9 +152,7 @@ fn frames(binding: Binding) {
         let (sets, pairs) = (reference(a, b, false), reference(a, b, true).pairs.unwrap());
         let hits = |k: usize, n: usize| bits(&read(&gpu, &queries, queries.sets.hits[k], n.div_ceil(32)));
         assert_eq!((hits(0, shown.tets.len()), hits(1, other.tets.len())), (sets.a.clone(), sets.b.clone()), "frame {i}");
-        let (device, other) =
-            (OverlapInput { mesh: &device, tree: &tree }, OverlapInput { mesh: &queries.other, tree: &queries.other_tree });
-        assert_eq!(overlap(device, other, false, SILENT).unwrap().overlap, sets, "frame {i}");
+        assert_eq!(overlap(&tree, &queries.other_tree, false, SILENT).unwrap().overlap, sets, "frame {i}");
         let statuses = queries.sets.status.map(|part| read::<OverlapStatus>(&gpu, &queries, part, 1)[0]);
         assert!(statuses.iter().all(|s| s.unfinished == 0 && s.empty == 0));
 
@@ -205,23 +203,23 @@ fn rounds_go_on_where_they_ended() {
         layers: 1,
     };
     let rows = Rows { layer: 0, first: 0, count: 5 };
-    let searched = StructureView::new(&device, &tree).unwrap();
-    let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest, part: None };
+    let scene = Scene::of(&tree);
+    let input = SliceInput { voxels: &voxels, rows, field: None, extrapolate: Extrapolate::Nearest };
     let carve = |a: &mut Arena| SliceMemory::carve(a, [5, 5], 5);
     let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.slice", carve).unwrap();
     // The same number of voxels, but more side by side.
     let wide = olbvh::slicing::VoxelGrid { size: [25, 1], ..voxels };
     let wide = SliceInput { voxels: &wide, rows: Rows { count: 1, ..rows }, ..input };
-    let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &searched, &wide, &memory, Rounds::begin(1)));
+    let refused = submit(&gpu, "olbvh.test.wide", |r| cmd_slice(r, &scene, &wide, &memory, Rounds::begin(1)));
     assert!(refused.is_err_and(|e| e.to_string().contains("1 rows of 25 voxels in memory for 25 voxels in 5 runs")));
     // A row that the layer lacks, although the stack goes on.
     let two = olbvh::slicing::VoxelGrid { layers: 2, ..voxels };
     let beyond = SliceInput { voxels: &two, rows: Rows { first: 5, count: 1, ..rows }, ..input };
-    let refused = cmd_slice(&mut olbvh::gpu::Recorder::rehearse(&gpu), &searched, &beyond, &memory, Rounds::begin(1));
+    let refused = cmd_slice(&mut olbvh::gpu::Recorder::rehearse(&gpu), &scene, &beyond, &memory, Rounds::begin(1));
     assert!(refused.is_err_and(|e| e.to_string().contains("1 rows from row 5 of layer 0 on")));
     let (mut rounds, mut submissions) = (Rounds::begin(1), 0);
     let status = loop {
-        submit(&gpu, "olbvh.test.round", |r| cmd_slice(r, &searched, &input, &memory, rounds)).unwrap();
+        submit(&gpu, "olbvh.test.round", |r| cmd_slice(r, &scene, &input, &memory, rounds)).unwrap();
         rounds = Rounds::resume(1);
         submissions += 1;
         let status = gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0];
@@ -236,24 +234,20 @@ fn rounds_go_on_where_they_ended() {
     assert_eq!(status.inside + status.touched + status.empty, 25);
     let answers: Vec<u32> = gpu.download(&buffer, memory.answers.part(0, 100)).unwrap();
     // All rounds in one recording give the same.
-    submit(&gpu, "olbvh.test.rounds", |r| cmd_slice(r, &searched, &input, &memory, Rounds::begin(40))).unwrap();
+    submit(&gpu, "olbvh.test.rounds", |r| cmd_slice(r, &scene, &input, &memory, Rounds::begin(40))).unwrap();
     assert_eq!(gpu.download::<SliceStatus>(&buffer, memory.status).unwrap()[0], status);
     assert_eq!(gpu.download::<u32>(&buffer, memory.answers.part(0, 100)).unwrap(), answers);
 
     let lbvh = Lbvh::build(&gpu, &device).unwrap();
-    picture_goes_on(&gpu, &searched, &mesh.points, false);
-    let surface = picture_goes_on(&gpu, &searched, &mesh.points, true);
-    assert!(
-        surface == picture_goes_on(&gpu, &StructureView::new(&device, &lbvh).unwrap(), &mesh.points, true),
-        "a surface by either structure"
-    );
+    picture_goes_on(&gpu, &scene, &mesh.points, false);
+    let (plan, values, surface) = picture_goes_on(&gpu, &scene, &mesh.points, true);
+    let drawn = lbvh.render(&plan, (&values, On::Points), None, SILENT).unwrap();
+    assert!(surface == drawn.colors, "a surface by either structure");
 
-    let scene = Scene::new(&device, &tree).unwrap();
     let few = DeviceMesh::upload(&gpu, &one, BadCells::Skip).unwrap();
     let few_tree = Tree::build(&gpu, &few, &options).unwrap();
-    let few_scene = Scene::new(&few, &few_tree).unwrap();
-    let expected =
-        overlap(OverlapInput { mesh: &few, tree: &few_tree }, OverlapInput { mesh: &device, tree: &tree }, true, SILENT).unwrap();
+    let few_scene = Scene::of(&few_tree);
+    let expected = overlap(&few_tree, &tree, true, SILENT).unwrap();
     let expected = expected.overlap.pairs.unwrap();
     let carve = |a: &mut Arena| Ok((PairMemory::carve(&gpu, a, one.tets.len() as u32)?, a.take(8 * expected.len() as u64)?));
     let (buffer, (memory, found)) = Arena::reserve(&gpu, "olbvh.test.pairs", carve).unwrap();
@@ -276,7 +270,7 @@ fn rounds_go_on_where_they_ended() {
 }
 
 /// A picture drawn in several recordings equals that of one recording: of a volume, or of a surface across it.
-fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso: bool) -> Vec<[f32; 4]> {
+fn picture_goes_on(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], iso: bool) -> (Plan, Vec<f32>, Vec<[f32; 4]>) {
     let (surfaces, step) = if iso { (vec![0.7], 0.1) } else { (vec![], 0.2) };
     let settings = RenderSettings { size: [4, 3], step: Some(step), iso: surfaces, ..RenderSettings::default() };
     let plan = Plan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();
@@ -285,22 +279,12 @@ fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso
     let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     let field = (field.all(), On::Points);
-    let input = RenderInput {
-        size: [4, 3],
-        view: view.all(),
-        iso,
-        table: table.all(),
-        field,
-        normals: None,
-        depth: None,
-        visibility: None,
-        part: None,
-    };
+    let input = RenderInput::of(&plan, view.all(), table.all(), field);
     let carve = |a: &mut Arena| RenderMemory::carve(a, [4, 3], None);
     let buffer = gpu.upload("olbvh.test.picture", &vec![0x55u8; Arena::measure(carve).unwrap() as usize]).unwrap();
     let memory = carve(&mut Arena::new(buffer.all())).unwrap();
     let draw = |rounds: Rounds| {
-        submit(gpu, "olbvh.test.round", |r| cmd_render(r, searched, &input, &memory, rounds)).unwrap();
+        submit(gpu, "olbvh.test.round", |r| cmd_render(r, scene, &input, &memory, rounds)).unwrap();
         let colors: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 12 * 16)).unwrap();
         (colors, RenderStatus { pad: 0, ..gpu.download::<RenderStatus>(&buffer, memory.status).unwrap()[0] })
     };
@@ -316,17 +300,16 @@ fn picture_goes_on(gpu: &Gpu, searched: &StructureView, points: &[[f32; 3]], iso
             break drawn;
         }
     };
-    assert!(rounds > 2 || searched.mesh.input.tets < 1000, "{rounds}");
+    assert!(rounds > 2 || scene.mesh.input.tets < 1000, "{rounds}");
     assert!(status.found[0] > 0 && colors.iter().any(|c| c[3] > 0.0));
     assert!(draw(Rounds::begin(rounds)) == (colors.clone(), status), "all rounds in one recording");
     assert!(draw(Rounds::begin(rounds + 1)) == (colors.clone(), status), "a round more");
     if rounds > 1 {
         assert!(draw(Rounds::begin(rounds - 1)).1.unfinished > 0, "a round less");
     }
-    let more =
-        submit(gpu, "olbvh.test.round", |r| cmd_render(r, searched, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
+    let more = submit(gpu, "olbvh.test.round", |r| cmd_render(r, scene, &RenderInput { size: [4, 4], ..input }, &memory, Rounds::begin(1)));
     assert!(more.unwrap_err().to_string().contains("4×4 pixels"));
-    colors
+    (plan, values, colors)
 }
 
 /// The status reports what a recording cannot know beforehand: boxes too large for the mesh, and a mesh without valid

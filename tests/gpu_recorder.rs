@@ -156,7 +156,7 @@ fn location() {
         r.barrier("sort_points → locate");
         cmd_locate(r, &scene, &points, &frame.output, &LocateOptions { method: LocateMethod::Sorted, ..LocateOptions::default() })?;
         r.barrier("locate → interpolate");
-        cmd_interpolate(r, &scene, field.all(), On::Points, &frame.output, values.all(), frame.points.count)?;
+        cmd_interpolate(r, &scene, (field.all(), On::Points), &frame.output, values.all(), frame.points.count)?;
         r.barrier("interpolate → caller");
         read(r, &[values.all()], &sink);
         Ok(())
@@ -164,7 +164,7 @@ fn location() {
     assert!(barriers >= 4 + 5, "{barriers}");
     let (_memory, near) = Arena::reserve(&gpu, "olbvh.test.nearest", |a| NearestMemory::carve(a, frame.points.count)).unwrap();
     let barriers = every_barrier_counts(&gpu, "closest places", |r| {
-        cmd_nearest(r, &scene, &frame.points, 1.0, None, &near, Rounds::begin(2))?;
+        cmd_nearest(r, &scene, &frame.points, 1.0, &near, Rounds::begin(2))?;
         r.barrier("nearest → caller");
         read(r, &[near.states, near.barycentrics, near.unfinished], &sink);
         Ok(())
@@ -245,7 +245,7 @@ fn addresses_of_a_host() {
     }
     let frame = Frame::new(&gpu, &kuhn_jittered([3; 3], 0.3, 1).unwrap());
     submit(&gpu, "olbvh.test.frame", |r| frame.record(r)).unwrap();
-    let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
+    let scene = Scene::recorded(MeshView { input: frame.input, arrays: frame.arrays }, frame.tree);
     let refused = |address: u64| {
         let all = frame.output.barycentrics;
         // SAFETY: nothing is executed.

@@ -26,7 +26,7 @@ fn strips_skip_what_is_not_visible() {
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
     let plan = Plan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
     let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
-    let [some, all] = [plan, all].map(|plan| query::render(&device, &tree, &plan, (&field.values, field.on), None, SILENT).unwrap());
+    let [some, all] = [plan, all].map(|plan| query::render(&tree, &plan, (&field.values, field.on), None, SILENT).unwrap());
     assert!(bits(&some.colors) == bits(&all.colors));
     assert!(some.colors[4096 * 256..].iter().any(|color| color[3] > 0.1));
     assert!(some.stats.samples + 50_000 < all.stats.samples && all.stats.skipped_samples == 0, "{:?} and {:?}", some.stats, all.stats);
@@ -45,7 +45,7 @@ fn walks_count_as_work() {
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
     let plan = Plan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
     let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], termination: 2.0, ..plan };
-    let stats = query::render(&device, &tree, &all, (&field.values, field.on), None, SILENT).unwrap().stats;
+    let stats = query::render(&tree, &all, (&field.values, field.on), None, SILENT).unwrap().stats;
     // Each of these rays takes 800 samples in the mesh, each of which tests some forty tetrahedra.
     assert!(stats.found_samples > 40_000 && (10..100).contains(&stats.submissions), "{stats:?}");
 }

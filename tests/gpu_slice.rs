@@ -51,8 +51,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh, trees: &[(f32, Assign)], settings: 
                 Ok(())
             };
             let values = field.map(|f| (&f.values[..], f.on));
-            let sliced =
-                slice(&device, &tree, values, &voxels, extrapolate, SILENT, &mut compare).unwrap_or_else(|e| panic!("{what}: {e}"));
+            let sliced = slice(&tree, values, &voxels, extrapolate, SILENT, &mut compare).unwrap_or_else(|e| panic!("{what}: {e}"));
             touched += sliced.tally.touched;
             assert_eq!(sliced.tally.inside + sliced.tally.touched + sliced.tally.empty, voxels.voxels(), "{what}");
         }
@@ -113,7 +112,7 @@ fn an_error_of_the_sink_ends_the_stack() {
         layers: 3,
     };
     let mut stop = |_: Band| Err(olbvh::Error::Invalid("full".into()));
-    let result = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut stop);
+    let result = slice(&tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut stop);
     assert!(result.is_err_and(|e| e.to_string().contains("full")));
 }
 
@@ -127,7 +126,7 @@ fn runs_along_vertices_are_sliced_to_their_end() {
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
     let settings = SliceSettings { at: Some(4.0), size: [4, 64], ..SliceSettings::default() };
     let voxels = settings.voxels([0.0; 3], [8.0, 128.0, 8.0], mesh.origin).unwrap();
-    let sliced = slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut |_| Ok(())).unwrap();
+    let sliced = slice(&tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut |_| Ok(())).unwrap();
     assert_eq!(sliced.tally.inside, voxels.voxels(), "{:?}", sliced.tally);
 }
 
@@ -151,7 +150,7 @@ fn memory_makes_no_difference_where_cells_overlap() {
             bands += 1;
             Ok(())
         };
-        slice(&device, &tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
+        slice(&tree, None, &voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
         (owners, bands)
     };
     let (all, bands) = owners();

@@ -9,7 +9,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::kernels::{Row, Target};
 use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
-use olbvh::query::{self, LocateMethod, LocateOptions, OverlapInput, SILENT};
+use olbvh::query::{self, LocateMethod, LocateOptions, SILENT};
 use olbvh::render::{Prepared, RenderSettings, ValidTets};
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
@@ -34,10 +34,9 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let Bounds { lo, hi } = bounds;
     let at = |i: u32, step: u32, c: usize| lo[c] + (hi[c] - lo[c]) * (i * step % 1009) as f32 / 1009.0;
     let points: Vec<[f32; 3]> = (0..3000).map(|i| [at(i, 1, 0), at(i, 313, 1), at(i, 71, 2)]).collect();
-    let locate =
-        |tree, method| query::locate(&device, tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
+    let locate = |tree, method| query::locate(tree, &points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT).unwrap();
     let (found, walked) = (locate(&all, LocateMethod::Descent), locate(&boundary, LocateMethod::Sorted));
-    let lbvh = Lbvh::build(gpu, &device).unwrap().locate(&device, &points, olbvh::options::TOLERANCE).unwrap();
+    let lbvh = Lbvh::build(gpu, &device).unwrap().locate(&points, olbvh::options::TOLERANCE).unwrap();
     assert!(lbvh.owners == found.owners, "{}: the LBVH finds other owners", gpu.target().name);
     let field = &mesh.fields[0];
     let settings = RenderSettings { size: [40, 32], ..RenderSettings::default() };
@@ -45,18 +44,17 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
     let prepared = Prepared::new(&settings, mesh, &valid, field).unwrap();
     let values = (field.values.as_slice(), On::Points);
-    let drawn = query::render(&device, &boundary, &prepared.plan, values, Some(&prepared.normals), SILENT).unwrap();
+    let drawn = query::render(&boundary, &prepared.plan, values, Some(&prepared.normals), SILENT).unwrap();
     assert!(drawn.stats.found_samples > 0);
     let voxels = SliceSettings { size: [60, 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3]).unwrap();
     let (mut kinds, mut owners) = (Vec::new(), Vec::new());
-    query::slice(&device, &all, None, &voxels, Extrapolate::Nearest, SILENT, &mut |band| {
+    query::slice(&all, None, &voxels, Extrapolate::Nearest, SILENT, &mut |band| {
         kinds.extend(band.kinds);
         owners.extend(band.owners);
         Ok(())
     })
     .unwrap();
-    let party = OverlapInput { mesh: &device, tree: &all };
-    let overlap = query::overlap(party, OverlapInput { mesh: &device, tree: &boundary }, false, SILENT).unwrap().overlap;
+    let overlap = query::overlap(&all, &boundary, false, SILENT).unwrap().overlap;
     Answers {
         trees: [all.download().unwrap(), boundary.download().unwrap()],
         neighbours,

@@ -4,10 +4,13 @@ use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
 use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
-use crate::layout::LbvhNode;
+use crate::layout::{Grid, LbvhNode};
+use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
-use crate::query::sealed::Sealed;
-use crate::query::{BinaryTree, Built, LocateOutput, Located, PointInput, Rounds, Structure, StructureView, numbered};
+use crate::query::searched::{BinaryTree, Searched, Structure};
+use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in};
+use crate::render::Plan;
+use crate::slicing::{Band, Extrapolate, VoxelGrid};
 
 /// Bits of a code: ten per axis, and one that sorts bad tetrahedra last.
 const CODE_BITS: u32 = 31;
@@ -19,6 +22,8 @@ const BUDGET: u32 = 16_384;
 pub struct Lbvh {
     pub(super) gpu: Gpu,
     pub(super) mesh: KeptMesh,
+    /// The grid of the mesh, at the finest level.
+    pub(super) grid: Grid,
     pub(super) tree: BinaryTree,
     pub(super) valid: u32,
     stages: Vec<StageTime>,
@@ -167,7 +172,8 @@ impl Lbvh {
         let carve = |a: &mut Arena| LbvhScratch::carve(gpu, a, tets);
         let (_buffer, scratch) = Arena::reserve(gpu, "olbvh.lbvh.scratch", carve)?;
         let ((), time) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
-        Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), tree, valid: tets - mesh.status().bad, stages: time.stages, memory })
+        let valid = tets - mesh.status().bad;
+        Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), grid: *mesh.grid(), tree, valid, stages: time.stages, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per valid tetrahedron.
@@ -198,14 +204,13 @@ impl Lbvh {
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
-    pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
-        mesh.check(&self.mesh)?;
+    pub fn locate(&self, points: &[[f32; 3]], tolerance: f32) -> Result<Located> {
         let gpu = &self.gpu;
         let (n, count) = (points.len() as u64, numbered(points.len())?);
         let uploaded = gpu.upload("olbvh.lbvh.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?, a.words(1)?));
         let (memory, (owners, barycentrics, unfinished)) = Arena::reserve(gpu, "olbvh.lbvh.located", carve)?;
-        let view = mesh.view();
+        let view = self.mesh.view;
         let (asked, output) = ((uploaded.all(), count), LocateOutput { owners, barycentrics });
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {
@@ -220,16 +225,31 @@ impl Lbvh {
         located.barycentrics = gpu.download(&memory, barycentrics.part(0, 16 * n))?;
         Ok(located)
     }
-}
 
-impl Sealed for Lbvh {
-    fn check(&self, mesh: &DeviceMesh) -> Result<()> {
-        mesh.check(&self.mesh)
+    /// Draws a picture as [`crate::query::render`] does; no nodes are skipped.
+    ///
+    /// # Errors
+    /// Those of [`crate::query::render`].
+    pub fn render(&self, plan: &Plan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
+        render_in(&self.gpu, &self.searched(), plan, field, normals, report)
     }
-}
 
-impl Built for Lbvh {
-    fn searched(&self) -> StructureView {
-        StructureView { mesh: self.mesh.view, structure: Structure::Binary(self.tree) }
+    /// Slices the mesh as [`crate::query::slice`] does.
+    ///
+    /// # Errors
+    /// Those of [`crate::query::slice`].
+    pub fn slice(
+        &self,
+        field: Option<(&[f32], On)>,
+        voxels: &VoxelGrid,
+        extrapolate: Extrapolate,
+        report: Progress<'_>,
+        sink: &mut dyn FnMut(Band) -> Result<()>,
+    ) -> Result<Sliced> {
+        slice_in(&self.gpu, (&self.searched(), &self.grid), field, (voxels, extrapolate), report, sink)
+    }
+
+    fn searched(&self) -> Searched {
+        Searched { mesh: self.mesh.view, structure: Structure::Binary(self.tree) }
     }
 }

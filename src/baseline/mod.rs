@@ -5,5 +5,6 @@ mod lbvh;
 mod overlap;
 mod rays;
 
+pub use crate::query::searched::BinaryTree;
 pub use lbvh::{Lbvh, LbvhArrays, LbvhScratch, cmd_build_lbvh, cmd_locate_lbvh};
 pub use rays::{RayMethod, Rays};

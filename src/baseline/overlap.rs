@@ -2,8 +2,7 @@
 //! phase.
 
 use super::Lbvh;
-use crate::build::DeviceMesh;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, Groups, Recorder};
 use crate::kernels::{LbvhOverlap, LbvhOverlapSpec};
 use crate::layout::{NodeFrame, OverlapStatus, set_bits, wide};
@@ -16,9 +15,8 @@ const BUDGET: u32 = 4096;
 
 /// The search for the tetrahedra of one mesh in the tree of the other.
 struct Direction<'a> {
-    own: &'a DeviceMesh,
-    other: &'a DeviceMesh,
-    lbvh: &'a Lbvh,
+    own: &'a Lbvh,
+    other: &'a Lbvh,
     frame: Buffer,
     places: BufferRef,
     hits: BufferRef,
@@ -27,28 +25,28 @@ struct Direction<'a> {
 
 impl Direction<'_> {
     fn cmd_search(&self, r: &mut Recorder<'_>) -> Result<()> {
-        let (own, other, tree) = (self.own.input(), self.other.input(), &self.lbvh.tree);
+        let ([own, other], tree) = ([self.own, self.other].map(|lbvh| lbvh.mesh.view), &self.other.tree);
         let arguments = LbvhOverlap {
-            grid: self.other.arrays().grid,
+            grid: other.arrays.grid,
             nodes: tree.nodes,
             root: tree.root,
             ids: tree.ids,
-            cells: other.cells,
-            vertices: self.other.arrays().vertices,
-            positions: other.positions,
-            own_cells: own.cells,
-            own_positions: own.positions,
-            bad: self.own.arrays().bad,
+            cells: other.input.cells,
+            vertices: other.arrays.vertices,
+            positions: other.input.positions,
+            own_cells: own.input.cells,
+            own_positions: own.input.positions,
+            bad: own.arrays.bad,
             frame: self.frame.all(),
             places: self.places,
             hits: self.hits,
             status: self.status,
-            tets: own.tets,
+            tets: own.input.tets,
             budget: BUDGET,
         };
         let workgroup = r.gpu().target().query;
-        let spec = LbvhOverlapSpec { workgroup, own_stride: own.stride, stride: other.stride, ..Default::default() };
-        r.dispatch(&arguments, spec, Groups::Count(own.tets.div_ceil(workgroup)))
+        let spec = LbvhOverlapSpec { workgroup, own_stride: own.input.stride, stride: other.input.stride, ..Default::default() };
+        r.dispatch(&arguments, spec, Groups::Count(own.input.tets.div_ceil(workgroup)))
     }
 }
 
@@ -57,34 +55,34 @@ impl Lbvh {
     /// in one coordinate system. `report` receives the number of tetrahedra done, and of all.
     ///
     /// # Errors
-    /// [`crate::Error::Memory`], or a failed Vulkan call.
-    pub fn overlap(&self, mesh: &DeviceMesh, other: &Self, other_mesh: &DeviceMesh, report: Progress<'_>) -> Result<Overlapped> {
-        mesh.check(&self.mesh)?;
-        other_mesh.check(&other.mesh)?;
-        other_mesh.check_device(mesh.gpu())?;
+    /// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] for trees on different devices.
+    pub fn overlap(&self, other: &Self, report: Progress<'_>) -> Result<Overlapped> {
         let gpu = &self.gpu;
+        if !gpu.is_same_device(&other.gpu) {
+            return Err(Error::Invalid("the two trees lie on different devices".into()));
+        }
         let mut done = Overlapped::default();
         let valid = [self.valid > 0, other.valid > 0];
         if valid.contains(&false) {
             return Ok(done);
         }
-        let joint = joint_grid(mesh.grid(), other_mesh.grid(), valid);
+        let joint = joint_grid(&self.grid, &other.grid, valid);
         let carve = |a: &mut Arena| {
-            let mut direction = |m: &DeviceMesh| {
-                let tets = u64::from(m.input().tets);
+            let mut direction = |own: &Self| {
+                let tets = u64::from(own.mesh.view.input.tets);
                 Ok((a.words(tets)?, a.words(tets.div_ceil(32))?, a.take(size_of::<OverlapStatus>() as u64)?))
             };
-            Ok([direction(mesh)?, direction(other_mesh)?])
+            Ok([direction(self)?, direction(other)?])
         };
         let memory = gpu.buffer("olbvh.lbvh.overlap", Arena::measure(carve)?)?;
         let [forth, back] = carve(&mut Arena::new(memory.all()))?;
-        let direction = |own, other: (_, _), (places, hits, status)| {
-            let (other, lbvh): (&DeviceMesh, _) = other;
-            let frame = gpu.upload::<NodeFrame>("olbvh.lbvh.overlap_frame", &[node_frame(other.grid(), &joint)])?;
-            Ok::<_, crate::Error>(Direction { own, other, lbvh, frame, places, hits, status })
+        let direction = |[own, other]: [_; 2], (places, hits, status)| {
+            let other: &Self = other;
+            let frame = gpu.upload::<NodeFrame>("olbvh.lbvh.overlap_frame", &[node_frame(&other.grid, &joint)])?;
+            Ok::<_, Error>(Direction { own, other, frame, places, hits, status })
         };
-        let directions = [direction(mesh, (other_mesh, other), forth)?, direction(other_mesh, (mesh, self), back)?];
-        let all = u64::from(mesh.input().tets) + u64::from(other_mesh.input().tets);
+        let directions = [direction([self, other], forth)?, direction([other, self], back)?];
+        let all = [self, other].map(|lbvh| u64::from(lbvh.mesh.view.input.tets)).iter().sum::<u64>();
         let statuses = loop {
             let ((), time) = gpu.submit("olbvh.lbvh.overlap", |r| {
                 for direction in &directions {
@@ -111,7 +109,7 @@ impl Lbvh {
                 break statuses;
             }
         };
-        let hits = |direction: &Direction<'_>| Ok::<_, crate::Error>(set_bits(gpu.download(&memory, direction.hits)?));
+        let hits = |direction: &Direction<'_>| Ok::<_, Error>(set_bits(gpu.download(&memory, direction.hits)?));
         (done.overlap.a, done.overlap.b) = (hits(&directions[0])?, hits(&directions[1])?);
         for (effort, status) in done.overlap.effort.iter_mut().zip(statuses) {
             effort.narrow = wide(status.narrow);

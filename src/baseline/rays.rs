@@ -119,10 +119,10 @@ impl Rays {
         &self.stages
     }
 
-    /// Records point location in the mesh of the structure, without hints. The result is a tetrahedron that contains the point, or `u32::MAX` if the
-    /// point is outside or lost. Reads mesh and points in compute shaders, and writes `output` in compute shaders,
-    /// without a barrier before or after. A ray-tracing pipeline adds a barrier before, from compute shaders and
-    /// transfers, and one after, to these and the host.
+    /// Records point location in the mesh of the structure, without hints. The result is a tetrahedron that contains the
+    /// point, or `u32::MAX` if the point is outside or lost. Reads mesh and points in compute shaders, and writes `output`
+    /// in compute shaders, without a barrier before or after. A ray-tracing pipeline adds a barrier before, from compute
+    /// shaders and transfers, and one after, to these and the host.
     ///
     /// # Errors
     /// [`crate::Error::Vulkan`] if the pipeline cannot be made, [`crate::Error::TooLarge`] for more points than a
@@ -152,8 +152,7 @@ impl Rays {
     ///
     /// # Errors
     /// [`crate::Error::Memory`], or a failed Vulkan call.
-    pub fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]]) -> Result<Located> {
-        mesh.check(&self.mesh)?;
+    pub fn locate(&self, points: &[[f32; 3]]) -> Result<Located> {
         let (n, count) = (points.len() as u64, numbered(points.len())?);
         let uploaded = self.gpu.upload("olbvh.rays.points", points)?;
         let carve = |a: &mut Arena| Ok((a.words(n)?, a.take(16 * n)?));

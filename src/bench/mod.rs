@@ -56,7 +56,7 @@ use crate::gpu::{Gpu, StageTime};
 use crate::mesh::Mesh;
 use crate::reference::boundary::{Topology, topology};
 use measure::{Runs, repeat};
-use structure::{Built, Structure};
+use structure::Structure;
 use subject::Subject;
 use verify::{Answers, check, check_tree};
 
@@ -135,7 +135,7 @@ fn measure(
         let found = owners.iter().filter(|&&owner| owner != u32::MAX).count();
         let traversed = quantity.traversed().filter(|_| structure.traverses(kind));
         for quantity in [*quantity].into_iter().chain(traversed) {
-            let locate = || structure.locate(&subject.device, points, quantity);
+            let locate = || structure.locate(points, quantity);
             if traversed == Some(quantity) && locate()?.owners != *owners {
                 return Err(Error::Mismatch(format!("{kind}: the traversal finds other owners than the descent")));
             }
@@ -160,9 +160,8 @@ fn measure(
         };
         add(Quantity::Slice, Some(repeat(load, budget, sliced)?), None, Some(kinds.len() as u64));
     }
-    if let (Some(moved), Some(mesh)) = (moved, &subject.moved) {
-        let [a, b] = [Built { mesh: &subject.device, structure }, Built { mesh, structure: moved }];
-        let runs = repeat(load, budget, || Ok(structure::overlap(a, b)?.map_or(Vec::new(), |found| found.stages)))?;
+    if let Some(moved) = moved {
+        let runs = repeat(load, budget, || Ok(structure.overlap(moved)?.map_or(Vec::new(), |found| found.stages)))?;
         add(Quantity::Overlap, Some(runs), None, None);
     }
     Ok(report)

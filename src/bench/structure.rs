@@ -6,7 +6,7 @@ use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
 use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
-use crate::query::{self, LocateMethod, LocateOptions, Located, MOST_TRAVERSED, OverlapInput, Overlapped, SILENT};
+use crate::query::{self, LocateMethod, LocateOptions, Located, MOST_TRAVERSED, Overlapped, SILENT};
 
 /// A kind of structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -60,13 +60,6 @@ pub(super) enum Structure {
     Rays(Rays),
 }
 
-/// A mesh and its structure.
-#[derive(Clone, Copy)]
-pub(super) struct Built<'a> {
-    pub mesh: &'a DeviceMesh,
-    pub structure: &'a Structure,
-}
-
 impl Structure {
     /// Builds a structure; `None` if the device lacks a required feature.
     pub(super) fn build(gpu: &Gpu, mesh: &DeviceMesh, kind: Kind) -> Result<Option<Self>> {
@@ -95,43 +88,31 @@ impl Structure {
         }
     }
 
-    /// The structure in the form that pictures and slices take; `None` for rays, which can only locate.
-    pub(super) fn built(&self) -> Option<&dyn query::Built> {
-        match self {
-            Self::Octree(tree) => Some(tree),
-            Self::Lbvh(lbvh) => Some(lbvh),
-            Self::Rays(_) => None,
-        }
-    }
-
     /// Locates points in the way that suits those of `quantity`: samples of rays each independently, as the paper does;
     /// others, where leaves within the mesh have no lists, as [`LocateMethod::fastest`] chooses.
-    pub(super) fn locate(&self, mesh: &DeviceMesh, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
+    pub(super) fn locate(&self, points: &[[f32; 3]], quantity: Quantity) -> Result<Located> {
         match self {
             Self::Octree(tree) => {
-                let fastest = |in_order| LocateMethod::fastest(tree.gpu(), points.len(), mesh.input().tets as usize, in_order);
+                let fastest = |in_order| LocateMethod::fastest(tree.gpu(), points.len(), tree.mesh().input.tets as usize, in_order);
                 let method = match (quantity, tree.memory().lists) {
                     (Quantity::TraverseRandom | Quantity::TraverseCoherent, _) => LocateMethod::Traversal(8),
                     (Quantity::LocateRandom, Lists::Boundary) => fastest(false),
                     (Quantity::LocateCoherent, Lists::Boundary) => fastest(true),
                     _ => LocateMethod::Descent,
                 };
-                query::locate(mesh, tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)
+                query::locate(tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)
             }
-            Self::Lbvh(lbvh) => lbvh.locate(mesh, points, TOLERANCE),
-            Self::Rays(rays) => rays.locate(mesh, points),
+            Self::Lbvh(lbvh) => lbvh.locate(points, TOLERANCE),
+            Self::Rays(rays) => rays.locate(points),
         }
     }
-}
 
-/// The tetrahedra of two meshes that intersect the other mesh; `None` if the structures cannot find them.
-pub(super) fn overlap(a: Built<'_>, b: Built<'_>) -> Result<Option<Overlapped>> {
-    match (a.structure, b.structure) {
-        (Structure::Octree(tree), Structure::Octree(other)) => {
-            let [a, b] = [OverlapInput { mesh: a.mesh, tree }, OverlapInput { mesh: b.mesh, tree: other }];
-            query::overlap(a, b, false, SILENT).map(Some)
+    /// The tetrahedra of the two meshes that intersect the other mesh; `None` if the structures cannot find them.
+    pub(super) fn overlap(&self, other: &Self) -> Result<Option<Overlapped>> {
+        match (self, other) {
+            (Self::Octree(a), Self::Octree(b)) => query::overlap(a, b, false, SILENT).map(Some),
+            (Self::Lbvh(a), Self::Lbvh(b)) => a.overlap(b, SILENT).map(Some),
+            _ => Ok(None),
         }
-        (Structure::Lbvh(tree), Structure::Lbvh(other)) => tree.overlap(a.mesh, other, b.mesh, SILENT).map(Some),
-        _ => Ok(None),
     }
 }

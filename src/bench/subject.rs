@@ -85,15 +85,22 @@ impl<'a> Subject<'a> {
 
     /// Draws the field; `None` if the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Rendered>> {
-        let (Some(built), Some(plan)) = (structure.built(), &self.plan) else { return Ok(None) };
-        query::render(&self.device, built, plan, (&self.field.values, On::Points), None, SILENT).map(Some)
+        let (Some(plan), field) = (&self.plan, (self.field.values.as_slice(), On::Points)) else { return Ok(None) };
+        match structure {
+            Structure::Octree(tree) => query::render(tree, plan, field, None, SILENT).map(Some),
+            Structure::Lbvh(lbvh) => lbvh.render(plan, field, None, SILENT).map(Some),
+            Structure::Rays(_) => Ok(None),
+        }
     }
 
     /// Slices the mesh through its middle; `None` if the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
-        let (Some(built), Some(voxels)) = (structure.built(), &self.voxels) else { return Ok(None) };
-        let field = Some((self.field.values.as_slice(), On::Points));
-        query::slice(&self.device, built, field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some)
+        let (Some(voxels), field) = (&self.voxels, Some((self.field.values.as_slice(), On::Points))) else { return Ok(None) };
+        match structure {
+            Structure::Octree(tree) => query::slice(tree, field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some),
+            Structure::Lbvh(lbvh) => lbvh.slice(field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some),
+            Structure::Rays(_) => Ok(None),
+        }
     }
 }
 

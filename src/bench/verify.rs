@@ -1,6 +1,6 @@
 //! The answers of a structure, and their verification.
 
-use super::structure::{Built, Kind, Structure, overlap};
+use super::structure::{Kind, Structure};
 use super::structure_report::Lost;
 use super::subject::Subject;
 use crate::build::Tree;
@@ -30,7 +30,7 @@ pub(super) struct Answers {
 impl Answers {
     /// Answers every query once. `moved` is the same kind of structure over the moved mesh.
     pub(super) fn of(subject: &Subject<'_>, structure: &Structure, moved: Option<&Structure>) -> Result<Self> {
-        let owners = subject.points.iter().map(|(of, points)| structure.locate(&subject.device, points, *of).map(|found| found.owners));
+        let owners = subject.points.iter().map(|(of, points)| structure.locate(points, *of).map(|found| found.owners));
         let owners = owners.collect::<Result<_>>()?;
         let picture = subject.render(structure)?.map(|rendered| (rendered.stats.found_samples, rendered.colors));
         let (mut kinds, mut cells) = (Vec::new(), Vec::new());
@@ -40,11 +40,7 @@ impl Answers {
             Ok(())
         })?;
         let voxels = sliced.map(|_| (kinds, cells));
-        let built = |mesh, structure| Built { mesh, structure };
-        let overlap = match (moved, &subject.moved) {
-            (Some(moved), Some(mesh)) => overlap(built(&subject.device, structure), built(mesh, moved))?,
-            _ => None,
-        };
+        let overlap = moved.map(|moved| structure.overlap(moved)).transpose()?.flatten();
         let overlap = overlap.map(|found| [found.overlap.a, found.overlap.b]);
         Ok(Self { owners, picture, voxels, overlap })
     }

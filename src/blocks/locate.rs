@@ -46,7 +46,7 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
     let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let here = field.map(|(values, on)| (placed.values(values, on), on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let found = query::locate(&placed.mesh, &placed.tree, points, here, &asked.how, SILENT)?;
+        let found = query::locate(&placed.tree, points, here, &asked.how, SILENT)?;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
             if field.is_some() {
@@ -67,7 +67,7 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
 pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
     let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
-        let found = query::locate_all(&placed.mesh, &placed.tree, points, asked.how.tolerance, SILENT)?;
+        let found = query::locate_all(&placed.tree, points, asked.how.tolerance, SILENT)?;
         for (&i, owners) in ids.iter().zip(found) {
             all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
         }

@@ -5,9 +5,9 @@ use super::locate::{Blocks, Points, each};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::NONE;
-use crate::query::{self, Nearest, Progress, SILENT};
+use crate::query::{Nearest, Progress, SILENT, nearest_in};
 
-/// Finds the place of the surface that is closest to each point, at most `within` away, as [`query::nearest`] does, within
+/// Finds the place of the surface that is closest to each point, at most `within` away, as [`crate::query::nearest`] does, within
 /// `memory` bytes of device memory; [`Points::how`] is not used. `report` receives the number of points done, and of all.
 ///
 /// # Errors
@@ -16,7 +16,7 @@ pub fn nearest(gpu: &Gpu, memory: u64, asked: &Points<'_>, within: f32, report: 
     let n = asked.points.len();
     let mut all = Nearest { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], squares: vec![f32::INFINITY; n], scale: 1.0 };
     let took = each(gpu, memory, asked, Blocks::All, report, &mut |ids, points, placed, cells| {
-        let found = query::nearest(&placed.mesh, &placed.tree, points, within, cells, SILENT)?;
+        let found = nearest_in(&placed.tree, points, within, cells, SILENT)?;
         all.scale = found.scale;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             let (owner, square) = (placed.tet(found.owners[k]), found.squares[k]);

@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::options::BuildOptions;
-use crate::query::{self, OverlapInput, Overlapped, Progress, SILENT};
+use crate::query::{self, Overlapped, Progress, SILENT};
 use crate::reference::overlap::Overlap;
 use std::cell::{Cell, OnceCell};
 use std::rc::Rc;
@@ -76,7 +76,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
     if least_bytes(gpu, meshes[0], options)?.saturating_add(least_bytes(gpu, meshes[1], options)? / 2) <= memory {
         let found = took.place(gpu, meshes[0], options, 0).and_then(|a| {
             let b = took.place(gpu, meshes[1], options, 1)?;
-            query::overlap(input_of(&a), input_of(&b), pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
+            query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
         });
         if let Some(found) = unless_too_large(found)? {
             tell(1.0);
@@ -136,10 +136,6 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>)
     Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(all))
 }
 
-fn input_of(placed: &Placed) -> OverlapInput<'_> {
-    OverlapInput { mesh: &placed.mesh, tree: &placed.tree }
-}
-
 /// Whether the cells of two blocks are near enough for their contents to touch.
 fn meet(sources: &[Source<'_>; 2], nodes: &[Rc<Node>; 2], apart: f64) -> bool {
     let bounds = [0, 1].map(|i| nodes[i].block.bounds(&sources[i]));
@@ -165,7 +161,7 @@ fn visit(
         }
     }
     let [Some((_, a)), Some((_, b))] = placed else { return Ok(Overlapped::default()) };
-    let mut found = query::overlap(input_of(a), input_of(b), pairs, SILENT)?;
+    let mut found = query::overlap(&a.tree, &b.tree, pairs, SILENT)?;
     log::debug!("blocks of {} and {} tetrahedra", nodes[0].tets(), nodes[1].tets());
     found.overlap.a.iter_mut().for_each(|t| *t = a.tet(*t));
     found.overlap.b.iter_mut().for_each(|t| *t = b.tet(*t));

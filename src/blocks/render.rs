@@ -99,7 +99,7 @@ fn render_whole(placed: &Placed, asked: &View<'_>, report: Progress<'_>) -> Resu
     let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &valid, field)?;
     drop(neighbours);
     let normals = (!normals.is_empty()).then_some(normals.as_slice());
-    let rendered = query::render(mesh, tree, &plan, (&field.values, field.on), normals, report)?;
+    let rendered = query::render(tree, &plan, (&field.values, field.on), normals, report)?;
     Ok(Picture { rendered, plan, range })
 }
 
@@ -141,7 +141,7 @@ impl Job<'_> {
         let (Field { values, on, .. }, Prepared { plan, normals, .. }) = (self.field, self.prepared);
         let placed = self.took.build(|| block.place(self.gpu, self.source))?;
         let (values, normals) = (placed.values(values, *on), (!normals.is_empty()).then(|| placed.values(normals, On::Points)));
-        let canvas = Canvas::new(&placed.mesh, &placed.tree, plan, (&values, *on), normals.as_deref(), true)?;
+        let canvas = Canvas::new(self.gpu, &(&placed.tree).into(), plan, (&values, *on), normals.as_deref(), true)?;
         let part = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;
         self.stats += part;
         log::debug!("a block of {} tetrahedra, {} samples", block.tets.len(), part.samples);

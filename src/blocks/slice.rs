@@ -10,6 +10,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
 use crate::options::BuildOptions;
+use crate::query::searched::Searched;
 use crate::query::{self, Progress, Slicing};
 use crate::reference::separate::closest;
 use crate::reference::tet::sub;
@@ -67,7 +68,7 @@ pub fn slice(
     };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = took.place(gpu, mesh, options, 0);
-        let sliced = whole.and_then(|Placed { mesh, tree, .. }| query::slice(&mesh, &tree, values, voxels, extrapolate, report, &mut sink));
+        let sliced = whole.and_then(|Placed { tree, .. }| query::slice(&tree, values, voxels, extrapolate, report, &mut sink));
         // Once the sink has voxels, it is too late to begin again.
         let sliced = if tally.get() == Tally::default() { unless_too_large(sliced)? } else { Some(sliced?) };
         if sliced.is_some() {
@@ -147,7 +148,9 @@ impl Job<'_> {
         let (Some((_, placed)), Some(bounds)) = (&self.placed, block.bounds(self.source)) else { return Ok(()) };
         let here = field.map(|f| (placed.values(&f.values, f.on), f.on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let mut slicing = Slicing::new(&placed.mesh, &placed.tree, here, (voxels, extrapolate), Some(block.cells.finest(level)))?;
+        let tree = &placed.tree;
+        let mut slicing =
+            Slicing::new(self.gpu, (&Searched::from(tree), tree.grid()), here, (voxels, extrapolate), Some(block.cells.finest(level)))?;
         let width = voxels.size[0] as usize;
         let mut at = 0;
         for rows in all.rows.parts(slicing.rows, voxels.size[1]) {

@@ -182,15 +182,6 @@ impl DeviceMesh {
         self.kept.clone()
     }
 
-    /// Rejects a tree that was built over another mesh.
-    pub(crate) fn check(&self, built_over: &KeptMesh) -> Result<()> {
-        if Arc::ptr_eq(&built_over.memory, &self.kept.memory) {
-            Ok(())
-        } else {
-            Err(Error::Invalid("a tree that was built over another mesh; build one over this mesh".into()))
-        }
-    }
-
     /// Rejects a device other than the mesh's.
     pub(crate) fn check_device(&self, gpu: &Gpu) -> Result<()> {
         if self.gpu.is_same_device(gpu) { Ok(()) } else { Err(Error::Invalid("the mesh lies on another device".into())) }

@@ -1,9 +1,9 @@
 //! The range of a field's values in every node of a tree (a min–max octree). New values need new ranges, but no new
 //! tree.
 
-use super::{DeviceMesh, MeshInput, MeshView, Tree, TreeMemory};
+use super::{MeshInput, MeshView, TreeMemory};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
+use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{MergeRanges, MergeRangesSpec, PushRanges, PushRangesSpec, ScatterRanges, ScatterRangesSpec};
 use crate::mesh::On;
 
@@ -66,68 +66,4 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
         }
         Ok(())
     })
-}
-
-/// The ranges of a field in device memory owned by this crate.
-#[derive(Debug)]
-pub struct FieldRanges {
-    gpu: Gpu,
-    /// The tree that they are of.
-    tree: TreeMemory,
-    buffer: Buffer,
-    stages: Vec<StageTime>,
-}
-
-impl FieldRanges {
-    /// Computes the ranges of a field (one value per point or per tetrahedron) over a tree.
-    ///
-    /// # Errors
-    /// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
-    pub fn new(mesh: &DeviceMesh, tree: &Tree, field: (&[f32], On)) -> Result<Self> {
-        let gpu = tree.gpu();
-        let buffer = gpu.buffer("olbvh.ranges.values", range_bytes(tree.status().nodes))?;
-        let mut made = Self { gpu: gpu.clone(), tree: *tree.memory(), buffer, stages: Vec::new() };
-        made.update(mesh, tree, field)?;
-        Ok(made)
-    }
-
-    /// Recomputes the ranges for new values, in the same memory. The tree must be the one that the ranges were made
-    /// for. Work submitted to the queue before may still read the old ranges; work on other queues must have ended.
-    ///
-    /// # Errors
-    /// Those of [`FieldRanges::new`].
-    pub fn update(&mut self, mesh: &DeviceMesh, tree: &Tree, (values, on): (&[f32], On)) -> Result<()> {
-        mesh.check(tree.mesh())?;
-        mesh.check_device(&self.gpu)?;
-        on.check(values, mesh.sizes())?;
-        if self.tree.status != tree.memory().status {
-            return Err(Error::Invalid("the ranges of another tree; make new ones".into()));
-        }
-        let field = self.gpu.upload("olbvh.ranges.field", values)?;
-        let ranges = self.memory();
-        let record = |r: &mut Recorder<'_>| {
-            r.barrier("ranges.used → ranges.clear");
-            cmd_ranges(r, &mesh.view(), tree.memory(), (field.all(), on), ranges)
-        };
-        self.stages = self.gpu.submit("olbvh.ranges", record)?.1.stages;
-        Ok(())
-    }
-
-    /// The ranges in device memory: two floats per node.
-    pub fn memory(&self) -> BufferRef {
-        self.buffer.all()
-    }
-
-    /// `[smallest, largest]` of every node, `[∞, −∞]` for a node without a value.
-    ///
-    /// # Errors
-    /// A failed transfer.
-    pub fn download(&self) -> Result<Vec<[f32; 2]>> {
-        self.gpu.download(&self.buffer, self.memory())
-    }
-
-    /// Device time of the last update.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
-    }
 }

@@ -1,5 +1,6 @@
 //! A tree in device memory owned by this crate.
 
+use super::MeshView;
 use super::mesh::{DeviceMesh, KeptMesh};
 use super::plan::{Capacity, CountScratch, FilterScratch, MAX_ENTRIES, SortedScratch, TreeMemory, filtered};
 use super::stages::Build;
@@ -175,9 +176,9 @@ impl Tree {
         &self.gpu
     }
 
-    /// The mesh that the tree was built over.
-    pub(crate) fn mesh(&self) -> &KeptMesh {
-        &self.mesh
+    /// The mesh that the tree was built over, whose memory the tree keeps.
+    pub fn mesh(&self) -> MeshView {
+        self.mesh.view
     }
 
     /// The arrays in device memory.

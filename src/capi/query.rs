@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Bounds, Field, Mesh, On};
-use crate::query::{LocateMethod, LocateOptions, OverlapInput, SILENT, locate, nearest, overlap, render, slice};
+use crate::query::{LocateMethod, LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -210,7 +210,7 @@ pub extern "C" fn olbvh_locate(
         let mut owners = array_mut(owners, count, "owners")?.iter_mut();
         let method = LocateMethod::suited(count, mesh.device.input().tets as usize, false);
         let options = LocateOptions { tolerance: self::tolerance(tolerance), method };
-        let found = locate(&mesh.device, tree, points, None, &options, SILENT)?;
+        let found = locate(tree, points, None, &options, SILENT)?;
         put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
         if !barycentrics.is_null() {
             put(&mut array_mut(barycentrics.cast::<[f32; 4]>(), count, "barycentrics")?.iter_mut(), found.barycentrics);
@@ -237,7 +237,7 @@ pub extern "C" fn olbvh_nearest(
         let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
         let points = array(points.cast::<[f32; 3]>(), count, "points")?;
         let mut owners = array_mut(owners, count, "owners")?.iter_mut();
-        let found = nearest(&mesh.device, tree, points, within, None, SILENT)?;
+        let found = nearest(tree, points, within, SILENT)?;
         if !distances.is_null() {
             put(&mut array_mut(distances, count, "distances")?.iter_mut(), found.distances());
         }
@@ -296,7 +296,7 @@ pub extern "C" fn olbvh_render(
         let field = Field { name: "values".into(), on, values };
         let (plan, normals) = mesh.prepare(&settings, tree.grid().into(), &field)?;
         let normals = (!normals.is_empty()).then_some(&normals[..]);
-        put(&mut pixels, render(&mesh.device, tree, &plan, (&field.values, on), normals, SILENT)?.colors);
+        put(&mut pixels, render(tree, &plan, (&field.values, on), normals, SILENT)?.colors);
         Ok(())
     })
 }
@@ -334,7 +334,7 @@ pub extern "C" fn olbvh_slice(
             Ok(())
         };
         let field = field.as_ref().map(|(values, on)| (&values[..], *on));
-        slice(&mesh.device, tree, field, &voxels, extrapolate, SILENT, &mut sink)?;
+        slice(tree, field, &voxels, extrapolate, SILENT, &mut sink)?;
         Ok(())
     })
 }
@@ -348,8 +348,7 @@ pub extern "C" fn olbvh_overlap(a: *const OlbvhTree, b: *const OlbvhTree, hits_a
         let [a, b] = [handle(a, "a")?, handle(b, "b")?];
         let words = |tree: &OlbvhTree| tree.mesh.device.input().tets.div_ceil(32) as usize;
         let hits = [array_mut(hits_a, words(a), "hits_a")?.iter_mut(), array_mut(hits_b, words(b), "hits_b")?.iter_mut()];
-        let [one, other] = [a, b].map(|t| OverlapInput { mesh: &t.mesh.device, tree: &t.tree });
-        let found = overlap(one, other, false, SILENT)?.overlap;
+        let found = overlap(&a.tree, &b.tree, false, SILENT)?.overlap;
         for ((mut hits, tree), found) in hits.into_iter().zip([a, b]).zip([found.a, found.b]) {
             let mut bits = vec![0; words(tree)];
             for cell in found.into_iter().map(|tet| tree.mesh.cell(tet)) {

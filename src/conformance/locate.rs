@@ -86,19 +86,19 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                 How::SortedRuns => LocateMethod::SortedRuns,
                 _ => LocateMethod::Descent,
             };
-            let found = locate(device, &tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
+            let found = locate(&tree, points, None, &LocateOptions { method, ..LocateOptions::default() }, SILENT)?;
             let order =
                 if method.is_sorted() { order_of(&built.tree().grid, points, code_bits(gpu)) } else { (0..points.len() as u32).collect() };
             let runs = matches!(case.how, How::Runs | How::SortedRuns).then(|| locator.locate_in_runs(points, &order));
             let expected = runs.as_deref().unwrap_or_else(|| twin.locations(&built));
             compare_locations(expected, &found.owners, &found.barycentrics, points)?;
             // The owners do not show whether points were sorted.
-            if case.how == How::Sorted { same_order(gpu, &Scene::new(device, &tree)?, points, &order) } else { Ok(()) }
+            if case.how == How::Sorted { same_order(gpu, &Scene::of(&tree), points, &order) } else { Ok(()) }
         }
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
             let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
-            compare("query.locate_all", "owners", &lists, &locate_all(device, &tree, points, TOLERANCE, SILENT)?)
+            compare("query.locate_all", "owners", &lists, &locate_all(&tree, points, TOLERANCE, SILENT)?)
         }
         How::Values => {
             // Values are whole numbers below 2^12, so products and sums differ at most by the rounding of the division
@@ -109,7 +109,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
                     on,
                     values: (0..n).map(|i| (super::data::mix(i as u32) % 4096) as f32).collect(),
                 };
-                let found = locate(device, &tree, points, Some((&field.values, on)), &LocateOptions::default(), SILENT)?;
+                let found = locate(&tree, points, Some((&field.values, on)), &LocateOptions::default(), SILENT)?;
                 let near = |a: f32, b: f32| (a.is_nan() && b.is_nan()) || (a - b).abs() <= 4096.0 * 1e-6;
                 let values: Vec<f32> = twin.locations(&built).iter().map(|e| e.value(mesh, &field)).collect();
                 if let Some(i) = (0..points.len()).find(|&i| !found.values.get(i).is_some_and(|v| near(*v, values[i]))) {
@@ -127,7 +127,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
         How::Nearest => {
             let surface = Surface::new(mesh, &twin.topology, built.tree());
             for within in [f32::INFINITY, 0.1 / built.tree().grid.scale] {
-                let found = nearest(device, &tree, points, within, None, SILENT)?;
+                let found = nearest(&tree, points, within, SILENT)?;
                 let expected: Vec<_> = points.iter().map(|&p| surface.nearest(p, within)).collect();
                 let places: Vec<_> = expected.iter().map(|place| place.map_or(Location::NOWHERE, |(location, _)| location)).collect();
                 compare_locations(&places, &found.owners, &found.barycentrics, points)?;
@@ -144,7 +144,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
 fn same_owners(gpu: &Gpu, twin: &mut Twin, device: &DeviceMesh, first: &Tree) -> Verdict {
     let (points, inside) = twin.points();
     let points = points[..inside].to_vec();
-    let owners = |tree: &Tree| Ok::<_, Error>(locate(device, tree, &points, None, &LocateOptions::default(), SILENT)?.owners);
+    let owners = |tree: &Tree| Ok::<_, Error>(locate(tree, &points, None, &LocateOptions::default(), SILENT)?.owners);
     let expected = owners(first)?;
     if let Some(i) = expected.iter().position(|&o| o == NONE) {
         return Err(fail("query.locate", "owners", Some(i), &format!("an owner of {:?}", points[i]), "none"));
@@ -197,7 +197,7 @@ fn hints(gpu: &Gpu, mesh: &Mesh, device: &DeviceMesh, tree: &Tree, locator: &Loc
     let hint_buffer = gpu.upload("olbvh.conformance.hints", &hints)?;
     let owners = Guarded::new(gpu, "olbvh.conformance.owners", &[], n)?;
     let barycentrics = Guarded::new(gpu, "olbvh.conformance.barycentrics", &[], 4 * n)?;
-    let scene = Scene::new(device, tree)?;
+    let scene = Scene::of(tree);
     let input = PointInput { points: input.all(), stride: 3, count: n as u32, hints: Some(hint_buffer.all()), order: None };
     let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
     gpu.submit("olbvh.conformance.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default()))?;

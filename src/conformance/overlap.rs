@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::mesh::{Mesh, kuhn_jittered};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::query::{OverlapInput, SILENT, overlap};
+use crate::query::{SILENT, overlap};
 use crate::reference::boundary::{Topology, topology};
 use crate::reference::build::build;
 use crate::reference::overlap::{OverlapSide, overlap as reference};
@@ -48,8 +48,8 @@ pub struct HostAndDevice {
     mesh: Mesh,
     topology: Topology,
     host: TreeArrays,
-    device: DeviceMesh,
-    tree: Tree,
+    /// The tree on the device.
+    pub tree: Tree,
 }
 
 impl HostAndDevice {
@@ -61,27 +61,22 @@ impl HostAndDevice {
         let topology = topology(&mesh)?;
         let device = DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?;
         let tree = Tree::build(gpu, &device, options)?;
-        Ok(Self { host: build(&mesh, &topology, options)?, topology, mesh, device, tree })
+        Ok(Self { host: build(&mesh, &topology, options)?, topology, mesh, tree })
     }
 
     fn sides(&self) -> Sides<'_> {
-        (OverlapSide { mesh: &self.mesh, topology: &self.topology, tree: &self.host }, self.input())
-    }
-
-    /// The mesh and the tree of the device.
-    pub fn input(&self) -> OverlapInput<'_> {
-        OverlapInput { mesh: &self.device, tree: &self.tree }
+        (OverlapSide { mesh: &self.mesh, topology: &self.topology, tree: &self.host }, &self.tree)
     }
 }
 
 /// A mesh as input of the reference implementation and of the device.
-type Sides<'a> = (OverlapSide<'a>, OverlapInput<'a>);
+type Sides<'a> = (OverlapSide<'a>, &'a Tree);
 
 pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
-    let own = (OverlapSide { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, OverlapInput { mesh: device, tree: &tree });
+    let own = (OverlapSide { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, &tree);
     let other = match case.other {
         Other::Grid => kuhn_jittered([6, 5, 4], 0.3, 9)?,
         Other::Itself => {

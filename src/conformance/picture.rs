@@ -65,7 +65,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let tree = Tree::build(gpu, device, &options)?;
         let normals = &scene.prepared.normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
-        let drawn = render(device, &tree, plan, (&field.values, field.on), normals, SILENT)?;
+        let drawn = render(&tree, plan, (&field.values, field.on), normals, SILENT)?;
         let pixels = plan.pixels(&drawn.colors, 1);
         let expected = draw(&scene, SILENT);
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
@@ -78,12 +78,12 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let hides = plan.hides(&field.values);
         if hides {
             let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
-            others.push(("every sample", render(device, &tree, &all, (&field.values, field.on), normals, SILENT)?.colors));
+            others.push(("every sample", render(&tree, &all, (&field.values, field.on), normals, SILENT)?.colors));
         }
         if case.parts {
             let mut rays = Rays::new(plan.size)?;
             for cells in halves(plan) {
-                let canvas = Canvas::new(device, &tree, plan, (&field.values, field.on), normals, true)?;
+                let canvas = Canvas::new(gpu, &(&tree).into(), plan, (&field.values, field.on), normals, true)?;
                 canvas.draw_part(cells, &vec![true; plan.size[1] as usize], &mut rays)?;
             }
             others.push(("two parts", rays.colors));

@@ -70,7 +70,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
     };
     if voxels.plan(&host.grid).is_err() {
         // The coordinates reach the limits of single precision: the device must refuse these voxels, too.
-        let refused = slice(device, &tree, None, &voxels, extrapolate, SILENT, &mut |_| Ok(()));
+        let refused = slice(&tree, None, &voxels, extrapolate, SILENT, &mut |_| Ok(()));
         return compare_one("query.slice", "refusal", &true, &matches!(refused, Err(Error::Invalid(_))));
     }
     let field = case.stack.field.map(|on| field(mesh, on));
@@ -83,7 +83,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
         Ok(())
     };
     let values = field.as_ref().map(|f| (&f.values[..], f.on));
-    let sliced = slice(device, &tree, values, &voxels, extrapolate, SILENT, &mut hold)?;
+    let sliced = slice(&tree, values, &voxels, extrapolate, SILENT, &mut hold)?;
     verdict?;
     let tally = sliced.tally;
     compare_one("query.slice", "voxels", &voxels.voxels(), &(tally.inside + tally.touched + tally.empty))

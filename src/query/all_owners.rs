@@ -2,7 +2,7 @@
 
 use super::locate::{LocateOptions, LocateOutput, PointInput, cmd_locate};
 use super::{Progress, Scene, capacity_of, list_parts};
-use crate::build::{DeviceMesh, Tree};
+use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{LocateAll, LocateAllSpec};
@@ -133,9 +133,9 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
 ///
 /// # Errors
 /// As [`super::locate`].
-pub fn locate_all(mesh: &DeviceMesh, tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<Vec<Vec<u32>>> {
+pub fn locate_all(tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<Vec<Vec<u32>>> {
     let gpu = tree.gpu();
-    let (scene, options) = (Scene::new(mesh, tree)?, LocateOptions { tolerance, ..LocateOptions::default() });
+    let (scene, options) = (Scene::of(tree), LocateOptions { tolerance, ..LocateOptions::default() });
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(POINT_CHUNK.min(OwnersMemory::most_points(scene.longest_leaf) as usize)) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;

@@ -2,7 +2,7 @@
 
 use super::order::{PointOrder, cmd_sort_points};
 use super::{Progress, Scene, list_parts, upload_field};
-use crate::build::{DeviceMesh, Tree, check_field, check_points};
+use crate::build::{Tree, check_field, check_points};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
@@ -243,8 +243,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
 pub fn cmd_interpolate(
     r: &mut Recorder<'_>,
     scene: &Scene,
-    field: BufferRef,
-    on: On,
+    (field, on): (BufferRef, On),
     located: &LocateOutput,
     values: BufferRef,
     count: u32,
@@ -290,10 +289,8 @@ pub struct Located {
 /// to points or tetrahedra. `report` receives the number of points done and their total.
 ///
 /// # Errors
-/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length or the tree was
-/// built over another mesh.
+/// [`Error::Memory`], a failed Vulkan call, or [`Error::Invalid`] if the field has the wrong length.
 pub fn locate(
-    mesh: &DeviceMesh,
     tree: &Tree,
     points: &[[f32; 3]],
     field: Option<(&[f32], On)>,
@@ -301,8 +298,8 @@ pub fn locate(
     report: Progress<'_>,
 ) -> Result<Located> {
     let gpu = tree.gpu();
-    let scene = Scene::new(mesh, tree)?;
-    let field = field.map(|field| upload_field(mesh, field)).transpose()?;
+    let scene = Scene::of(tree);
+    let field = field.map(|field| upload_field(gpu, &scene.mesh.input, field)).transpose()?;
     let mut all = Located::default();
     let at_once = points_at_once(scene.longest_leaf);
     let most = points.len().min(at_once) as u64;
@@ -326,7 +323,7 @@ pub fn locate(
             cmd_locate(r, &scene, &input, &output, options)?;
             if let (Some((field, on)), Some(values)) = (&field, &values) {
                 r.barrier("locate → interpolate");
-                cmd_interpolate(r, &scene, field.all(), *on, &output, values.all().part(0, 4 * n), count)?;
+                cmd_interpolate(r, &scene, (field.all(), *on), &output, values.all().part(0, 4 * n), count)?;
             }
             Ok(())
         })?;

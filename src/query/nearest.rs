@@ -2,7 +2,7 @@
 
 use super::locate::numbered;
 use super::{PointInput, Progress, Rounds, Scene};
-use crate::build::{DeviceMesh, Tree};
+use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::{CellRange, canonical};
@@ -39,8 +39,7 @@ impl NearestMemory {
 /// Records the search for the place of the surface that is closest to each point, at most `within` away, in units of the
 /// mesh, and at most 1 / [`crate::layout::Grid::scale`], which is between half of the mesh's largest extent and all of it:
 /// of the faces without neighbour the one with the smallest squared distance (ties: that of the tetrahedron with the lowest
-/// id). Hints and order of the points are not used. `part` restricts the search to the leaves in these cells, as it must be
-/// for a block of a mesh. Each round tests some thousand nodes and tetrahedra per point and passes over points that are
+/// id). Hints and order of the points are not used. Each round tests some thousand nodes and tetrahedra per point and passes over points that are
 /// finished; [`nearest`] searches for 131,072 points at a time, so that no dispatch takes long.
 ///
 /// Entry: mesh, tree and points are read by compute shaders. First use of `memory`: a transfer write of `unfinished`, and
@@ -53,7 +52,18 @@ pub fn cmd_nearest(
     scene: &Scene,
     input: &PointInput,
     within: f32,
-    part: Option<CellRange>,
+    memory: &NearestMemory,
+    rounds: Rounds,
+) -> Result<()> {
+    cmd_nearest_in(r, scene, input, (within, None), memory, rounds)
+}
+
+/// [`cmd_nearest`]; a block of a mesh is searched in these cells, whole leaves of its tree, only.
+fn cmd_nearest_in(
+    r: &mut Recorder<'_>,
+    scene: &Scene,
+    input: &PointInput,
+    (within, cells): (f32, Option<CellRange>),
     memory: &NearestMemory,
     rounds: Rounds,
 ) -> Result<()> {
@@ -62,12 +72,12 @@ pub fn cmd_nearest(
     let n = u64::from(input.count);
     memory.states.check(size_of::<NearState>() as u64 * n, "states of points")?;
     memory.barycentrics.check(16 * n, "barycentrics")?;
-    record(r, &arguments(scene, input, within, part, memory), rounds, NearestSpec::default().budget)
+    record(r, &arguments(scene, input, (within, cells), memory), rounds, NearestSpec::default().budget)
 }
 
-fn arguments(scene: &Scene, input: &PointInput, within: f32, part: Option<CellRange>, memory: &NearestMemory) -> NearestKernel {
+fn arguments(scene: &Scene, input: &PointInput, (within, cells): (f32, Option<CellRange>), memory: &NearestMemory) -> NearestKernel {
     let (tree, mesh) = (&scene.tree, &scene.mesh);
-    let [first_cell, last_cell] = part.unwrap_or(CellRange::WHOLE).words();
+    let [first_cell, last_cell] = cells.unwrap_or(CellRange::WHOLE).words();
     NearestKernel {
         grid: tree.grid,
         masks: tree.masks,
@@ -129,21 +139,18 @@ impl Nearest {
 }
 
 /// Finds the place of the surface that is closest to each point, at most `within` away ([`cmd_nearest`]). Points are
-/// relative to the mesh's origin. `part` restricts the search to a block of a mesh. `report` receives the number of points
-/// done and their total.
+/// relative to the mesh's origin. `report` receives the number of points done and their total.
 ///
 /// # Errors
-/// [`crate::Error::Memory`], a failed Vulkan call, or [`crate::Error::Invalid`] if the tree was built over another mesh.
-pub fn nearest(
-    mesh: &DeviceMesh,
-    tree: &Tree,
-    points: &[[f32; 3]],
-    within: f32,
-    part: Option<CellRange>,
-    report: Progress<'_>,
-) -> Result<Nearest> {
+/// [`crate::Error::Memory`], or a failed Vulkan call.
+pub fn nearest(tree: &Tree, points: &[[f32; 3]], within: f32, report: Progress<'_>) -> Result<Nearest> {
+    nearest_in(tree, points, within, None, report)
+}
+
+/// [`nearest`]; a block of a mesh is searched in these cells, whole leaves of its tree, only.
+pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: Option<CellRange>, report: Progress<'_>) -> Result<Nearest> {
     numbered(points.len())?;
-    let (gpu, scene, scale) = (tree.gpu(), Scene::new(mesh, tree)?, tree.grid().scale);
+    let (gpu, scene, scale) = (tree.gpu(), Scene::of(tree), tree.grid().scale);
     let most = points.len().min(AT_ONCE) as u32;
     let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.nearest", |a| NearestMemory::carve(a, most))?;
     let mut all = Nearest { scale, ..Nearest::default() };
@@ -153,7 +160,7 @@ pub fn nearest(
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
         let mut rounds = Rounds::begin(1);
         loop {
-            gpu.submit("olbvh.query.nearest", |r| cmd_nearest(r, &scene, &input, within, part, &memory, rounds))?;
+            gpu.submit("olbvh.query.nearest", |r| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds))?;
             let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
             report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64);
             if unfinished == 0 {
@@ -172,7 +179,7 @@ pub fn nearest(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::build::BadCells;
+    use crate::build::{BadCells, DeviceMesh};
     use crate::gpu::{Gpu, GpuOptions};
     use crate::grid::per_axis;
     use crate::mesh::kuhn_jittered;
@@ -201,7 +208,7 @@ mod tests {
             let input = PointInput { points: input.all(), stride: 3, count: points.len() as u32, hints: None, order: None };
             let carve = |a: &mut Arena| NearestMemory::carve(a, input.count);
             let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.nearest", carve).unwrap();
-            let arguments = arguments(&Scene::new(&device, &tree).unwrap(), &input, f32::INFINITY, None, &memory);
+            let arguments = arguments(&Scene::of(&tree), &input, (f32::INFINITY, None), &memory);
             for budget in [7, 8, 12, 37] {
                 let mut rounds = Rounds::begin(1);
                 let mut count = 0;

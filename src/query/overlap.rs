@@ -19,7 +19,7 @@ pub use pairs::{PairMemory, cmd_count_pairs, cmd_list_pairs};
 pub use sets::{OverlapMemory, cmd_overlap};
 
 use super::{Progress, Rounds, Scene};
-use crate::build::{DeviceMesh, Tree};
+use crate::build::Tree;
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Gpu, Recorder, StageTime};
 use crate::layout::{OverlapStatus, set_bits, wide};
@@ -28,15 +28,6 @@ use crate::reference::overlap::{Effort, Overlap, members};
 /// Rounds of the search per submission; for large meshes one, so that no submission takes long.
 fn rounds_at_once(tets: u32) -> u32 {
     if tets < 1 << 20 { 3 } else { 1 }
-}
-
-/// A mesh and its tree.
-#[derive(Clone, Copy, Debug)]
-pub struct OverlapInput<'a> {
-    /// The mesh.
-    pub mesh: &'a DeviceMesh,
-    /// Its tree.
-    pub tree: &'a Tree,
 }
 
 /// Overlap of two meshes, and what it cost.
@@ -145,18 +136,18 @@ impl Job<'_> {
     }
 }
 
-/// Overlap of A and B, whose points lie in one space, on one device: all pairs if `pairs` is true, else the two sets
+/// Overlap of the meshes of two trees, A and B, whose points lie in one space, on one device: all pairs if `pairs` is true, else the two sets
 /// alone. `report` receives how many of the tetrahedra that need a search are done, and how many there are; for pairs,
 /// every tetrahedron of A, twice: its pairs are counted first, then written.
 ///
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`] for 2^31 pairs and more, a failed Vulkan call, or [`Error::Invalid`] for
-/// meshes on different devices, a tree of another mesh, or pairs in a tree over B without the lists that pairs are
-/// found by.
-pub fn overlap(a: OverlapInput<'_>, b: OverlapInput<'_>, pairs: bool, report: Progress<'_>) -> Result<Overlapped> {
-    b.mesh.check_device(a.mesh.gpu())?;
-    let scenes = [Scene::new(a.mesh, a.tree)?, Scene::new(b.mesh, b.tree)?];
-    let mut job = Job { gpu: a.tree.gpu(), scenes, report, done: Overlapped::default() };
+/// trees on different devices, or pairs in a tree over B without the lists that pairs are found by.
+pub fn overlap(a: &Tree, b: &Tree, pairs: bool, report: Progress<'_>) -> Result<Overlapped> {
+    if !a.gpu().is_same_device(b.gpu()) {
+        return Err(Error::Invalid("the two trees lie on different devices".into()));
+    }
+    let mut job = Job { gpu: a.gpu(), scenes: [a, b].map(Scene::of), report, done: Overlapped::default() };
     if pairs {
         job.pairs()?;
     } else {

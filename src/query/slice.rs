@@ -10,10 +10,11 @@
 //! ```
 
 mod stack;
-pub(crate) use stack::Slicing;
 pub use stack::{Sliced, slice};
+pub(crate) use stack::{Slicing, slice_in};
 
-use super::{Rounds, Structure, StructureView, dispatch};
+use super::searched::{Searched, dispatch};
+use super::{Rounds, Scene};
 use crate::build::check_field;
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
@@ -47,10 +48,6 @@ pub struct SliceInput<'a> {
     pub field: Option<(BufferRef, On)>,
     /// The value that a touched voxel gets.
     pub extrapolate: Extrapolate,
-    /// If given, the mesh is a block of another one, and only these cells of the finest grid, whole leaves of an
-    /// octree, are searched. A voxel is then inside if its centre lies in these cells and has an owner, and it is
-    /// touched by what the leaves among them list. `None`: the whole mesh.
-    pub part: Option<CellRange>,
 }
 
 impl SliceInput<'_> {
@@ -111,18 +108,26 @@ impl SliceMemory {
 /// while there is any, answers must not be used, and values are incomplete. Recording again with [`Rounds::resume`]
 /// (same input, same memory) continues the work.
 ///
-/// Entry: mesh, structure and field are read by compute shaders. First use of `memory`: transfer and compute writes.
+/// Entry: mesh, tree and field are read by compute shaders. First use of `memory`: transfer and compute writes.
 /// Last use: compute reads and writes. There is no barrier before or after, so the caller records one from compute
 /// shader writes (and transfer writes of the status) to whatever reads the answers.
 ///
 /// # Errors
 /// [`Error::Invalid`] as [`VoxelGrid::check`], for rows that the stack lacks, for memory of too few voxels or runs, for
-/// a field of too few values, for no rounds, or for a part of a binary tree. Only the device knows whether boxes are
-/// flat or too large for the mesh; [`SliceStatus::refused`] reports that.
-pub fn cmd_slice(
+/// a field of too few values, or for no rounds. Only the device knows whether boxes are flat or too large for the mesh;
+/// [`SliceStatus::refused`] reports that.
+pub fn cmd_slice(r: &mut Recorder<'_>, scene: &Scene, input: &SliceInput<'_>, memory: &SliceMemory, rounds: Rounds) -> Result<()> {
+    cmd_slice_in(r, &scene.into(), input, None, memory, rounds)
+}
+
+/// [`cmd_slice`]. If cells of the finest grid are given, whole leaves of an octree, the mesh is a block of another one, and
+/// only these cells are searched. A voxel is then inside if its centre lies in them and has an owner, and it is touched by
+/// what the leaves among them list.
+fn cmd_slice_in(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     input: &SliceInput<'_>,
+    cells: Option<CellRange>,
     memory: &SliceMemory,
     rounds: Rounds,
 ) -> Result<()> {
@@ -138,17 +143,14 @@ pub fn cmd_slice(
         return Err(Error::Invalid(format!("{count} rows of {width} voxels in memory for {} voxels in {} runs", fits.0, fits.1)));
     }
     input.field.map_or(Ok(()), |field| check_field(field, &searched.mesh.input))?;
-    if input.part.is_some() && matches!(searched.structure, Structure::Binary(_)) {
-        return Err(Error::Invalid("a part of a binary tree, which has no cells".into()));
-    }
     if !rounds.resume {
-        cmd_plan(r, searched, input, memory)?;
+        cmd_plan(r, searched, input, cells, memory)?;
     }
     for round in 0..rounds.count {
         let fresh = round == 0 && !rounds.resume;
         r.fill(memory.status, 0);
         r.barrier("slice.clear → slice.locate");
-        cmd_locate_voxels(r, searched, memory, input, fresh)?;
+        cmd_locate_voxels(r, searched, memory, input, (fresh, cells.is_some()))?;
         r.barrier("slice.locate → slice.collect");
         // Voxels are listed only once all centres are located.
         cmd_touch_voxels(r, searched, memory, input)?;
@@ -157,10 +159,16 @@ pub fn cmd_slice(
     if rounds.count == 0 { Ok(()) } else { cmd_values(r, searched, memory, input) }
 }
 
-fn cmd_plan(r: &mut Recorder<'_>, searched: &StructureView, input: &SliceInput<'_>, memory: &SliceMemory) -> Result<()> {
+fn cmd_plan(
+    r: &mut Recorder<'_>,
+    searched: &Searched,
+    input: &SliceInput<'_>,
+    cells: Option<CellRange>,
+    memory: &SliceMemory,
+) -> Result<()> {
     let VoxelGrid { origin, next_voxel, next_row, next_layer, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
     let Rows { layer, first, count: rows } = input.rows;
-    let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, input.part.unwrap_or(CellRange::WHOLE).words());
+    let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, cells.unwrap_or(CellRange::WHOLE).words());
     let arguments = PlanKernel {
         grid,
         plans,
@@ -184,14 +192,14 @@ fn cmd_plan(r: &mut Recorder<'_>, searched: &StructureView, input: &SliceInput<'
 
 fn cmd_locate_voxels(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     memory: &SliceMemory,
     input: &SliceInput<'_>,
-    fresh: bool,
+    (fresh, part): (bool, bool),
 ) -> Result<()> {
     let (cells, arrays) = (searched.mesh.input.cells, &searched.mesh.arrays);
     let groups = Groups::Count(input.runs().div_ceil(r.gpu().target().query));
-    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(input.part.is_some()), searched.lists());
+    let (run, walk, part, lists) = (VOXEL_RUN, WALK, u32::from(part), searched.lists());
     let (budget, tolerance) = (LOCATE_BUDGET, TOLERANCE.to_bits());
     let (buffer, field, on_cells) = of_field(r, input);
     r.stage("query.slice_locate", |r| {
@@ -217,7 +225,7 @@ fn of_field(r: &Recorder<'_>, input: &SliceInput<'_>) -> (BufferRef, u32, u32) {
     (buffer, u32::from(input.field.is_some()), u32::from(on == On::Cells))
 }
 
-fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
+fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
     let (cells, arrays) = (searched.mesh.input.cells, &searched.mesh.arrays);
     let (boundary, voxels) = (arrays.boundary, input.count());
     let workgroup = r.gpu().target().query;
@@ -242,7 +250,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &StructureView, memory: &Sli
     })
 }
 
-fn cmd_values(r: &mut Recorder<'_>, searched: &StructureView, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
+fn cmd_values(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMemory, input: &SliceInput<'_>) -> Result<()> {
     let SliceMemory { answers, values, status, plan: plans, touches: states, groups, .. } = *memory;
     let (buffer, field, on_cells) = of_field(r, input);
     let arguments = SliceValues {

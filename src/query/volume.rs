@@ -9,10 +9,11 @@
 //! ```
 
 mod picture;
-pub(crate) use picture::{Canvas, Rays};
+pub(crate) use picture::{Canvas, Rays, render_in};
 pub use picture::{Rendered, render};
 
-use super::{Rounds, Structure, StructureView, cmd_visible, dispatch, visible_bytes};
+use super::searched::{Searched, dispatch};
+use super::{Rounds, Scene, cmd_visible, visible_bytes};
 use crate::build::{Capacity, MeshInput, check_field};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
@@ -23,7 +24,7 @@ use crate::kernels::{
 };
 use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
 use crate::mesh::On;
-use crate::render::TABLE_SIZE;
+use crate::render::{Plan, TABLE_SIZE};
 use std::mem::offset_of;
 
 /// Entries, nodes, and tetrahedra on and around walks that one ray may test in one dispatch, roughly.
@@ -42,7 +43,7 @@ pub struct RenderInput {
     /// [`RenderView`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
     pub view: BufferRef,
     /// Draws iso-surfaces, for the values that the view has, instead of the volume. View and table must have been made for
-    /// the same: it is the opposite of `plan.iso.is_empty()`.
+    /// the same; [`RenderInput::of`] sees to that.
     pub iso: bool,
     /// The transfer function: [`TABLE_SIZE`] times four floats, as in [`crate::render::Plan::table`].
     pub table: BufferRef,
@@ -59,14 +60,16 @@ pub struct RenderInput {
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
     /// picture is the same either way. With a binary tree nothing is skipped.
     pub visibility: Option<Visibility>,
-    /// Given if this is a part of a picture: some rows of it, or the part of one block of a mesh.
-    pub part: Option<RenderPart>,
+    /// The row of the view that is row 0 of this picture: 0, or the first row of a strip that is drawn by itself.
+    pub row: u32,
 }
 
 impl RenderInput {
-    /// The cells of the block of a mesh that draws its part of the picture.
-    fn cells(&self) -> Option<CellRange> {
-        self.part.and_then(|part| part.cells)
+    /// The whole picture of a plan, unlit and with nothing in front of it. `view` and `table` have [`Plan::view`] and
+    /// [`Plan::table`], or those of a later plan of the same size and kind.
+    pub fn of(plan: &Plan, view: BufferRef, table: BufferRef, field: (BufferRef, On)) -> Self {
+        let (size, iso) = (plan.size, !plan.iso.is_empty());
+        Self { size, view, iso, table, field, normals: None, depth: None, visibility: None, row: 0 }
     }
 
     /// Whether there is a depth buffer, and that buffer or an empty one.
@@ -85,17 +88,17 @@ impl RenderInput {
     }
 }
 
-/// A part of a picture.
-#[derive(Clone, Copy, Debug)]
-pub struct RenderPart {
-    /// The row of the view that is row 0 of this part.
-    pub row: u32,
+/// The share of a block of a mesh in a picture, or of a strip in the work for a whole one; by default neither.
+#[derive(Clone, Copy, Debug, Default)]
+struct Share {
     /// Given if the mesh is a block of another one, and other blocks draw their parts of the same rows. Blocks draw one
     /// after the other, in an order in which every ray that meets two of them meets the earlier one first. Each block
     /// continues the colours and rays in [`RenderMemory`] instead of starting new ones. Before the first block, colours
     /// must be 0, and rays must be 0 except for [`RayState::last`], which must be `u32::MAX`. Only samples in these
     /// cells of the finest grid, whole leaves of an octree, are taken.
-    pub cells: Option<CellRange>,
+    cells: Option<CellRange>,
+    /// The memory has the marks of the visible nodes already.
+    marked: bool,
 }
 
 /// The values that are visible; nodes of an octree without any of them are skipped.
@@ -184,29 +187,20 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// /// (range_bytes); and with a copy of your depth attachment.
 /// struct Yours { view: BufferRef, table: BufferRef, values: BufferRef, field: BufferRef, ranges: BufferRef, depth: BufferRef }
 ///
-/// /// `memory` is that of RenderMemory::carve(arena, size, Some(&scene.tree.capacity)).
-/// fn draw(r: &mut Recorder, scene: &Scene, plan: &Plan, size: [u32; 2], yours: &Yours, memory: &RenderMemory) -> Result<()> {
+/// /// `memory` is that of RenderMemory::carve(arena, plan.size, Some(&scene.tree.capacity)).
+/// fn draw(r: &mut Recorder, scene: &Scene, plan: &Plan, yours: &Yours, memory: &RenderMemory) -> Result<()> {
 ///     let field = (yours.field, On::Points);
 ///     cmd_ranges(r, &scene.mesh, &scene.tree, field, yours.ranges)?; // for a new tree, or new values; ends with a barrier
 ///     // A barrier of yours: what you uploaded, and the copy of the depths, to compute shaders.
 ///     let visibility = Visibility { ranges: yours.ranges, values: yours.values, count: plan.visible_values.len() as u32 };
-///     let input = RenderInput {
-///         size,
-///         view: yours.view,
-///         iso: !plan.iso.is_empty(),
-///         table: yours.table,
-///         field,
-///         normals: None,
-///         depth: Some(yours.depth),
-///         visibility: Some(visibility),
-///         part: None,
-///     };
-///     cmd_render(r, &StructureView::from(scene), &input, memory, Rounds::begin(2))
+///     let whole = RenderInput::of(plan, yours.view, yours.table, field);
+///     let input = RenderInput { depth: Some(yours.depth), visibility: Some(visibility), ..whole };
+///     cmd_render(r, scene, &input, memory, Rounds::begin(2))
 /// } // then a barrier of yours from compute shaders to the shader that blends memory.colors
 /// ```
 ///
-/// Entry: mesh, structure and input are read by compute shaders; the flags of a structure whose nodes are skipped are
-/// also read by transfers. First use of `memory`: transfer and compute writes; when resumed, a transfer write of the
+/// Entry: mesh, tree and input are read by compute shaders; the flags of a tree whose nodes are skipped are also read by
+/// transfers. First use of `memory`: transfer and compute writes; when resumed, a transfer write of the
 /// status, and compute reads and writes. Last use: compute reads and writes. There is no barrier before or after, so
 /// the caller records one from compute shader writes to whatever reads colours and status, and, before resuming, one to
 /// transfers and compute shaders.
@@ -214,24 +208,18 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// # Errors
 /// [`Error::Invalid`] for memory of fewer pixels, or without room for the nodes to be skipped, or if a part of the input
 /// is too small; [`Error::TooLarge`] as [`RenderMemory::carve`].
-pub fn cmd_render(
-    r: &mut Recorder<'_>,
-    searched: &StructureView,
-    input: &RenderInput,
-    memory: &RenderMemory,
-    rounds: Rounds,
-) -> Result<()> {
-    cmd_render_marked(r, searched, input, memory, rounds, false)
+pub fn cmd_render(r: &mut Recorder<'_>, scene: &Scene, input: &RenderInput, memory: &RenderMemory, rounds: Rounds) -> Result<()> {
+    cmd_render_in(r, &scene.into(), input, Share::default(), memory, rounds)
 }
 
-/// [`cmd_render`]. If nodes are skipped, and `marked`, `memory` has the marks of the visible nodes already.
-fn cmd_render_marked(
+/// [`cmd_render`], in any structure.
+fn cmd_render_in(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     input: &RenderInput,
+    Share { cells, marked }: Share,
     memory: &RenderMemory,
     rounds: Rounds,
-    marked: bool,
 ) -> Result<()> {
     let [width, height] = input.size;
     let rays = rays(input.size)?;
@@ -247,12 +235,12 @@ fn cmd_render_marked(
         if !marked {
             cmd_marks(r, searched, input, visible)?;
         }
-        cmd_plan(r, searched, input, memory, visible)?;
+        cmd_plan(r, searched, input, cells, memory, visible)?;
         r.barrier("render.plan → render.intervals");
         // With iso-surfaces the intervals use the boundary flags, not the marks: where the mesh has a crack, the field
         // may jump across an iso-value between nodes of which none is visible. These places must be sampled whatever
         // the tree.
-        cmd_intervals(r, searched, rays, input, memory, visible.filter(|_| !input.iso))?;
+        cmd_intervals(r, searched, rays, input, cells.is_some(), memory, visible.filter(|_| !input.iso))?;
     }
     for round in 0..rounds.count {
         if round > 0 {
@@ -266,8 +254,8 @@ fn cmd_render_marked(
 }
 
 /// The flags and marks in `memory` if nodes are to be skipped.
-fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
-    let (Some(_), Structure::Octree(tree)) = (input.visibility, searched.structure) else { return Ok(None) };
+fn visible(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
+    let (Some(_), Some(tree)) = (input.visibility, searched.octree()) else { return Ok(None) };
     let bits = visible_bytes(tree.capacity.nodes);
     match memory.visible {
         Some(visible) if bits <= visible.marks.size => Ok(Some(visible)),
@@ -276,8 +264,8 @@ fn visible(searched: &StructureView, input: &RenderInput, memory: &RenderMemory)
 }
 
 /// Records the marks of the visible nodes, if nodes are to be skipped.
-fn cmd_marks(r: &mut Recorder<'_>, searched: &StructureView, input: &RenderInput, visible: Option<Visible>) -> Result<()> {
-    if let (Some(Visible { flags, marks }), Some(shown), Structure::Octree(tree)) = (visible, input.visibility, &searched.structure) {
+fn cmd_marks(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, visible: Option<Visible>) -> Result<()> {
+    if let (Some(Visible { flags, marks }), Some(shown), Some(tree)) = (visible, input.visibility, searched.octree()) {
         let bits = visible_bytes(tree.capacity.nodes);
         r.copy(tree.flags.part(0, bits), flags);
         cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), marks)?;
@@ -288,12 +276,13 @@ fn cmd_marks(r: &mut Recorder<'_>, searched: &StructureView, input: &RenderInput
 /// Records the preparation of the view for the kernels.
 fn cmd_plan(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     input: &RenderInput,
+    cells: Option<CellRange>,
     memory: &RenderMemory,
     visible: Option<Visible>,
 ) -> Result<()> {
-    let [first_cell, last_cell] = input.cells().unwrap_or(CellRange::WHOLE).words();
+    let [first_cell, last_cell] = cells.unwrap_or(CellRange::WHOLE).words();
     let arguments = VolumePlan {
         grid: searched.mesh.arrays.grid,
         views: input.view,
@@ -302,7 +291,7 @@ fn cmd_plan(
         width: input.size[0],
         height: input.size[1],
         visible_at: visible.map_or(0, |v| ((v.marks.offset - v.flags.offset) / 4) as u32),
-        row: input.part.map_or(0, |part| part.row),
+        row: input.row,
         first_cell,
         last_cell,
     };
@@ -312,15 +301,16 @@ fn cmd_plan(
 
 fn cmd_intervals(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     rays: u32,
     input: &RenderInput,
+    part: bool,
     memory: &RenderMemory,
     visible: Option<Visible>,
 ) -> Result<()> {
     let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
     let (mesh, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
-    let (stack, part, iso) = (STACK, u32::from(input.cells().is_some()), u32::from(input.iso));
+    let (stack, part, iso) = (STACK, u32::from(part), u32::from(input.iso));
     let (depth, depths) = input.depths(r);
     let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.intervals", |r| {
@@ -338,7 +328,7 @@ fn cmd_intervals(
 
 fn cmd_march(
     r: &mut Recorder<'_>,
-    searched: &StructureView,
+    searched: &Searched,
     rays: u32,
     input: &RenderInput,
     memory: &RenderMemory,

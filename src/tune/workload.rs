@@ -136,14 +136,14 @@ impl<'a> Workload<'a> {
         let mut stages = Vec::new();
         for (tree, method) in [(&on.whole, LocateMethod::Descent), (&on.boundary, LocateMethod::Sorted)] {
             let options = LocateOptions { method, ..LocateOptions::default() };
-            let located = query::locate(&on.mesh, tree, &self.points, None, &options, SILENT)?;
+            let located = query::locate(tree, &self.points, None, &options, SILENT)?;
             stages.extend(located.stages);
             answers.owners.push(located.owners);
             answers.barycentrics.extend(located.barycentrics);
         }
-        let rendered = query::render(&on.mesh, &on.whole, &self.plan, (&self.field.values, On::Points), None, SILENT)?;
+        let rendered = query::render(&on.whole, &self.plan, (&self.field.values, On::Points), None, SILENT)?;
         answers.colors = rendered.colors;
-        let sliced = query::slice(&on.mesh, &on.whole, None, &self.voxels, Extrapolate::Nearest, SILENT, &mut |band| {
+        let sliced = query::slice(&on.whole, None, &self.voxels, Extrapolate::Nearest, SILENT, &mut |band| {
             answers.kinds.extend(band.kinds);
             answers.voxels.extend(band.owners);
             Ok(())

@@ -1,10 +1,11 @@
 //! Construction of the baselines and location in them, recorded.
 
+use olbvh::baseline::BinaryTree;
 use olbvh::baseline::{LbvhScratch, RayMethod, Rays, cmd_build_lbvh, cmd_locate_lbvh};
 use olbvh::build::{BadCells, DeviceMesh};
 use olbvh::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder};
 use olbvh::mesh::Mesh;
-use olbvh::query::{BinaryTree, LocateOutput, PointInput, Rounds};
+use olbvh::query::{LocateOutput, PointInput, Rounds};
 
 /// The memory of both baselines over a mesh, whose points are located.
 pub struct Baseline {

@@ -208,7 +208,7 @@ impl Frame {
         r.barrier("frame.mesh → frame.tree");
         let mesh = MeshView { input: self.input, arrays: self.arrays };
         cmd_build(r, &mesh, &self.tree, &BuildOptions::default(), &self.build_scratch)?;
-        let scene = Scene { mesh, tree: self.tree, longest_leaf: self.input.tets };
+        let scene = Scene::recorded(mesh, self.tree);
         cmd_locate(r, &scene, &self.points, &self.output, &LocateOptions::default())
     }
 }

@@ -8,7 +8,7 @@ use olbvh::mesh::{Bounds, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput, RenderMemory,
-    Rounds, Scene, SliceInput, SliceMemory, StructureView, Visibility, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
+    Rounds, Scene, SliceInput, SliceMemory, Visibility, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
     cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
 use olbvh::render::{Plan, RenderSettings, TransferFunction};
@@ -44,7 +44,7 @@ pub struct Queries {
 impl Queries {
     /// Queries after `frame`, whose mesh has the values `field` on its points, with room for `room` pairs.
     pub fn new(gpu: &Gpu, frame: &Frame, field: &[f32], other: &Mesh, room: u64) -> Self {
-        let scene = Scene { mesh: MeshView { input: frame.input, arrays: frame.arrays }, tree: frame.tree, longest_leaf: frame.input.tets };
+        let scene = Scene::recorded(MeshView { input: frame.input, arrays: frame.arrays }, frame.tree);
         let other = DeviceMesh::upload(gpu, other, BadCells::Skip).unwrap();
         // Pairs are found in lists, and each once in lists of `Aabb`.
         let options = BuildOptions { lists: Lists::All, assign: Assign::Aabb, ..BuildOptions::default() };
@@ -64,7 +64,7 @@ impl Queries {
         let normals = vec![[0.6, 0.0, 0.7]; field.len()];
         let carve = |a: &mut Arena| {
             let slice = SliceMemory::carve(a, [37, 29], rows.count)?;
-            let sets = OverlapMemory::carve(a, &scene, &Scene::new(&other, &other_tree)?)?;
+            let sets = OverlapMemory::carve(a, &scene, &Scene::of(&other_tree))?;
             let pairs = PairMemory::carve(gpu, a, scene.mesh.input.tets)?;
             let owners = OwnersMemory::carve(gpu, a, frame.points.count)?;
             let picture = RenderMemory::carve(a, plan.size, Some(&frame.tree.capacity))?;
@@ -117,28 +117,17 @@ impl Queries {
         cmd_count_owners(r, &self.scene, &self.points, &self.owners, &options)?;
         cmd_list_owners(r, &self.scene, &self.points, &self.owners, self.owner_lists)?;
         let count = self.points.count;
-        cmd_interpolate(r, &self.scene, self.field.all(), On::Points, &self.located, self.values, count)?;
-        let searched = StructureView::from(&self.scene);
+        cmd_interpolate(r, &self.scene, (self.field.all(), On::Points), &self.located, self.values, count)?;
         let field = Some((self.field.all(), On::Points));
-        let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest, part: None };
-        cmd_slice(r, &searched, &input, &self.slice, Rounds::begin(2))?;
+        let input = SliceInput { voxels: &self.voxels, rows: self.rows, field, extrapolate: Extrapolate::Nearest };
+        cmd_slice(r, &self.scene, &input, &self.slice, Rounds::begin(2))?;
         let field = (self.field.all(), On::Points);
         cmd_ranges(r, &self.scene.mesh, &self.scene.tree, field, self.ranges)?;
         let [view, table, values, normals] = self.drawn.each_ref().map(Buffer::all);
         let visibility = Some(Visibility { ranges: self.ranges, values, count: self.plan.visible_values.len() as u32 + 1 });
-        let input = RenderInput {
-            size: self.plan.size,
-            view,
-            iso: false,
-            table,
-            field,
-            normals: Some(normals),
-            depth: None,
-            visibility,
-            part: None,
-        };
-        cmd_render(r, &searched, &input, &self.picture, Rounds::begin(2))?;
-        let other = Scene::new(&self.other, &self.other_tree)?;
+        let input = RenderInput { normals: Some(normals), visibility, ..RenderInput::of(&self.plan, view, table, field) };
+        cmd_render(r, &self.scene, &input, &self.picture, Rounds::begin(2))?;
+        let other = Scene::of(&self.other_tree);
         cmd_overlap(r, &self.scene, &other, &self.sets, Rounds::begin(4))?;
         cmd_count_pairs(r, &self.scene, &other, &self.pairs, Rounds::begin(8))?;
         cmd_list_pairs(r, &self.scene, &other, &self.pairs, self.found, Rounds::begin(8))

@@ -65,7 +65,7 @@ impl Body {
         let memory = buffer("memory", Arena::measure(carve)?)?;
         let (arrays, tree, mesh_scratch, build_scratch, barycentrics) = carve(&mut Arena::new(memory.all()))?;
         let mesh = MeshView { input: MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets }, arrays };
-        let scene = Scene { mesh, tree, longest_leaf: tets };
+        let scene = Scene::recorded(mesh, tree);
         let input = PointInput { points: asked.all(), stride: 3, count: pixels as u32, hints: None, order: None };
         let output = LocateOutput { owners: owners.all(), barycentrics };
         let held = [on_device, cells, asked, memory];

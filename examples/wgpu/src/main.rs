@@ -181,7 +181,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, body: &Body) -> Result<()> {
     let moved = Mesh::new(moved, mesh.tets.clone());
     let device = DeviceMesh::upload(gpu, &moved, BadCells::Skip)?;
     let tree = Tree::build(gpu, &device, &BuildOptions::default())?;
-    let expected = locate(&device, &tree, &body.places, Some((&body.field, On::Points)), &LocateOptions::default(), SILENT)?;
+    let expected = locate(&tree, &body.places, Some((&body.field, On::Points)), &LocateOptions::default(), SILENT)?;
     let owners: Vec<u32> = gpu.download(&body.owners, body.owners.all())?;
     let values: Vec<u32> = gpu.download(&body.values, body.values.all())?;
     ensure!(owners == expected.owners, "the recorded frame has other owners than the owning functions");

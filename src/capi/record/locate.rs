@@ -202,7 +202,7 @@ pub extern "C" fn olbvh_cmd_nearest(
         let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
         let input = OlbvhLocation { hints: OlbvhBuffer::default(), ..*location }.input();
         let memory = memory.place(|a| NearestMemory::carve(a, location.count))?;
-        cmd_nearest(r, scene, &input, within, None, &memory, rounds.into())
+        cmd_nearest(r, scene, &input, within, &memory, rounds.into())
     })
 }
 
@@ -218,7 +218,6 @@ pub extern "C" fn olbvh_cmd_interpolate(
 ) -> OlbvhStatus {
     recorded(recording, |r| {
         let (scene, location) = (&scene_on(r, scene, "scene")?.scene, handle(location, "location")?);
-        let (field, on) = handle(field, "field")?.read();
-        cmd_interpolate(r, scene, field, on, &location.output(), values.part(), location.count)
+        cmd_interpolate(r, scene, handle(field, "field")?.read(), &location.output(), values.part(), location.count)
     })
 }

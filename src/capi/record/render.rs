@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::Arena;
 use crate::layout::RenderView;
 use crate::mesh::Bounds;
-use crate::query::{RenderInput, RenderMemory, Scene, StructureView, Visibility, cmd_render};
+use crate::query::{RenderInput, RenderMemory, Scene, Visibility, cmd_render};
 use crate::render::{Plan, ProjectedView};
 use glam::DMat4;
 use std::mem::offset_of;
@@ -186,10 +186,9 @@ pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const
             normals: picture.normals.given(),
             depth: picture.depth.given(),
             visibility: picture.ranges.given().map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
-            part: None,
+            row: 0,
         };
         let memory = picture.memory.place(picture.carve(scene))?;
-        let searched = StructureView::from(scene);
-        cmd_render(r, &searched, &input, &memory, picture.rounds.into())
+        cmd_render(r, scene, &input, &memory, picture.rounds.into())
     })
 }

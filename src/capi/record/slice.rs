@@ -4,7 +4,7 @@ use super::scene::{OlbvhScene, scene_on};
 use super::{OlbvhBuffer, OlbvhField, OlbvhRecording, OlbvhRounds, recorded};
 use crate::capi::query::OlbvhVoxels;
 use crate::capi::{OlbvhStatus, border, handle, put};
-use crate::query::{SliceInput, SliceMemory, StructureView, cmd_slice};
+use crate::query::{SliceInput, SliceMemory, cmd_slice};
 use crate::slicing::{Extrapolate, Rows};
 
 /// Which voxels are sliced, and where the results go.
@@ -68,8 +68,8 @@ pub extern "C" fn olbvh_cmd_slice(recording: *mut OlbvhRecording, scene: *const 
         let OlbvhSlicing { layer, first, rows, field, .. } = *slicing;
         let field = (field.values.size > 0).then(|| field.read());
         let extrapolate = if slicing.linear == 0 { Extrapolate::Nearest } else { Extrapolate::Linear };
-        let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate, part: None };
+        let input = SliceInput { voxels: &slicing.voxels.read(), rows: Rows { layer, first, count: rows }, field, extrapolate };
         let memory = slicing.memory.place(|a| SliceMemory::carve(a, [slicing.voxels.width, slicing.voxels.height], rows))?;
-        cmd_slice(r, &StructureView::from(scene), &input, &memory, slicing.rounds.into())
+        cmd_slice(r, scene, &input, &memory, slicing.rounds.into())
     })
 }

@@ -29,7 +29,7 @@ pub fn pictures(tree: *mut OlbvhTree, values: &[f32], prepare: &dyn Fn(&OlbvhPic
     ] {
         let Prepared { plan, normals, .. } = prepare(&settings);
         let normals = (settings.shading != 0).then_some(&normals[..]);
-        let expected = render(&mesh.device, built, &plan, (values, On::Points), normals, SILENT).unwrap().colors;
+        let expected = render(built, &plan, (values, On::Points), normals, SILENT).unwrap().colors;
         assert!(expected.iter().any(|color| color[3] > 0.1), "{settings:?}");
         for _ in 0..2 {
             let mut colors = vec![[0f32; 4]; 37 * 30];

@@ -7,7 +7,7 @@ use crate::gpu::Buffer;
 use crate::layout::{NearState, RenderView};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
-use crate::query::{LocateOptions, Nearest, OverlapInput, SILENT, locate, locate_all, nearest, overlap, render, slice};
+use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
 use crate::render::{Plan, Prepared, ProjectedView, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
@@ -51,7 +51,7 @@ struct Expected {
 }
 
 /// Answers, bits of the values, and the number of bands of a stack.
-fn sliced(mesh: &DeviceMesh, tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Vec<u32>, Vec<u32>, u32) {
+fn sliced(tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Vec<u32>, Vec<u32>, u32) {
     let (mut answers, mut values, mut bands) = (Vec::new(), Vec::new(), 0);
     let mut sink = |band: Band| {
         let answer = |(&owner, &kind): (&u32, &u8)| if kind == crate::slicing::TOUCHED { owner | 1 << 31 } else { owner };
@@ -60,7 +60,7 @@ fn sliced(mesh: &DeviceMesh, tree: &Tree, field: Option<(&[f32], On)>, voxels: &
         bands += 1;
         Ok(())
     };
-    slice(mesh, tree, field, &voxels.read(), Extrapolate::Linear, SILENT, &mut sink).unwrap();
+    slice(tree, field, &voxels.read(), Extrapolate::Linear, SILENT, &mut sink).unwrap();
     (answers, values, bands)
 }
 
@@ -70,9 +70,8 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
     let [mesh, other] = meshes.each_ref().map(|m| DeviceMesh::upload(gpu, m, BadCells::Skip).unwrap());
     let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     let [tree, other_tree] = [&mesh, &other].map(|m| Tree::build(gpu, m, &options).unwrap());
-    let (answers, sliced, _) = sliced(&mesh, &tree, field, &voxels());
-    let inputs = [OverlapInput { mesh: &mesh, tree: &tree }, OverlapInput { mesh: &other, tree: &other_tree }];
-    let [sets, pairs] = [false, true].map(|pairs| overlap(inputs[0], inputs[1], pairs, SILENT).unwrap().overlap);
+    let (answers, sliced, _) = sliced(&tree, field, &voxels());
+    let [sets, pairs] = [false, true].map(|pairs| overlap(&tree, &other_tree, pairs, SILENT).unwrap().overlap);
     let bits = |found: &[u32], mesh: &Mesh| {
         let mut words = vec![0; mesh.tets.len().div_ceil(32)];
         found.iter().for_each(|i| words[*i as usize / 32] |= 1 << (i % 32));
@@ -80,14 +79,14 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 
     };
     let points = &meshes[0].points;
     Expected {
-        colors: render(&mesh, &tree, plan, (&values, On::Points), normals, SILENT).unwrap().colors,
+        colors: render(&tree, plan, (&values, On::Points), normals, SILENT).unwrap().colors,
         answers,
         sliced,
         hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
         pairs: pairs.pairs.unwrap(),
-        owners: locate_all(&mesh, &tree, points, TOLERANCE, SILENT).unwrap(),
-        nearest: nearest(&mesh, &tree, points, 1.0, None, SILENT).unwrap(),
-        located: locate(&mesh, &tree, points, field, &LocateOptions::default(), SILENT).unwrap().values,
+        owners: locate_all(&tree, points, TOLERANCE, SILENT).unwrap(),
+        nearest: nearest(&tree, points, 1.0, SILENT).unwrap(),
+        located: locate(&tree, points, field, &LocateOptions::default(), SILENT).unwrap().values,
     }
 }
 
@@ -327,7 +326,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
 fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
     let stack = OlbvhVoxels { across: [0.007, 0.0, 0.0], down: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
     let held = handle(tree, "tree").unwrap();
-    let expected = sliced(&held.mesh.device, &held.tree, Some((values, On::Points)), &stack);
+    let expected = sliced(&held.tree, Some((values, On::Points)), &stack);
     let (mut answers, mut found) = (vec![0u32; 2_800_000], vec![0f32; 2_800_000]);
     ok(olbvh_slice(tree, &raw const stack, values.as_ptr(), 0, 1, answers.as_mut_ptr(), found.as_mut_ptr()));
     assert!(expected.2 > 2 && expected.0 == answers, "{} bands", expected.2);

@@ -1,14 +1,15 @@
 //! Slicing of a whole stack of layers by means of [`cmd_slice`]: allocates memory, divides the stack into bands of
 //! rows, and submits until every voxel is done.
 
-use super::{SliceInput, SliceMemory, cmd_slice};
-use crate::build::DeviceMesh;
+use super::{SliceInput, SliceMemory, cmd_slice_in};
+use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, Buffer, Gpu};
 use crate::grid::CellRange;
-use crate::layout::{RunState, SliceStatus};
+use crate::layout::{Grid, RunState, SliceStatus};
 use crate::mesh::On;
-use crate::query::{Built, Progress, Rounds, StructureView, upload_field};
+use crate::query::searched::Searched;
+use crate::query::{Progress, Rounds, upload_field};
 use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
 
 /// Bytes of device memory per voxel of a band, including transfers but not runs, and a fixed reserve.
@@ -35,11 +36,11 @@ pub struct Sliced {
 /// What the bands of a stack over a mesh and its structure have in common, in memory owned by this crate.
 pub(crate) struct Slicing<'a> {
     gpu: &'a Gpu,
-    searched: StructureView,
+    searched: Searched,
     voxels: &'a VoxelGrid,
     field: Option<(Buffer, On)>,
     extrapolate: Extrapolate,
-    part: Option<CellRange>,
+    cells: Option<CellRange>,
     memory: SliceMemory,
     buffer: Buffer,
     /// Rows of the largest band.
@@ -48,21 +49,20 @@ pub(crate) struct Slicing<'a> {
 }
 
 impl<'a> Slicing<'a> {
-    /// Prepares slicing in bands of as many rows as the memory that is left allows. `part` is that of
-    /// [`SliceInput::part`].
+    /// Prepares slicing in bands of as many rows as the memory that is left allows, of a mesh in this grid. `cells` are
+    /// those of [`cmd_slice_in`].
     ///
     /// # Errors
     /// As [`slice`].
     pub(crate) fn new(
-        mesh: &'a DeviceMesh,
-        built: &dyn Built,
+        gpu: &'a Gpu,
+        (searched, grid): (&Searched, &Grid),
         field: Option<(&[f32], On)>,
         (voxels, extrapolate): (&'a VoxelGrid, Extrapolate),
-        part: Option<CellRange>,
+        cells: Option<CellRange>,
     ) -> Result<Self> {
-        let gpu = mesh.gpu();
-        voxels.plan(mesh.grid())?;
-        let field = field.map(|field| upload_field(mesh, field)).transpose()?;
+        voxels.plan(grid)?;
+        let field = field.map(|field| upload_field(gpu, &searched.mesh.input, field)).transpose()?;
         let [width, height] = voxels.size;
         let per_run = size_of::<RunState>() as u64;
         let per_voxel = PER_VOXEL + per_run / u64::from(height.clamp(1, VOXEL_RUN));
@@ -71,22 +71,22 @@ impl<'a> Slicing<'a> {
         let rows = bands(voxels, most).next().map_or(1, |rows| rows.count);
         let carve = |a: &mut Arena| SliceMemory::carve(a, voxels.size, rows);
         let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.slice", carve)?;
-        let (searched, sliced) = (StructureView::new(mesh, built)?, Sliced::default());
-        Ok(Self { gpu, searched, voxels, field, extrapolate, part, memory, buffer, rows, sliced })
+        Ok(Self { gpu, searched: *searched, voxels, field, extrapolate, cells, memory, buffer, rows, sliced: Sliced::default() })
     }
 
     /// Slices one band of at most [`Self::rows`] rows. Submits until every voxel is done; usually one submission
     /// suffices.
     ///
     /// # Errors
-    /// As [`cmd_slice`], or a failed Vulkan call.
+    /// As [`super::cmd_slice`], or a failed Vulkan call.
     pub(crate) fn band(&mut self, rows: Rows) -> Result<Band> {
         let (memory, sliced) = (&self.memory, &mut self.sliced);
         let field = self.field.as_ref().map(|(buffer, on)| (buffer.all(), *on));
-        let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate, part: self.part };
+        let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate };
         let mut rounds = Rounds::begin(1);
         let status = loop {
-            let ((), time) = self.gpu.submit("olbvh.query.slice", |r| cmd_slice(r, &self.searched, &input, memory, rounds))?;
+            let ((), time) =
+                self.gpu.submit("olbvh.query.slice", |r| cmd_slice_in(r, &self.searched, &input, self.cells, memory, rounds))?;
             rounds = Rounds::resume(1);
             sliced.submissions += 1;
             sliced.locate_ms += time.milliseconds("query.slice_locate");
@@ -117,22 +117,33 @@ impl<'a> Slicing<'a> {
     }
 }
 
-/// Slices a mesh and hands the voxels to `sink` band by band, in order. `field` has values and says whether they belong
-/// to points or tetrahedra. `report` receives the number of voxels done and their total.
+/// Slices the mesh of a tree and hands the voxels to `sink` band by band, in order. `field` has values and says whether
+/// they belong to points or tetrahedra. `report` receives the number of voxels done and their total.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for a field of the wrong length, for voxels that [`VoxelGrid::plan`] refuses, or for a
-/// structure over another mesh; [`crate::Error::Memory`]; a failed Vulkan call; errors of `sink`.
+/// [`crate::Error::Invalid`] for a field of the wrong length, or for voxels that [`VoxelGrid::plan`] refuses;
+/// [`crate::Error::Memory`]; a failed Vulkan call; errors of `sink`.
 pub fn slice(
-    mesh: &DeviceMesh,
-    built: &dyn Built,
+    tree: &Tree,
     field: Option<(&[f32], On)>,
     voxels: &VoxelGrid,
     extrapolate: Extrapolate,
     report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<Sliced> {
-    let mut slicing = Slicing::new(mesh, built, field, (voxels, extrapolate), None)?;
+    slice_in(tree.gpu(), (&tree.into(), tree.grid()), field, (voxels, extrapolate), report, sink)
+}
+
+/// [`slice`], of any structure over a mesh in this grid.
+pub(crate) fn slice_in(
+    gpu: &Gpu,
+    searched: (&Searched, &Grid),
+    field: Option<(&[f32], On)>,
+    (voxels, extrapolate): (&VoxelGrid, Extrapolate),
+    report: Progress<'_>,
+    sink: &mut dyn FnMut(Band) -> Result<()>,
+) -> Result<Sliced> {
+    let mut slicing = Slicing::new(gpu, searched, field, (voxels, extrapolate), None)?;
     let mut done = 0;
     for rows in bands(voxels, u64::from(slicing.rows) * u64::from(voxels.size[0])) {
         let band = slicing.band(rows)?;

@@ -1,14 +1,15 @@
-//! Drawing of a whole picture by means of [`cmd_render`]: allocates memory, and submits one round at a time until every
+//! Drawing of a whole picture by means of [`super::cmd_render`]: allocates memory, and submits one round at a time until every
 //! ray is done.
 
-use super::{BLOCK, RenderInput, RenderMemory, RenderPart, Visibility, cmd_render, cmd_render_marked};
-use crate::build::{DeviceMesh, cmd_ranges, range_bytes};
+use super::{BLOCK, RenderInput, RenderMemory, Share, Visibility, cmd_render_in};
+use crate::build::{Tree, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, DeviceKind, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::On;
-use crate::query::{Built, Progress, Rounds, SILENT, Structure, StructureView, upload_field};
+use crate::query::searched::Searched;
+use crate::query::{Progress, Rounds, SILENT, upload_field};
 use crate::render::{Plan, RenderStats, TABLE_SIZE};
 use bytemuck::Pod;
 
@@ -49,7 +50,7 @@ impl Rays {
 /// A mesh, its structure and a field in device memory, ready to draw a whole picture or strips of one.
 pub(crate) struct Canvas<'a> {
     gpu: &'a Gpu,
-    searched: StructureView,
+    searched: Searched,
     plan: &'a Plan,
     field: (Buffer, On),
     normals: Option<Buffer>,
@@ -70,37 +71,33 @@ impl<'a> Canvas<'a> {
     /// # Errors
     /// As [`render`].
     pub(crate) fn new(
-        mesh: &'a DeviceMesh,
-        built: &dyn Built,
+        gpu: &'a Gpu,
+        searched: &Searched,
         plan: &'a Plan,
         (values, on): (&[f32], On),
         normals: Option<&[[f32; 3]]>,
         in_strips: bool,
     ) -> Result<Self> {
-        let gpu = mesh.gpu();
-        let searched = StructureView::new(mesh, built)?;
+        let mesh = &searched.mesh.input;
         if plan.table.len() != TABLE_SIZE {
             return Err(Error::Invalid(format!("a transfer function of {} colours; there are {TABLE_SIZE}", plan.table.len())));
         }
-        if let Some(normals) = normals.filter(|n| n.len() != mesh.sizes()[0]) {
-            return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.sizes()[0])));
+        if let Some(normals) = normals.filter(|n| n.len() != mesh.points as usize) {
+            return Err(Error::Invalid(format!("{} normals where the mesh has {} points", normals.len(), mesh.points)));
         }
-        let field = upload_field(mesh, (values, on))?;
+        let field = upload_field(gpu, mesh, (values, on))?;
         let normals = normals.map(|n| gpu.upload("olbvh.query.normals", n)).transpose()?;
         let uniforms = [
             gpu.upload("olbvh.query.view", &[plan.view()])?,
             gpu.upload("olbvh.query.table", &plan.table)?,
             gpu.upload("olbvh.query.drawn", &plan.visible_values)?,
         ];
-        let skipped = match &searched.structure {
-            Structure::Octree(tree) if plan.hides(values) => Some(tree),
-            _ => None,
-        };
+        let skipped = searched.octree().filter(|_| plan.hides(values));
         let carve = |a: &mut Arena, rows: u32| {
             let memory = RenderMemory::carve(a, [plan.size[0], rows], skipped.map(|tree| &tree.capacity))?;
             Ok((memory, skipped.map(|tree| a.take(range_bytes(tree.capacity.nodes))).transpose()?))
         };
-        let in_strips = in_strips && matches!(searched.structure, Structure::Octree(_));
+        let in_strips = in_strips && searched.octree().is_some();
         let mut rows = if in_strips { strip_rows(strip(gpu), plan.size) } else { plan.size[1] }.max(1);
         let left = gpu.memory_left(); // once: other threads allocate and free
         while in_strips && rows > BLOCK && Arena::measure(|a| carve(a, rows))? > left - left / 4 {
@@ -109,14 +106,15 @@ impl<'a> Canvas<'a> {
         let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
         let (memory, ranges) = carve(&mut Arena::new(buffer.all()), rows)?;
         let stats = RenderStats::default();
-        let mut canvas = Self { gpu, searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, marked: false, stats };
+        let mut canvas =
+            Self { gpu, searched: *searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, marked: false, stats };
         canvas.gather_ranges()?;
         Ok(canvas)
     }
 
     /// Computes the range of the field in every node, if nodes are skipped.
     fn gather_ranges(&mut self) -> Result<()> {
-        if let (Structure::Octree(tree), Some(ranges)) = (&self.searched.structure, self.ranges) {
+        if let (Some(tree), Some(ranges)) = (self.searched.octree(), self.ranges) {
             let field = (self.field.0.all(), self.field.1);
             let ((), time) = self.gpu.submit("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
             self.stats.ranges_ms += time.milliseconds("build.ranges");
@@ -124,29 +122,27 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws a picture of this size, or a part of one. `report` receives the number of rays done and their total.
-    fn draw(&mut self, size: [u32; 2], part: Option<RenderPart>, report: Progress<'_>) -> Result<()> {
+    /// Draws a picture of this size from this row of the view on, or the share of a block in it. `report` receives the number of rays done and their total.
+    fn draw(&mut self, size: [u32; 2], row: u32, cells: Option<CellRange>, report: Progress<'_>) -> Result<()> {
         let Self { gpu, searched, plan, memory, stats, .. } = self;
         let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
         let input = RenderInput {
             size,
-            view,
-            iso: !plan.iso.is_empty(),
-            table,
-            field: (self.field.0.all(), self.field.1),
+            row,
             normals: self.normals.as_ref().map(Buffer::all),
-            depth: None,
             visibility: self.ranges.map(|ranges| Visibility { ranges, values, count: plan.visible_values.len() as u32 }),
-            part,
+            ..RenderInput::of(plan, view, table, (self.field.0.all(), self.field.1))
         };
-        let begin = |r: &mut Recorder<'_>| cmd_render_marked(r, searched, &input, memory, Rounds::begin(0), self.marked);
+        let share = Share { cells, marked: self.marked };
+        let begin = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::begin(0));
         let ((), time) = gpu.submit("olbvh.query.intervals", begin)?;
         self.marked = true;
         stats.ranges_ms += time.milliseconds("query.visible");
         stats.interval_ms += time.milliseconds("query.intervals");
         let rays = u64::from(size[0]) * u64::from(size[1]);
         let status = loop {
-            let ((), time) = gpu.submit("olbvh.query.march", |r| cmd_render(r, searched, &input, memory, Rounds::resume(1)))?;
+            let round = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::resume(1));
+            let ((), time) = gpu.submit("olbvh.query.march", round)?;
             stats.march_ms += time.milliseconds("query.march");
             stats.submissions += 1;
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
@@ -180,7 +176,7 @@ impl<'a> Canvas<'a> {
             let (colors, states) = (&mut rays.colors[pixels], &mut rays.states[items]);
             self.gpu.write(&mut self.buffer, self.memory.colors.offset, colors)?;
             self.gpu.write(&mut self.buffer, self.memory.rays.offset, states)?;
-            self.draw(size, Some(RenderPart { row, cells: Some(cells) }), SILENT)?;
+            self.draw(size, row, Some(cells), SILENT)?;
             // Both are read before either is stored: colours with older states would get the same samples again.
             let drawn = self.first(self.memory.colors, colors.len())?;
             let reached = self.first(self.memory.rays, states.len())?;
@@ -201,15 +197,20 @@ fn strip_rows(rays: u32, [width, height]: [u32; 2]) -> u32 {
     (rays / width.max(1)).max(1).next_multiple_of(BLOCK).min(height)
 }
 
-/// Draws a plan of a field (values per point or per tetrahedron). `normals` has one normal per point, for shading.
-/// `report` receives the number of rays done and their total.
+/// Draws a plan of a field (values per point or per tetrahedron) over the mesh of a tree. `normals` has one normal per
+/// point, for shading. `report` receives the number of rays done and their total.
 ///
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field, normals or transfer
-/// function have the wrong length or the structure was built over another mesh.
-pub fn render(
-    mesh: &DeviceMesh,
-    built: &dyn Built,
+/// function have the wrong length.
+pub fn render(tree: &Tree, plan: &Plan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
+    render_in(tree.gpu(), &tree.into(), plan, field, normals, report)
+}
+
+/// [`render`], with any structure.
+pub(crate) fn render_in(
+    gpu: &Gpu,
+    searched: &Searched,
     plan: &Plan,
     field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
@@ -221,12 +222,12 @@ pub fn render(
     if !plan.rays.is_finite(plan.size) {
         return Err(Error::Invalid("rays that are no finite numbers; the camera's matrix may have no inverse".into()));
     }
-    let mut canvas = Canvas::new(mesh, built, plan, field, normals, rays > u64::from(strip(mesh.gpu())))?;
+    let mut canvas = Canvas::new(gpu, searched, plan, field, normals, rays > u64::from(strip(gpu)))?;
     let mut colors = Vec::with_capacity(rays as usize);
     for row in (0..height).step_by(canvas.rows as usize) {
         let size = [width, canvas.rows.min(height - row)];
         let before = colors.len() as u64;
-        canvas.draw(size, Some(RenderPart { row, cells: None }), &|done, _| report(before + done, rays))?;
+        canvas.draw(size, row, None, &|done, _| report(before + done, rays))?;
         colors.extend(canvas.first::<[f32; 4]>(canvas.memory.colors, size[0] as usize * size[1] as usize)?);
     }
     Ok(Rendered { colors, stats: canvas.stats })
