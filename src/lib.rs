@@ -9,7 +9,7 @@
 //!
 //! # A complete example
 //! ```no_run
-//! use olbvh::{build::{BadCells, DeviceMesh, Tree}, gpu::{Gpu, GpuOptions}, mesh, options::BuildOptions, query};
+//! use olbvh::{BadCells, BuildOptions, DeviceMesh, Gpu, GpuOptions, Tree, mesh, query};
 //! # fn main() -> olbvh::Result<()> {
 //! let mesh = mesh::kuhn([32, 32, 32])?;
 //! let gpu = Gpu::new(&GpuOptions::default())?;
@@ -20,8 +20,7 @@
 //! # Ok(()) }
 //! ```
 //!
-//! For thin bodies and for rendering, see [`options::Fineness`]; for many points, [`query::LocateMethod`]; for repeated
-//! calls, [`gpu::Gpu::with_pool`].
+//! For thin bodies and for rendering, see [`options::Fineness`]; for repeated calls, [`gpu::Gpu::with_pool`].
 //!
 //! # In your own renderer
 //! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], exported
@@ -132,7 +131,11 @@ pub mod tune;
 /// The versions whose types appear in the interface for host applications.
 pub use {ash, glam, gpu_allocator};
 
+pub use build::{BadCells, DeviceMesh, Tree};
 pub use error::{Error, Result};
+pub use gpu::{Gpu, GpuOptions};
+pub use mesh::Mesh;
+pub use options::BuildOptions;
 
 /// The results of owning calls can be sent to and shared by any thread.
 const _: () = {

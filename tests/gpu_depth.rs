@@ -14,7 +14,7 @@ use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene as OnDevice,
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Scene, render};
-use olbvh::render::{Plan, Prepared, ProjectedView, RenderSettings, ValidTets};
+use olbvh::render::{Plan, ProjectedView, RenderSettings, ValidTets};
 use submit::submit;
 
 const SIZE: [u32; 2] = [44, 30];
@@ -75,7 +75,7 @@ fn what_lies_behind_is_not_drawn() {
             let scene = || Scene::new(&mesh, &topology, &arrays, field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
             let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
             let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
-            let normals = gpu.upload("olbvh.test.normals", &Prepared::new(&settings, &mesh, &valid, field).unwrap().normals).unwrap();
+            let normals = gpu.upload("olbvh.test.normals", &settings.normals(&mesh, &valid, field)).unwrap();
             let carve = |a: &mut Arena| RenderMemory::carve(a, SIZE, None);
             let buffer = gpu.upload("olbvh.test.picture", &vec![0u8; Arena::measure(carve).unwrap() as usize]).unwrap();
             let memory = carve(&mut Arena::new(buffer.all())).unwrap();

@@ -4,7 +4,7 @@ use super::{HeldMesh, OlbvhStatus, OlbvhTree, array, border, handle, missing, to
 use crate::error::{Error, Result};
 use crate::gpu::BufferRef;
 use crate::mesh::{Bounds, Field, Mesh, On};
-use crate::query::{LocateMethod, LocateOptions, SILENT, locate, nearest, overlap, render, slice};
+use crate::query::{LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
 use crate::render::{Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
@@ -208,8 +208,7 @@ pub extern "C" fn olbvh_locate(
         let OlbvhTree { mesh, tree, .. } = handle(tree, "tree")?;
         let points = array(points.cast::<[f32; 3]>(), count, "points")?;
         let mut owners = array_mut(owners, count, "owners")?.iter_mut();
-        let method = LocateMethod::suited(count, mesh.device.input().tets as usize, false);
-        let options = LocateOptions { tolerance: self::tolerance(tolerance), method };
+        let options = LocateOptions { tolerance: self::tolerance(tolerance), ..LocateOptions::default() };
         let found = locate(tree, points, None, &options, SILENT)?;
         put(&mut owners, found.owners.into_iter().map(|owner| mesh.cell(owner)));
         if !barycentrics.is_null() {

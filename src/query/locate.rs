@@ -19,8 +19,11 @@ pub const MOST_TRAVERSED: u32 = 32_000;
 /// How the owner of a point is searched for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum LocateMethod {
-    /// Finds the point's leaf by descent over child masks.
+    /// As suits the points, with the same owners: [`locate`] takes what [`LocateMethod::suited`] names, and [`cmd_locate`]
+    /// [`LocateMethod::Sorted`] if it is given an order, otherwise [`LocateMethod::Descent`].
     #[default]
+    Suited,
+    /// Finds the point's leaf by descent over child masks.
     Descent,
     /// Takes points in runs of [`POINT_RUN`]. Each point is first searched for around the owner of the one before it,
     /// up to a few tetrahedra away, and found by descent if it is not there. Suits points that are each near the one
@@ -63,7 +66,7 @@ impl LocateMethod {
         }
     }
 
-    /// Whether points are taken in the order [`PointInput::order`].
+    /// Whether points are taken in the order [`PointInput::order`], which must then be given.
     pub fn is_sorted(self) -> bool {
         matches!(self, Self::Sorted | Self::SortedRuns)
     }
@@ -80,7 +83,7 @@ pub struct LocateOptions {
 
 impl Default for LocateOptions {
     fn default() -> Self {
-        Self { tolerance: TOLERANCE, method: LocateMethod::Descent }
+        Self { tolerance: TOLERANCE, method: LocateMethod::Suited }
     }
 }
 
@@ -93,9 +96,10 @@ pub struct PointInput {
     pub stride: u32,
     /// Number of points.
     pub count: u32,
-    /// For [`LocateMethod::Descent`]: one tetrahedron per point from which its search starts, such as its last owner,
-    /// or `u32::MAX` for none; points that have moved little are found in about half the time. Only valid tetrahedra of this mesh are allowed. It may be the same part as
-    /// [`LocateOutput::owners`]: a point's hint is read before its owner is written, and no other point reads it.
+    /// For points that are taken in their own order, each by itself: one tetrahedron per point from which its search
+    /// starts, such as its last owner, or `u32::MAX` for none; points that have moved little are found in about half the
+    /// time. Only valid tetrahedra of this mesh are allowed. It may be the same part as [`LocateOutput::owners`]: a point's
+    /// hint is read before its owner is written, and no other point reads it.
     pub hints: Option<BufferRef>,
     /// For methods that sort ([`LocateMethod::is_sorted`]): one word per place, the point that is located there; every
     /// point occurs once. Answers are stored by point, not by place.
@@ -157,11 +161,12 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
     let groups = |run: u32| Groups::Count(count.div_ceil(run).div_ceil(workgroup));
     let (run, guide, guides) = match options.method {
-        LocateMethod::Descent | LocateMethod::Traversal(_) => (1, Guide::Hints, hints),
-        LocateMethod::Runs => (POINT_RUN, Guide::Nothing, None),
         method if method.is_sorted() && order.is_none() => {
             return Err(Error::Invalid("points to be located in an order that is not given".into()));
         }
+        LocateMethod::Suited if order.is_some() => (1, Guide::Order, order),
+        LocateMethod::Suited | LocateMethod::Descent | LocateMethod::Traversal(_) => (1, Guide::Hints, hints),
+        LocateMethod::Runs => (POINT_RUN, Guide::Nothing, None),
         LocateMethod::Sorted => (1, Guide::Order, order),
         LocateMethod::SortedRuns => (POINT_RUN, Guide::Order, order),
     };
@@ -306,7 +311,11 @@ pub fn locate(
     let owners = gpu.buffer("olbvh.query.owners", 4 * most)?;
     let barycentrics = gpu.buffer("olbvh.query.barycentrics", 16 * most)?;
     let values = field.as_ref().map(|_| gpu.buffer("olbvh.query.values", 4 * most)).transpose()?;
-    let sorted = options.method.is_sorted();
+    let method = match options.method {
+        LocateMethod::Suited => LocateMethod::suited(points.len(), scene.mesh.input.tets as usize, false),
+        method => method,
+    };
+    let (sorted, options) = (method.is_sorted(), &LocateOptions { method, ..*options });
     let carve = |a: &mut Arena| if sorted { PointOrder::carve(gpu, a, most as u32).map(Some) } else { Ok(None) };
     let (_memory, order) = Arena::reserve(gpu, "olbvh.query.order", carve)?;
     for chunk in points.chunks(at_once) {

@@ -102,7 +102,8 @@ impl Plan {
         Self::with_view(settings, &view, bounds, origin, field_range)
     }
 
-    /// As [`Plan::new`], but with the view of a renderer instead of the camera of the settings.
+    /// As [`Plan::new`], but with the view of a renderer instead of the camera of the settings. Opacities are those of the
+    /// settings; [`RenderSettings::for_field`] chooses some that suit a field.
     ///
     /// `bounds` contain the mesh in every frame that is drawn with this plan: nothing is drawn that is nearer than their
     /// nearest corner. The usual step and the unit of opacity are parts of their diagonal. So give a mesh that moves one box
@@ -303,7 +304,7 @@ pub fn interval_slack(grid: &Grid) -> [f32; 3] {
     [0, 1, 2].map(|c| canonical(largest * two_to(-18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * two_to(-21)))
 }
 
-/// A plan, its camera, and the normals that its light needs.
+/// A plan with the camera of the settings, and the normals that its light needs.
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// The plan.
@@ -322,9 +323,26 @@ impl Prepared {
     /// # Errors
     /// As [`Plan::new`].
     pub fn new(settings: &RenderSettings, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Result<Self> {
+        let settings = settings.for_field(mesh, valid, field)?;
+        let points = if settings.frames_bounds { valid.bounds.corners().to_vec() } else { used_points(mesh, valid) };
+        let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
+        let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
+        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
+        let range = settings.range.unwrap_or([0.0, 1.0]);
+        Ok(Self { plan, camera, normals: settings.normals(mesh, valid, field), range })
+    }
+}
+
+impl RenderSettings {
+    /// These settings with what they leave open chosen for a field: the range of values and, for a volume, opacities. Done
+    /// once per field; a renderer then makes a [`Plan`] of them in every frame.
+    ///
+    /// # Errors
+    /// [`Error::Invalid`] if a setting is out of its limits, or for iso-surfaces of a field of cells.
+    pub fn for_field(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Result<Self> {
         let own = || used_range(mesh, valid, field);
-        let range = settings.range.or(settings.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
-        let mut settings = RenderSettings { range: Some(range), ..settings.clone() };
+        let range = self.range.or(self.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
+        let mut settings = Self { range: Some(range), ..self.clone() };
         settings.check()?;
         if !settings.iso.is_empty() && field.on == On::Cells {
             return Err(Error::Invalid(format!(
@@ -336,16 +354,17 @@ impl Prepared {
         if settings.iso.is_empty() && !settings.transfer.has_opacity() {
             settings.transfer = settings.transfer.with_opacity(auto_opacity(mesh, valid, field, range))?;
         }
-        let points = if settings.frames_bounds { valid.bounds.corners().to_vec() } else { used_points(mesh, valid) };
-        let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
-        let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
-        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
-        let normals = match (settings.shading, settings.iso.is_empty()) {
+        Ok(settings)
+    }
+
+    /// A normal per point of the mesh for the light of these settings, which come from [`RenderSettings::for_field`]; empty
+    /// without light.
+    pub fn normals(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Vec<[f32; 3]> {
+        match (self.shading, self.iso.is_empty()) {
             (false, _) => Vec::new(),
-            (true, true) => shading_normals(mesh, valid, field, range),
+            (true, true) => shading_normals(mesh, valid, field, self.range.unwrap_or([0.0, 1.0])),
             (true, false) => gradient_normals(mesh, valid, field),
-        };
-        Ok(Self { plan, camera, normals, range })
+        }
     }
 }
 

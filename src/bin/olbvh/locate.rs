@@ -128,7 +128,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
-    let method = LocateMethod::suited(local.len(), mesh.tets.len(), args.coherent);
+    let method = if args.coherent { LocateMethod::Descent } else { LocateMethod::Suited };
     let asked = Points { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);

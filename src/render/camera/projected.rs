@@ -10,7 +10,7 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 ///
 /// ```
 /// use olbvh::glam::{DVec3, dcamera::rh::{proj::vulkan::perspective_infinite_reverse, view::look_at_mat4}};
-/// use olbvh::render::{Bounds, Plan, ProjectedView, RenderSettings};
+/// use olbvh::{mesh::Bounds, render::{Plan, ProjectedView, RenderSettings}};
 ///
 /// let eye = look_at_mat4(DVec3::new(-3.0, -4.0, 5.0), DVec3::ZERO, DVec3::Z);
 /// let view = ProjectedView { to_clip: perspective_infinite_reverse(0.8, 16.0 / 9.0, 0.1) * eye, reversed: true };

@@ -168,7 +168,9 @@ impl<'a> CpuTree<'a> {
             let found = match options.method {
                 LocateMethod::Runs => locator.locate_in_runs(chunk, &(0..chunk.len() as u32).collect::<Vec<_>>()),
                 LocateMethod::SortedRuns => locator.locate_in_runs(chunk, &locate::order_of(&self.tree.grid, chunk, POINT_CODE_BITS)),
-                LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => locator.locate_each(chunk),
+                LocateMethod::Suited | LocateMethod::Descent | LocateMethod::Sorted | LocateMethod::Traversal(_) => {
+                    locator.locate_each(chunk)
+                }
             };
             all.owners.extend(found.iter().map(|l| l.owner));
             all.barycentrics.extend(found.iter().map(|l| l.barycentric));
