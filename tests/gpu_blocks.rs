@@ -1,9 +1,9 @@
-//! Meshes that do not fit into the memory allowed are processed in blocks: the answers are those of the whole mesh, and
+//! OverlapRequest that do not fit into the memory allowed are processed in blocks: the answers are those of the whole mesh, and
 //! the limit of memory is kept.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
 use olbvh::Error;
-use olbvh::blocks::{Meshes, Points, Stack, View, locate, locate_all, nearest, overlap, render, slice};
+use olbvh::blocks::{LocateRequest, OverlapRequest, RenderRequest, SliceRequest, locate, locate_all, nearest, overlap, render, slice};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
@@ -38,7 +38,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     let how = LocateOptions { tolerance, method };
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, options).unwrap();
-    let asked = Points { mesh, options: *options, points: &points, how };
+    let asked = LocateRequest { mesh, options: *options, points: &points, how };
     let mut most = 0;
     for field in mesh.fields.iter().filter(|f| f.on == on) {
         let field = (&field.values[..], field.on);
@@ -112,7 +112,7 @@ fn located(gpu: &Gpu, mesh: &Mesh) {
 fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
-    let asked = Points { mesh, options, points: &points, how: LocateOptions::default() };
+    let asked = LocateRequest { mesh, options, points: &points, how: LocateOptions::default() };
     let found = locate(gpu, 64 << 20, &asked, None, SILENT).unwrap();
     assert_eq!((found.trees, found.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
     let refused = locate(gpu, 1 << 14, &asked, None, SILENT).unwrap_err();
@@ -120,7 +120,7 @@ fn refused(gpu: &Gpu, mesh: &Mesh) {
     // Blocks as small as these are not cut, so they are asked for few points at a time.
     let small = kuhn_jittered([3; 3], 0.1, 1).unwrap();
     let points: Vec<[f32; 3]> = (0..20_000).map(|i| [i as f32 * 1.5e-4, 1.5, 1.5]).collect();
-    let asked = Points { mesh: &small, options, points: &points, how: LocateOptions::default() };
+    let asked = LocateRequest { mesh: &small, options, points: &points, how: LocateOptions::default() };
     let found = locate(gpu, 200 << 10, &asked, None, SILENT).unwrap();
     assert!(found.trees == 1 && !found.answer.owners.contains(&u32::MAX), "{} trees", found.trees);
 }
@@ -133,13 +133,15 @@ fn remedied(gpu: &Gpu) {
     let settings = RenderSettings { size: [300, 20], ..RenderSettings::default() };
     let voxels = &SliceSettings { size: [500, 0], ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
     let queries: [&dyn Fn(u64) -> olbvh::Result<u32>; 4] = [
-        &|memory| Ok(locate(gpu, memory, &Points { mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)?.trees),
-        &|memory| Ok(render(gpu, memory, &View { mesh, options, field, settings: &settings }, SILENT)?.trees),
         &|memory| {
-            let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
+            Ok(locate(gpu, memory, &LocateRequest { mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)?.trees)
+        },
+        &|memory| Ok(render(gpu, memory, &RenderRequest { mesh, options, field, settings: &settings }, SILENT)?.trees),
+        &|memory| {
+            let asked = SliceRequest { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
             Ok(slice(gpu, memory, &asked, SILENT, &mut |_| Ok(()))?.trees)
         },
-        &|memory| Ok(overlap(gpu, memory, &Meshes { meshes: [mesh, mesh], options, pairs: false }, SILENT)?.trees),
+        &|memory| Ok(overlap(gpu, memory, &OverlapRequest { meshes: [mesh, mesh], options, pairs: false }, SILENT)?.trees),
     ];
     for (i, query) in queries.into_iter().enumerate() {
         for memory in [20_000, 100_000, 300_000] {
@@ -160,7 +162,7 @@ fn flat(gpu: &Gpu) {
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
     let ask = |fineness| {
         let options = BuildOptions { fineness, ..BuildOptions::default() };
-        locate(gpu, 768 << 10, &Points { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)
+        locate(gpu, 768 << 10, &LocateRequest { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)
     };
     assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
     let found = ask(Fineness::Points).unwrap();
@@ -182,7 +184,7 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let searched = u64::from(whole.effort[0].searched) + u64::from(whole.effort[1].searched);
         rises(&told, if pairs { 2 * a.tets.len() as u64 } else { searched });
         let memory = 3 << 19;
-        let found = overlap(gpu, memory, &Meshes { meshes: [a, &b], options, pairs }, &report).unwrap();
+        let found = overlap(gpu, memory, &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
         rises(&told, 1_000_000);
         println!("overlap: {} trees, peak {}, {} and {}", found.trees, found.peak, whole.a.len(), whole.b.len());
         assert!(whole.a.len() > 1000 && found.trees > 4 && found.peak <= memory);
@@ -190,7 +192,7 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         assert_eq!(found.answer.overlap.b, whole.b);
         assert_eq!(found.answer.overlap.pairs, whole.pairs);
         let bad = devices.each_ref().map(|device| device.status().bad);
-        let uncut = overlap(gpu, 64 << 20, &Meshes { meshes: [a, &b], options, pairs }, SILENT).unwrap();
+        let uncut = overlap(gpu, 64 << 20, &OverlapRequest { meshes: [a, &b], options, pairs }, SILENT).unwrap();
         assert!(bad[0] > 0 && bad[1] == 1 && found.bad_cells == bad && (uncut.trees, uncut.bad_cells) == (2, bad), "{bad:?}");
     }
 }
@@ -210,7 +212,7 @@ fn apart(gpu: &Gpu, a: &Mesh) {
         let told = RefCell::new(Vec::new());
         let report = |done, all| told.borrow_mut().push((done, all));
         // Too little memory for the whole meshes to be tried.
-        let found = overlap(gpu, 1 << 19, &Meshes { meshes: [a, &b], options, pairs }, &report).unwrap();
+        let found = overlap(gpu, 1 << 19, &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
         rises(&told, 1_000_000);
         assert_eq!((found.trees, found.answer.overlap.pairs), (0, wanted));
         assert!(found.answer.overlap.a.is_empty() && found.answer.overlap.b.is_empty());
@@ -247,7 +249,7 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
         };
         query::slice(&tree, values, voxels, extrapolate, SILENT, &mut sink).unwrap();
         let memory = 640 << 10;
-        let asked = Stack { mesh, options, field: Some(field), voxels, extrapolate };
+        let asked = SliceRequest { mesh, options, field: Some(field), voxels, extrapolate };
         let mut sink = |band: Band| {
             gather(&mut all[1], band);
             Ok(())
@@ -270,7 +272,7 @@ fn far(gpu: &Gpu, mesh: &Mesh) {
         let stack = SliceSettings { at: Some(at), layers: 11, spacing: Some(999_999.562_5), ..SliceSettings::default() };
         let voxels =
             &SliceSettings { size: [32, 32], thickness: Some(0.001), ..stack }.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
-        let asked = Stack { mesh, options, field: None, voxels, extrapolate: Extrapolate::Nearest };
+        let asked = SliceRequest { mesh, options, field: None, voxels, extrapolate: Extrapolate::Nearest };
         let of = |memory: u64| {
             let mut owners = Vec::new();
             let mut sink = |band: Band| {
@@ -294,7 +296,7 @@ fn passed_over(gpu: &Gpu) {
     let ask = |at| {
         let settings = SliceSettings { at: Some(at), thickness: Some(0.5), size: [20, 20], ..SliceSettings::default() };
         let voxels = &settings.voxels([0.0; 3], [14.0, 13.0, 12.0], mesh.origin).unwrap();
-        let asked = Stack { mesh: &mesh, options: BuildOptions::default(), field: None, voxels, extrapolate: Extrapolate::Nearest };
+        let asked = SliceRequest { mesh: &mesh, options: BuildOptions::default(), field: None, voxels, extrapolate: Extrapolate::Nearest };
         slice(gpu, 1 << 20, &asked, SILENT, &mut |_| Ok(()))
     };
     let below = ask(2.0).unwrap();
@@ -327,7 +329,7 @@ fn drawn(gpu: &Gpu, mesh: &Mesh) {
             ..RenderSettings::default()
         };
         let options = BuildOptions::default();
-        let asked = View { mesh, options, field: wave, settings: &settings };
+        let asked = RenderRequest { mesh, options, field: wave, settings: &settings };
         let (whole, took) = render(gpu, 64 << 20, &asked, SILENT).unwrap().into_parts();
         let bad = took.bad_cells;
         assert!(took.trees == 1 && bad[0] > 0);
@@ -350,7 +352,7 @@ fn hidden(gpu: &Gpu, mesh: &Mesh) {
         let transfer = TransferFunction::default().with_opacity(opacity).unwrap();
         let clips = clips.iter().map(|clip| clip.parse().unwrap()).collect();
         let settings = RenderSettings { size: [41, 33], transfer, clips, ..RenderSettings::default() };
-        let asked = View { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
+        let asked = RenderRequest { mesh, options: BuildOptions::default(), field: &field, settings: &settings };
         let (picture, took) = render(gpu, memory, &asked, SILENT).unwrap().into_parts();
         (picture.rendered.colors.iter().map(|c| bits(c)).collect::<Vec<_>>(), took.trees)
     };
@@ -375,7 +377,7 @@ fn large_pictures_are_drawn_in_strips() {
     let settings = RenderSettings { size: [4096, 270], step: Some(0.2), shading: false, ..RenderSettings::default() };
     let (topology, options) = (topology(&mesh).unwrap(), BuildOptions::default());
     let host = build(&mesh, &topology, &options).unwrap();
-    let scene = volume::Scene::new(&mesh, &topology, &host, &field, &settings).unwrap();
+    let scene = volume::Drawing::new(&mesh, &topology, &host, &field, &settings).unwrap();
     let expected = volume::render(&scene, SILENT);
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &options).unwrap();

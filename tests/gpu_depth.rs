@@ -10,10 +10,10 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Arena, Gpu, GpuOptions};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene as OnDevice, cmd_render};
+use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene, cmd_render};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
-use olbvh::reference::volume::{Scene, render};
+use olbvh::reference::volume::{Drawing, render};
 use olbvh::render::{Plan, ProjectedView, RenderSettings, ValidTets};
 use submit::submit;
 
@@ -61,7 +61,7 @@ fn what_lies_behind_is_not_drawn() {
     let arrays = build(&mesh, &topology, &BuildOptions::default()).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let on_device = OnDevice::of(&tree);
+    let on_device = Scene::of(&tree);
     let is_valid = |tet| topology.is_valid(tet);
     let valid = ValidTets { bounds: (&arrays.grid).into(), neighbours: &topology.neighbours, is_valid: &is_valid };
     let values = gpu.upload("olbvh.test.field", &field.values).unwrap();
@@ -72,7 +72,7 @@ fn what_lies_behind_is_not_drawn() {
         for iso in [vec![], vec![lo + 0.2 * (hi - lo), lo + 0.5 * (hi - lo)]] {
             let settings = RenderSettings { size: SIZE, iso, opacity_scale: 0.1, ..RenderSettings::default() };
             let plan = Plan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
-            let scene = || Scene::new(&mesh, &topology, &arrays, field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
+            let scene = || Drawing::new(&mesh, &topology, &arrays, field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
             let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
             let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
             let normals = gpu.upload("olbvh.test.normals", &settings.normals(&mesh, &valid, field)).unwrap();

@@ -3,7 +3,7 @@
 
 use olbvh::build::{BadCells, DeviceMesh};
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::kernels::Row;
+use olbvh::kernels::DeviceClass;
 use olbvh::mesh::{Mesh, kuhn};
 use olbvh::reference::boundary::topology;
 use std::collections::{BTreeMap, BTreeSet};
@@ -63,7 +63,7 @@ fn copies() -> Mesh {
 #[test]
 fn faces_find_each_other_however_many_cells_they_have() {
     let gpu = Gpu::new(&GpuOptions::default()).unwrap();
-    for row in [Row::Cpu, Row::Portable] {
+    for row in [DeviceClass::Cpu, DeviceClass::Portable] {
         let gpu = gpu.with_target(row.target(&gpu.report().room)).unwrap();
         for (name, mesh) in [("stars", stars(3000)), ("copies", copies())] {
             let expected = topology(&mesh).unwrap();

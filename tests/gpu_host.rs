@@ -15,7 +15,9 @@ use host::queries::Queries;
 use host::{Frame, Host};
 use not_run::not_run;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
-use olbvh::gpu::{Binding, DescriptorPools, DescriptorRoom, Enabled, Gpu, GpuOptions, HostDevice, HostQueue, Recorder, Requirements};
+use olbvh::gpu::{
+    Binding, DescriptorPools, DescriptorRoom, EnabledFeatures, Gpu, GpuOptions, HostDevice, HostQueue, Recorder, Requirements,
+};
 use olbvh::kernels::Target;
 use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
@@ -95,7 +97,7 @@ fn without_a_queue_only_recording_works() {
 #[test]
 fn what_is_not_enabled_is_not_used() {
     let host = Host::new();
-    let lent = HostDevice { enabled: Enabled { buffer_addresses: false, ..host.enabled() }, ..host.lend() };
+    let lent = HostDevice { enabled: EnabledFeatures { buffer_addresses: false, ..host.enabled() }, ..host.lend() };
     // SAFETY: as above.
     let gpu = unsafe { Gpu::from_raw(lent, &GpuOptions::default()) }.unwrap();
     assert_eq!(gpu.binding(), Binding::Descriptors);
@@ -174,7 +176,7 @@ fn subgroup_size_control_is_found_and_missed() {
     let varying = ash::Instance::from_parts_1_3(functions.handle(), functions.fp_v1_0().clone(), one, functions.fp_v1_3().clone());
     let warned = || LOG.0.lock().unwrap().iter().filter(|text| text.contains("no size control enabled")).count();
     for (instance, warnings) in [(functions, 0), (&varying, 1)] {
-        let enabled = Enabled { subgroup_size_control: false, ..host.enabled() };
+        let enabled = EnabledFeatures { subgroup_size_control: false, ..host.enabled() };
         // SAFETY: as above; features that are not enabled are not used.
         drop(unsafe { Gpu::from_raw(HostDevice { instance: instance.clone(), enabled, ..host.lend() }, &GpuOptions::default()) }.unwrap());
         assert_eq!(warned(), if listed.subgroup_size_control { warnings } else { 0 });

@@ -134,7 +134,7 @@ impl Subject {
         let (tree, host) = self.tree(gpu, options);
         let field = Field { name: "x".into(), on: On::Points, values: self.mesh.points.iter().map(|p| p[0] + 0.5 * p[1]).collect() };
         let settings = RenderSettings { size: [60, 45], ..RenderSettings::default() };
-        let scene = volume::Scene::new(&self.mesh, &self.topology, &host, &field, &settings).unwrap();
+        let scene = volume::Drawing::new(&self.mesh, &self.topology, &host, &field, &settings).unwrap();
         let drawn = render(&tree, scene.plan(), (&field.values, field.on), None, SILENT).unwrap();
         (drawn.colors.into_iter().map(|c| c.map(f32::to_bits)).collect(), drawn.stats.found_samples)
     }

@@ -7,8 +7,8 @@ mod submit;
 use olbvh::build::{BadCells, DeviceMesh, Tree, cmd_ranges, range_bytes};
 use olbvh::error::{Error, Result};
 use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions, Recorder};
-use olbvh::kernels::Row;
-use olbvh::layout::RenderView;
+use olbvh::kernels::DeviceClass;
+use olbvh::layout::ViewUniforms;
 use olbvh::mesh::{On, kuhn};
 use olbvh::options::BuildOptions;
 use olbvh::primitives::{Count, SortScratch, cmd_sort_pairs};
@@ -150,7 +150,7 @@ fn pictures_and_slices() {
     let memory = RenderMemory::carve(&mut Arena::new(lab.memory.all()), [16; 2], None).unwrap();
     let field = (lab.part(4 * points), On::Points);
     let short = (less(field.0), On::Points);
-    let (view, table) = (lab.part(size_of::<RenderView>() as u64), lab.part(16 * TABLE_SIZE as u64));
+    let (view, table) = (lab.part(size_of::<ViewUniforms>() as u64), lab.part(16 * TABLE_SIZE as u64));
     let (normals, depth) = (Some(lab.part(12 * points)), Some(lab.part(4 * 16 * 16)));
     let input = RenderInput { size: [16; 2], view, iso: false, table, field, normals, depth, visibility: None, row: 0 };
     let draw = |input: RenderInput| lab.rehearse(|r| cmd_render(r, &scene, &input, &memory, Rounds::begin(1)));
@@ -191,7 +191,7 @@ fn searches_begin_with_a_round() {
 /// Keys have 32 bits, so that a sort by more of them sorts by all, in the place that it says.
 #[test]
 fn a_sort_takes_no_more_bits_than_there_are() {
-    for row in [Row::Portable, Row::Cpu] {
+    for row in [DeviceClass::Portable, DeviceClass::Cpu] {
         let gpu = Gpu::new(&GpuOptions::default()).unwrap();
         let gpu = gpu.with_target(row.target(&gpu.report().room)).unwrap();
         let n = 5000;

@@ -12,7 +12,7 @@ use host::queries::Queries;
 use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Arena, Binding, BufferRef, Gpu, GpuOptions};
-use olbvh::layout::{Grid, OverlapStatus, RenderPlan, RenderStatus, RenderView, SliceStatus};
+use olbvh::layout::{DrawUniforms, Grid, OverlapStatus, RenderStatus, SliceStatus, ViewUniforms};
 use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{
@@ -88,11 +88,11 @@ fn compare_picture(gpu: &Gpu, queries: &Queries, values: &[f32], tree: &Tree, gr
     let status: RenderStatus = read(gpu, queries, picture.status, 1)[0];
     let low = [status.samples, status.found, status.skipped].map(|[low, high]| u64::from(low) | u64::from(high) << 32);
     assert_eq!((low, status.unfinished), ([owned.stats.samples, owned.stats.found_samples, owned.stats.skipped_samples], 0));
-    let at = size_of::<RenderView>() as u64;
-    let made: RenderPlan = read(gpu, queries, picture.frame.part(at, size_of::<RenderPlan>() as u64), 1)[0];
+    let at = size_of::<ViewUniforms>() as u64;
+    let made: DrawUniforms = read(gpu, queries, picture.frame.part(at, size_of::<DrawUniforms>() as u64), 1)[0];
     let [x, y, z] = interval_slack(grid);
     assert_eq!((made.slack, made.size), ([x, y, z, 0.0], plan.size));
-    assert_eq!(read::<RenderView>(gpu, queries, picture.frame, 1)[0], plan.view());
+    assert_eq!(read::<ViewUniforms>(gpu, queries, picture.frame, 1)[0], plan.view());
     [low[1], low[2]]
 }
 

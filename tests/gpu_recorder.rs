@@ -18,7 +18,7 @@ use olbvh::build::{
     cmd_ranges, range_bytes,
 };
 use olbvh::gpu::{Arena, Binding, Buffer, BufferRef, Gpu, GpuOptions, Recorder};
-use olbvh::kernels::{Row, SortTarget, Target};
+use olbvh::kernels::{DeviceClass, SortTarget, Target};
 use olbvh::mesh::{On, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions};
 use olbvh::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
@@ -61,7 +61,7 @@ fn every_barrier_counts(gpu: &Gpu, what: &str, work: impl Fn(&mut Recorder<'_>) 
 }
 
 fn targets(gpu: &Gpu) -> Vec<Gpu> {
-    let [serial, ballot] = [Row::Cpu, Row::Portable].map(|row| row.target(&gpu.report().room));
+    let [serial, ballot] = [DeviceClass::Cpu, DeviceClass::Portable].map(|row| row.target(&gpu.report().room));
     let few_bits = Target { sort: SortTarget { digit_bits: 4, ..serial.sort }, ..serial.clone() };
     [serial, ballot, few_bits].map(|target| gpu.with_target(target).unwrap()).to_vec()
 }

@@ -6,7 +6,7 @@ use olbvh::baseline::Lbvh;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Error;
 use olbvh::gpu::{Gpu, GpuOptions};
-use olbvh::kernels::{Row, Target};
+use olbvh::kernels::{DeviceClass, Target};
 use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{self, LocateMethod, LocateOptions, SILENT};
@@ -72,7 +72,7 @@ fn every_row_gives_the_same_bytes() {
     let mesh = kuhn_jittered([9, 8, 7], 0.3, 5).unwrap();
     let expected = ask(&gpu, &mesh);
     assert!(expected.owners[0].iter().any(|&o| o != u32::MAX) && !expected.overlap[0].is_empty());
-    for row in Row::EVERY {
+    for row in DeviceClass::EVERY {
         let shaped = gpu.with_target(row.target(&gpu.report().room)).unwrap();
         assert_eq!(shaped.target().name, row.name());
         assert!(ask(&shaped, &mesh) == expected, "{}", row.name());

@@ -9,7 +9,7 @@ use olbvh::options::{Assign, BuildOptions};
 use olbvh::query::SILENT;
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::build::build;
-use olbvh::reference::volume::{Picture, Scene, brute_force, render};
+use olbvh::reference::volume::{Drawing, Picture, brute_force, render};
 use olbvh::render::{Background, Clip, ClipPlace, RenderSettings, RenderStats, TransferFunction};
 
 /// A jittered grid with the analytic field, moved away from the origin.
@@ -32,7 +32,7 @@ struct Drawn {
 }
 
 impl Drawn {
-    fn of(scene: &Scene<'_>) -> Self {
+    fn of(scene: &Drawing<'_>) -> Self {
         let Picture { colors, stats } = render(scene, SILENT);
         Self { pixels: scene.plan().pixels(&colors, 1), stats }
     }
@@ -40,7 +40,7 @@ impl Drawn {
 
 fn draw(mesh: &Mesh, topology: &Topology, options: &BuildOptions, settings: &RenderSettings) -> Drawn {
     let tree = build(mesh, topology, options).unwrap();
-    Drawn::of(&Scene::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap())
+    Drawn::of(&Drawing::new(mesh, topology, &tree, &mesh.fields[0], settings).unwrap())
 }
 
 /// The largest difference between two pictures.
@@ -59,7 +59,7 @@ fn parts_share_the_samples() {
     for camera in ["iso", "azimuth=200,elevation=-35,ortho", "eye=-0.5,14,4,target=0,15,4,fov=100"] {
         let settings = RenderSettings { size: [24, 20], termination: 1.0, ..settings(camera) };
         let samples = |part| {
-            let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+            let scene = Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
             render(&scene.within(part), SILENT).stats.found_samples
         };
         let all = samples(CellRange::WHOLE);
@@ -102,7 +102,7 @@ fn the_picture_does_not_depend_on_the_tree() {
 fn assert_as_brute_force(what: &str, mesh: &Mesh, settings: &RenderSettings) {
     let topology = topology(mesh).unwrap();
     let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
-    let scene = Scene::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
+    let scene = Drawing::new(mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
     let expected = brute_force(&scene, settings, &Bounds::from(&tree.grid));
     let picture = Drawn::of(&scene);
     let off = picture.pixels.chunks(4).zip(expected.chunks(4)).filter(|(a, b)| distance(a, b) > 2).count();
@@ -136,7 +136,7 @@ fn a_depth_ends_rays_as_a_clip_does() {
     for camera in ["eye=-9,30,21,target=-1,13,3,fov=30", "eye=-9,30,21,target=-1,13,3,ortho"] {
         for iso in [vec![], vec![0.2, 0.7]] {
             let settings = RenderSettings { iso, ..settings(camera) };
-            let scene = |settings: &RenderSettings| Scene::new(&mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
+            let scene = |settings: &RenderSettings| Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], settings).unwrap();
             let whole = scene(&settings);
             let depth = 25.0;
             let cut = Clip { direction: Some(forward), place: ClipPlace::At(forward.dot(eye) + depth) };
@@ -181,7 +181,7 @@ fn skipped_samples_have_nothing_to_add() {
             }
             let settings = RenderSettings { range: (on == On::Cells).then_some([0.0, 7.7]), ..peak(camera) };
             let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
-            let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+            let scene = Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
             let picture = Drawn::of(&scene);
             let every = Drawn::of(&scene.without_skipping());
             assert_eq!(picture.pixels, every.pixels, "{camera} {on:?}");
@@ -233,7 +233,7 @@ fn surfaces_of_a_linear_field_are_planes() {
             ..settings("iso,ortho")
         };
         let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
-        let scene = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
+        let scene = Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
         let picture = Drawn::of(&scene);
         assert!(picture.stats.skipped_samples > 1000, "{}", picture.stats.skipped_samples);
         for options in [
@@ -278,7 +278,7 @@ fn surfaces_of_a_linear_field_are_planes() {
     mesh.fields[0] = Field { name: "id".into(), on: On::Cells, values: vec![0.5; mesh.tets.len()] };
     let tree = build(&mesh, &topology, &BuildOptions::default()).unwrap();
     let settings = RenderSettings { iso: vec![0.5], ..RenderSettings::default() };
-    let error = Scene::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).err().unwrap().to_string();
+    let error = Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).err().unwrap().to_string();
     assert!(error.contains("a field of cells"), "{error}");
 }
 

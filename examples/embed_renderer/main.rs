@@ -20,7 +20,7 @@ use glam::Vec3;
 use glam::camera::rh::proj::vulkan;
 use glam::camera::rh::view::look_at_mat4;
 use host::Host;
-use olbvh::gpu::{Enabled, Gpu, GpuOptions, HostDevice, Recorder};
+use olbvh::gpu::{EnabledFeatures, Gpu, GpuOptions, HostDevice, Recorder};
 use pictures::{Drawing, Pictures, Push};
 use std::io::BufWriter;
 use std::time::Instant;
@@ -44,12 +44,12 @@ fn main() -> Result<()> {
         queue: None,
         allocator: Some(host.allocator().clone()),
         pipeline_cache: None,
-        enabled: Enabled {
+        enabled: EnabledFeatures {
             buffer_addresses: host.addresses,
             shader_int64: host.int64,
             subgroup_size_control: host.size_control,
             debug_utils: host.debug.is_some(),
-            ..Enabled::default()
+            ..EnabledFeatures::default()
         },
     };
     // SAFETY: the handles belong together, and `gpu` is dropped before `host`, while the device is idle.

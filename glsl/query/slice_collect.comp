@@ -13,7 +13,7 @@ ARGUMENTS(5)
 END_ARGUMENTS
 BUFFER(0, readonly, uint, answers)
 BUFFER(1, READ_WRITE, SliceStatus, status)
-BUFFER16(2, READ_WRITE, SlicePlan, plans)
+BUFFER16(2, READ_WRITE, SliceUniforms, plans)
 BUFFER(3, READ_WRITE, RunState, runs)
 BUFFER(4, writeonly, TouchState, states)
 

@@ -23,7 +23,7 @@ BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 RECORDS(3, uvec4, neighbours)
-BUFFER16(4, readonly, SlicePlan, plans)
+BUFFER16(4, readonly, SliceUniforms, plans)
 BUFFER(5, READ_WRITE, RunState, states)
 BUFFER(6, writeonly, uint, answers) // owner, or SLICE_PENDING
 BUFFER(7, READ_WRITE, SliceStatus, status) // zeroed
@@ -34,7 +34,7 @@ STRUCTURE(10)
 #include "shared/held.glsl"
 #include "shared/part.glsl"
 
-SlicePlan plan;
+SliceUniforms plan;
 RunState state;
 uint column, line; // of the run: its place in a row, and its first voxel
 uvec2 row;         // of the next voxel: its row in the layer, and the layer

@@ -21,7 +21,7 @@ ARGUMENTS(2)
     uint last_cell;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, writeonly, SlicePlan, plans)
+BUFFER16(1, writeonly, SliceUniforms, plans)
 
 vec4 wide(float a[3]) { return vec4(a[0], a[1], a[2], 0.0); }
 
@@ -60,7 +60,7 @@ vec4 grown(vec4 axis, float gap) {
 void main() {
     if (item_index() > 0u) return;
     Grid g = grid.at[0];
-    SlicePlan plan;
+    SliceUniforms plan;
     plan.origin = wide(origin);
     plan.next_voxel = wide(next_voxel);
     plan.next_row = wide(next_row);

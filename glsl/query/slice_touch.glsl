@@ -21,7 +21,7 @@ END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
-BUFFER16(3, readonly, SlicePlan, plans)
+BUFFER16(3, readonly, SliceUniforms, plans)
 BUFFER(4, READ_WRITE, TouchState, states)
 BUFFER(5, READ_WRITE, uint, answers)
 BUFFER(6, READ_WRITE, SliceStatus, status)
@@ -147,7 +147,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
 void main() {
     uint i = item_index();
     uint unfinished = 0u;
-    SlicePlan plan = plans.at[0];
+    SliceUniforms plan = plans.at[0];
     if (i < plan.listed) {
         state = states.at[i];
         uint voxel = state.voxel;

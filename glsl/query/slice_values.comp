@@ -17,7 +17,7 @@ BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)
 RECORDS(2, vec4, vertices)
 BUFFER(3, readonly, float, field)
-BUFFER16(4, readonly, SlicePlan, plans)
+BUFFER16(4, readonly, SliceUniforms, plans)
 BUFFER(5, readonly, TouchState, states)
 BUFFER(6, readonly, uint, answers)
 BUFFER(7, writeonly, float, values)
@@ -40,7 +40,7 @@ float touched_value(uint owner, vec3 x) {
 
 void main() {
     uint i = item_index(), touched = 0u;
-    SlicePlan plan = plans.at[0];
+    SliceUniforms plan = plans.at[0];
     // Voxels are counted only once all answers are known.
     if (i < min(plan.listed, voxels) && (status.at[0].locating | status.at[0].touching) == 0u) {
         uint voxel = states.at[i].voxel, answer = answers.at[voxel];

@@ -28,8 +28,8 @@ BUFFER(6, readonly, float, depths) // row by row, as the colours
 STRUCTURE(7)
 
 Grid g;
-RenderView view;
-RenderPlan plan;
+ViewUniforms view;
+DrawUniforms plan;
 vec3 origin, inverse_direction;
 float first, last;
 float entered, left;

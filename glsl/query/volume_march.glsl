@@ -30,8 +30,8 @@ BUFFER(10, readonly, float, depths) // row by row, as the colours
 STRUCTURE(11)
 #include "shared/structure_owner.glsl"
 
-RenderView view;
-RenderPlan plan;
+ViewUniforms view;
+DrawUniforms plan;
 #include "shared/clip.glsl"
 #include "shared/skip.glsl"
 #include "shared/held.glsl"

@@ -14,7 +14,7 @@ ARGUMENTS(4)
     uint last_cell;
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
-BUFFER16(1, readonly, RenderView, views)
+BUFFER16(1, readonly, ViewUniforms, views)
 RECORDS(2, vec4, table)
 BUFFER16(3, writeonly, Frame, frames)
 
@@ -29,7 +29,7 @@ void main() {
         precise float extent = hi[c] - lo[c];
         largest = max(largest, canonical(extent));
     }
-    RenderPlan plan = RenderPlan(vec4(0.0), uint[2](width, height), visible_at, row, first_cell, last_cell, uint[2](0u, 0u));
+    DrawUniforms plan = DrawUniforms(vec4(0.0), uint[2](width, height), visible_at, row, first_cell, last_cell, uint[2](0u, 0u));
     for (uint c = 0u; c < 3u; ++c) {
         precise float of_bounds = largest * two_to(-18);
         precise float far = abs(lo[c]) + abs(hi[c]);

@@ -3,7 +3,7 @@
 const uint TABLE = 1024u; // entries of the transfer function
 
 struct Frame {
-    RenderView view;
-    RenderPlan plan;
+    ViewUniforms view;
+    DrawUniforms plan;
     FLOATS table[TABLE]; // sRGB colour, and opacity of one step
 };

@@ -34,7 +34,7 @@ struct BuildStatus {
 };
 
 // The view of a picture, without mesh, tree and field; see src/render.
-struct RenderView {
+struct ViewUniforms {
     vec4 origin;     // Origin of the ray of pixel (0, 0); p of a depth buffer, whose value d lies at direction·(p + d·q) / (r + d·s) from the origin.
     vec4 origin_x;   // What one pixel to the right adds to the origin; q of a depth buffer.
     vec4 origin_y;   // What one pixel down adds to the origin; r of a depth buffer.
@@ -56,7 +56,7 @@ struct RenderView {
 };
 
 // What the device computes from a view.
-struct RenderPlan {
+struct DrawUniforms {
     vec4 slack;      // Boxes are enlarged by this, so that rounding loses no sample.
     uint size[2];    // Width and height in pixels.
     uint visible_at; // Word of the flags where the marks of visible nodes start, if there are any.
@@ -98,7 +98,7 @@ struct LbvhNode {
 };
 
 // A stack of layers of voxels over a mesh; see src/slicing.
-struct SlicePlan {
+struct SliceUniforms {
     uint listed; // Voxels of the band whose centre lies in no tetrahedron. First member, since bound by itself.
     uint pad0;   // Unused.
     uint pad1;   // Unused.
@@ -154,7 +154,7 @@ struct RunState {
 struct SliceStatus {
     uint locating; // Runs of voxels whose centres need another round.
     uint touching; // Voxels whose boxes need another round. Boxes are tested once all centres are located.
-    uint refused;  // Not 0: boxes are flat (1) or too large, as in `SlicePlan` (2), and all voxels are empty.
+    uint refused;  // Not 0: boxes are flat (1) or too large, as in `SliceUniforms` (2), and all voxels are empty.
     uint inside;   // Voxels with their centre in the mesh. Counted once all centres are located.
     uint touched;  // Voxels that the mesh only touches. Counted once all boxes are tested.
     uint empty;    // Voxels that it does not touch and, until all boxes are tested, those that it may touch.

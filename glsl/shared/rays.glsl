@@ -15,13 +15,13 @@ float inverse_sqrt(float x) {
 }
 
 // The direction of a pixel's ray, of any length.
-vec3 way_of(RenderView view, uvec2 pixel) {
+vec3 way_of(ViewUniforms view, uvec2 pixel) {
     vec2 at = vec2(pixel);
     precise vec3 w = (view.direction.xyz + at.x * view.direction_x.xyz) + at.y * view.direction_y.xyz;
     return w;
 }
 
-void make_ray(RenderView view, uvec2 pixel, out vec3 origin, out vec3 direction) {
+void make_ray(ViewUniforms view, uvec2 pixel, out vec3 origin, out vec3 direction) {
     vec2 at = vec2(pixel);
     precise vec3 o = (view.origin.xyz + at.x * view.origin_x.xyz) + at.y * view.origin_y.xyz;
     vec3 w = way_of(view, pixel);
@@ -48,7 +48,7 @@ vec3 inverse_of(vec3 direction) {
 const float MAX_SAMPLES = 8388608.0;
 
 // How many steps from its origin the ray of a pixel reaches value d of a depth buffer.
-float steps_to_depth(RenderView view, uvec2 pixel, float d) {
+float steps_to_depth(ViewUniforms view, uvec2 pixel, float d) {
     precise float scale = view.origin_y.w + d * view.direction.w;
     bool finite = (floatBitsToUint(d) & 0x7f800000u) != 0x7f800000u; // by its bits: drivers may compare NaN as they like
     if (!finite || scale <= LEAST || scale >= MOST) return MAX_SAMPLES;
@@ -60,7 +60,7 @@ float steps_to_depth(RenderView view, uvec2 pixel, float d) {
 }
 
 // The position of sample k.
-vec3 sample_at(RenderView view, vec3 origin, vec3 direction, uint k) {
+vec3 sample_at(ViewUniforms view, vec3 origin, vec3 direction, uint k) {
     precise float t = (float(k) + 0.5) * view.step_size;
     precise vec3 at = origin + direction * t;
     return at;

@@ -4,7 +4,7 @@ const uint NAN = 0x7fc00000u; // value of an empty voxel
 const uint SLICE_TOUCHED = 0x80000000u; // added to the owner of a voxel that is only touched
 
 // Row number i of the band: its number within its layer, and the layer.
-uvec2 voxel_row(SlicePlan plan, uint i) {
+uvec2 voxel_row(SliceUniforms plan, uint i) {
     uint y = plan.first + i;
     return uvec2(y % plan.height, plan.layer + y / plan.height);
 }
@@ -17,19 +17,19 @@ uvec2 rows_of_run(uint run, uint rows, uint height, uint i) {
 }
 
 // The centre of the first voxel of a row.
-vec3 row_origin(SlicePlan plan, uvec2 row) {
+vec3 row_origin(SliceUniforms plan, uvec2 row) {
     precise vec3 at = (plan.origin.xyz + float(row.y) * plan.next_layer.xyz) + float(row.x) * plan.next_row.xyz;
     return at;
 }
 
 // The centre of voxel x of the row that starts at `row`.
-vec3 voxel_centre(SlicePlan plan, vec3 row, uint x) {
+vec3 voxel_centre(SliceUniforms plan, vec3 row, uint x) {
     precise vec3 at = row + float(x) * plan.next_voxel.xyz;
     return at;
 }
 
 // The centre of voxel number i of the band.
-vec3 voxel_centre(SlicePlan plan, uint i) {
+vec3 voxel_centre(SliceUniforms plan, uint i) {
     uint row = i / plan.width;
     return voxel_centre(plan, row_origin(plan, voxel_row(plan, row)), i - row * plan.width);
 }

@@ -3,7 +3,7 @@
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
-use crate::kernels::{LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec, Row};
+use crate::kernels::{DeviceClass, LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::{Grid, LbvhNode};
 use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
@@ -96,7 +96,7 @@ pub fn cmd_build_lbvh(r: &mut Recorder<'_>, mesh: &MeshView, tree: &BinaryTree, 
     r.stage("lbvh.merge", |r| {
         // One subgroup (of the size that kernels of baselines have) per workgroup where a memory barrier may act as a
         // control barrier of the workgroup; see the kernel.
-        let alone = matches!(Row::of(r.gpu().report()), Row::Cpu | Row::Apple);
+        let alone = matches!(DeviceClass::of(r.gpu().report()), DeviceClass::Cpu | DeviceClass::Apple);
         let workgroup = if alone { r.gpu().report().query_subgroup } else { r.gpu().target().each };
         let spec = LbvhMergeSpec { workgroup, ..Default::default() };
         let arguments = LbvhMerge { vertices, cells, boundary, codes, ids, nodes, arrivals, root, status, tets };

@@ -20,7 +20,7 @@ const FEW: usize = 4096;
 
 /// Points of a mesh that may not fit the device.
 #[derive(Clone, Copy, Debug)]
-pub struct Points<'a> {
+pub struct LocateRequest<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
     /// Options of its trees.
@@ -37,7 +37,13 @@ pub struct Points<'a> {
 /// # Errors
 /// Those of [`query::locate`] and [`crate::build::Tree::build`]; [`Error::TooLarge`] with the sizes if the memory is
 /// too small for the smallest blocks, or for 2^32 points and more.
-pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32], On)>, report: Progress<'_>) -> Result<InBlocks<Located>> {
+pub fn locate(
+    gpu: &Gpu,
+    memory: u64,
+    asked: &LocateRequest<'_>,
+    field: Option<(&[f32], On)>,
+    report: Progress<'_>,
+) -> Result<InBlocks<Located>> {
     let (mesh, n) = (asked.mesh, asked.points.len());
     check_field(mesh, field)?;
     let nan = f32::from_bits(0x7fc0_0000);
@@ -59,12 +65,12 @@ pub fn locate(gpu: &Gpu, memory: u64, asked: &Points<'_>, field: Option<(&[f32],
     Ok(took.with(all))
 }
 
-/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does; of [`Points::how`] only the
+/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does; of [`LocateRequest::how`] only the
 /// tolerance is used. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`locate`].
-pub fn locate_all(gpu: &Gpu, memory: u64, asked: &Points<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
     let mut all = vec![Vec::new(); asked.points.len()];
     let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let found = query::locate_all(&placed.tree, points, asked.how.tolerance, SILENT)?;
@@ -90,8 +96,15 @@ pub(super) enum Blocks {
 }
 
 /// Queries the whole mesh, if it fits, or one block after another.
-pub(super) fn each(gpu: &Gpu, memory: u64, asked: &Points<'_>, blocks: Blocks, report: Progress<'_>, ask: Ask<'_>) -> Result<InBlocks> {
-    let Points { mesh, ref options, points, .. } = *asked;
+pub(super) fn each(
+    gpu: &Gpu,
+    memory: u64,
+    asked: &LocateRequest<'_>,
+    blocks: Blocks,
+    report: Progress<'_>,
+    ask: Ask<'_>,
+) -> Result<InBlocks> {
+    let LocateRequest { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
     let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };

@@ -37,11 +37,11 @@ mod render;
 mod size;
 mod slice;
 
-pub use locate::{Points, locate, locate_all};
+pub use locate::{LocateRequest, locate, locate_all};
 pub use nearest::nearest;
-pub use overlap::{Meshes, overlap};
-pub use render::{Picture, View, render};
-pub use slice::{Stack, slice};
+pub use overlap::{OverlapRequest, overlap};
+pub use render::{Picture, RenderRequest, render};
+pub use slice::{SliceRequest, slice};
 
 use crate::error::{Error, Result};
 use crate::gpu::Gpu;

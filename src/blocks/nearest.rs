@@ -1,18 +1,18 @@
 //! The places of the surface that are closest to points, in blocks: each block tells the closest in its own cells.
 
 use super::InBlocks;
-use super::locate::{Blocks, Points, each};
+use super::locate::{Blocks, LocateRequest, each};
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::NONE;
 use crate::query::{Nearest, Progress, SILENT, nearest_in};
 
 /// Finds the place of the surface that is closest to each point, at most `within` away, as [`crate::query::nearest`] does, within
-/// `memory` bytes of device memory; [`Points::how`] is not used. `report` receives the number of points done, and of all.
+/// `memory` bytes of device memory; [`LocateRequest::how`] is not used. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`super::locate`].
-pub fn nearest(gpu: &Gpu, memory: u64, asked: &Points<'_>, within: f32, report: Progress<'_>) -> Result<InBlocks<Nearest>> {
+pub fn nearest(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, within: f32, report: Progress<'_>) -> Result<InBlocks<Nearest>> {
     let n = asked.points.len();
     let mut all = Nearest { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], squares: vec![f32::INFINITY; n], scale: 1.0 };
     let took = each(gpu, memory, asked, Blocks::All, report, &mut |ids, points, placed, cells| {

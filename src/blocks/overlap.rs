@@ -44,7 +44,7 @@ impl Node {
 
 /// Two meshes, which may not fit the device, and what to find.
 #[derive(Clone, Copy, Debug)]
-pub struct Meshes<'a> {
+pub struct OverlapRequest<'a> {
     /// A and B, with points in one coordinate system.
     pub meshes: [&'a Mesh; 2],
     /// Options of their trees.
@@ -61,8 +61,8 @@ pub struct Meshes<'a> {
 /// # Errors
 /// Those of [`query::overlap`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the sizes if the
 /// memory is too small for the smallest blocks.
-pub fn overlap(gpu: &Gpu, memory: u64, asked: &Meshes<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
-    let Meshes { meshes, ref options, pairs } = *asked;
+pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Overlapped>> {
+    let OverlapRequest { meshes, ref options, pairs } = *asked;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
     // If the whole turns out not to fit, the progress stays where it is until the blocks have come as far.

@@ -24,7 +24,7 @@ const RESERVE: u64 = 1 << 17;
 
 /// The field of a mesh that may not fit the device, and how to render it.
 #[derive(Clone, Copy, Debug)]
-pub struct View<'a> {
+pub struct RenderRequest<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
     /// Options of its trees.
@@ -52,8 +52,8 @@ pub struct Picture {
 /// # Errors
 /// Those of [`query::render`], [`Prepared::new`] and [`crate::build::Tree::build`]; [`crate::Error::TooLarge`] with the
 /// sizes if the memory is too small for the smallest blocks.
-pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
-    let View { mesh, ref options, field, settings } = *asked;
+pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Picture>> {
+    let RenderRequest { mesh, ref options, field, settings } = *asked;
     check_field(mesh, Some((&field.values, field.on)))?;
     let gpu = &gpu.with_memory(memory);
     let mut took = InBlocks::default();
@@ -90,8 +90,8 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &View<'_>, report: Progress<'_>) ->
     Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, plan, range }))
 }
 
-fn render_whole(placed: &Placed, asked: &View<'_>, report: Progress<'_>) -> Result<Picture> {
-    let (Placed { mesh, tree, .. }, View { field, settings, .. }) = (placed, asked);
+fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
+    let (Placed { mesh, tree, .. }, RenderRequest { field, settings, .. }) = (placed, asked);
     let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
     let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
     let is_valid = |t| bad.binary_search(&t).is_err();

@@ -28,7 +28,7 @@ const RESERVE: u64 = 1 << 16;
 
 /// A stack of layers through a mesh that may not fit the device.
 #[derive(Clone, Copy, Debug)]
-pub struct Stack<'a> {
+pub struct SliceRequest<'a> {
     /// The mesh.
     pub mesh: &'a Mesh,
     /// Options of its trees.
@@ -50,11 +50,11 @@ pub struct Stack<'a> {
 pub fn slice(
     gpu: &Gpu,
     memory: u64,
-    asked: &Stack<'_>,
+    asked: &SliceRequest<'_>,
     report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
 ) -> Result<InBlocks<Tally>> {
-    let Stack { mesh, ref options, field, voxels, extrapolate } = *asked;
+    let SliceRequest { mesh, ref options, field, voxels, extrapolate } = *asked;
     let values = field.map(|f| (f.values.as_slice(), f.on));
     check_field(mesh, values)?;
     let gpu = &gpu.with_memory(memory);
@@ -90,7 +90,7 @@ pub fn slice(
 struct Job<'a> {
     gpu: &'a Gpu,
     memory: u64,
-    asked: &'a Stack<'a>,
+    asked: &'a SliceRequest<'a>,
     source: &'a Source<'a>,
     /// The blocks that the mesh is cut into so far; the last one may be in device memory.
     blocks: Vec<Block>,
@@ -138,7 +138,7 @@ impl Job<'_> {
 
     /// Queries a block.
     fn visit(&mut self, block: &Block, all: &mut Band) -> Result<()> {
-        let Stack { field, voxels, extrapolate, .. } = *self.asked;
+        let SliceRequest { field, voxels, extrapolate, .. } = *self.asked;
         let (grid, level) = (&self.source.grid, self.source.level);
         self.placed.take_if(|(tets, _)| !Rc::ptr_eq(tets, &block.tets));
         if self.placed.is_none() {

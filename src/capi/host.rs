@@ -2,7 +2,7 @@
 
 use super::{OlbvhGpu, OlbvhStatus, border, give, handle, missing, put};
 use crate::error::Error;
-use crate::gpu::{Enabled, Gpu, GpuOptions, HostDevice, HostQueue, Requirements};
+use crate::gpu::{EnabledFeatures, Gpu, GpuOptions, HostDevice, HostQueue, Requirements};
 use ash::vk::{self, Handle};
 use std::ffi::{c_char, c_void};
 use std::ptr::null;
@@ -189,12 +189,12 @@ pub extern "C" fn olbvh_gpu_from_host(host: *const OlbvhHostDevice, out: *mut *m
                 queue,
                 allocator: None,
                 pipeline_cache: (host.pipeline_cache != 0).then(|| vk::PipelineCache::from_raw(host.pipeline_cache)),
-                enabled: Enabled {
+                enabled: EnabledFeatures {
                     buffer_addresses: host.buffer_addresses != 0,
                     shader_int64: host.shader_int64 != 0,
                     subgroup_size_control: host.subgroup_size_control != 0,
                     debug_utils: host.debug_utils != 0,
-                    ..Enabled::default()
+                    ..EnabledFeatures::default()
                 },
                 instance,
             };

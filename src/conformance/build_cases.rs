@@ -4,7 +4,7 @@ use super::build::{BuildCase, Way};
 use super::meshes::{MeshRecipe, recipes};
 use super::primitive_cases::push;
 use super::{Case, Group, TargetKind, Work};
-use crate::kernels::Row;
+use crate::kernels::DeviceClass;
 use crate::options::{Assign, Lists};
 
 /// All values of α of the full group.
@@ -68,7 +68,7 @@ fn add_builds(cases: &mut Vec<Case>, mesh: MeshRecipe) {
 
 /// Adds trees with every row of the table of targets.
 fn add_rows(cases: &mut Vec<Case>, mesh: MeshRecipe) {
-    for target in Row::EVERY.map(TargetKind::Row) {
+    for target in DeviceClass::EVERY.map(TargetKind::Row) {
         for (assign, lists) in [(Assign::Aabb, Lists::All), (Assign::Exact, Lists::Boundary)] {
             build(cases, mesh.group, BuildCase { mesh, alpha: 0.0, assign, lists, boxes: true, way: Way::Recorded, target });
         }

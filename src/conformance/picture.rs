@@ -10,7 +10,7 @@ use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{Canvas, Rays, SILENT, render};
-use crate::reference::volume::{Scene, render as draw};
+use crate::reference::volume::{Drawing, render as draw};
 use crate::render::{Plan, RenderSettings, TransferFunction};
 
 /// A small picture.
@@ -60,7 +60,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
     for (alpha, assign, lists) in [(0.0, Assign::Aabb, all), (0.0, Assign::Planes, boundary), (2.0, Assign::Exact, all)] {
         let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
         let built = twin.tree(&options)?;
-        let scene = Scene::new(&twin.mesh, &twin.topology, built.tree(), &field, &settings)?;
+        let scene = Drawing::new(&twin.mesh, &twin.topology, built.tree(), &field, &settings)?;
         let plan = scene.plan();
         let tree = Tree::build(gpu, device, &options)?;
         let normals = &scene.prepared.normals;

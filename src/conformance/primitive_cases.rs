@@ -3,7 +3,7 @@
 use super::data::Keys;
 use super::primitives::{Live, ReduceCase, ScanCase, SortCase, TargetKind};
 use super::{Case, Group, Work};
-use crate::kernels::Row;
+use crate::kernels::DeviceClass;
 use crate::primitives::Reduction;
 
 /// Lengths around subgroups, workgroups and tiles of every target, around powers of two, and primes.
@@ -77,7 +77,7 @@ pub(super) fn add(cases: &mut Vec<Case>) {
             sort(cases, Group::Full, SortCase { bits: 32, n: 100_000, live: Live::Host, keys, target });
         }
     }
-    for target in Row::EVERY.map(TargetKind::Row) {
+    for target in DeviceClass::EVERY.map(TargetKind::Row) {
         for (n, live) in [(100_003, Live::Host), (10_007, Live::Below)] {
             scan(cases, Group::Quick, ScanCase { n, live, in_place: true, target });
             sort(cases, Group::Quick, SortCase { bits: 21, n, live, keys: Keys::Random, target });

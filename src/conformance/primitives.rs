@@ -4,7 +4,7 @@ use super::buffers::{FILL, Guarded};
 use super::data::Keys;
 use super::failure::{Verdict, compare};
 use crate::gpu::{Arena, Gpu};
-use crate::kernels::{Row, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
+use crate::kernels::{DeviceClass, ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 use crate::primitives::{Count, REDUCE_SCRATCH, Reduction, ScanScratch, SortScratch, cmd_exclusive_scan, cmd_reduce, cmd_sort_pairs};
 
 /// The target with which a case runs.
@@ -19,7 +19,7 @@ pub(crate) enum TargetKind {
     /// Ballots with tiny tiles and digits, which make many tiles and many passes.
     Narrow,
     /// A given row of the table, whatever the device is.
-    Row(Row),
+    Row(DeviceClass),
 }
 
 impl TargetKind {
@@ -40,8 +40,8 @@ impl TargetKind {
         let subgroup = room.subgroup;
         match self {
             Self::Device => None,
-            Self::Serial => Some(Row::Cpu.target(room)),
-            Self::Ballot => Some(Row::Portable.target(room)),
+            Self::Serial => Some(DeviceClass::Cpu.target(room)),
+            Self::Ballot => Some(DeviceClass::Portable.target(room)),
             Self::Narrow => Some(Target {
                 name: "narrow".into(),
                 scan: ScanTarget { serial: false, workgroup: 2 * subgroup, rows: 3 },

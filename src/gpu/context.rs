@@ -13,7 +13,7 @@ use super::queue::HostQueue;
 use super::ray_functions::Acceleration;
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
-use crate::kernels::{ALL, Row, Target};
+use crate::kernels::{ALL, DeviceClass, Target};
 use ash::vk;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -36,7 +36,7 @@ pub struct GpuOptions {
     pub device: Option<String>,
     /// How kernels receive their buffers; `None`: by address where the device supports it.
     pub binding: Option<Binding>,
-    /// Tuning parameters of the kernels; `None`: those of the kind of device, see [`Row`].
+    /// Tuning parameters of the kernels; `None`: those of the kind of device, see [`DeviceClass`].
     pub target: Option<Target>,
     /// Folder in which compiled pipelines are kept, in one file per device and driver; `None`: they are not kept.
     pub pipeline_cache: Option<PathBuf>,
@@ -113,7 +113,7 @@ impl Gpu {
                 "{name}: subgroups of {least} to {most}, no size control enabled; the driver is trusted to run kernels with {usual}"
             );
         }
-        let target = options.target.clone().unwrap_or_else(|| Row::of(report).target(&report.room));
+        let target = options.target.clone().unwrap_or_else(|| DeviceClass::of(report).target(&report.room));
         target.check(&report.room)?;
         let debug_device = foundation.debug_utils.then(|| ash::ext::debug_utils::Device::new(instance, device));
         let heap = Heap::new(&foundation)?;
@@ -272,7 +272,7 @@ impl Gpu {
     /// Whether kernels read records of four words as two 64-bit words. This helps on processors, which load every
     /// component separately.
     pub(super) fn reads_wide(&self) -> bool {
-        self.report().requirements.shader_int64 && Row::of(self.report()) == Row::Cpu
+        self.report().requirements.shader_int64 && DeviceClass::of(self.report()) == DeviceClass::Cpu
     }
 
     pub(crate) fn requires_subgroup_size(&self) -> bool {

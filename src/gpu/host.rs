@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex};
 /// used, even if it is supported.
 #[derive(Clone, Copy, Debug, Default)]
 #[allow(clippy::struct_excessive_bools)]
-pub struct Enabled {
+pub struct EnabledFeatures {
     /// Feature `bufferDeviceAddress`; without it kernels receive their buffers as descriptors.
     pub buffer_addresses: bool,
     /// Feature `shaderInt64`, which only helps drivers that run on a processor.
@@ -50,7 +50,7 @@ pub struct HostDevice {
     /// simultaneously. `None`: this crate makes its own.
     pub pipeline_cache: Option<vk::PipelineCache>,
     /// What is enabled.
-    pub enabled: Enabled,
+    pub enabled: EnabledFeatures,
 }
 
 impl std::fmt::Debug for HostDevice {

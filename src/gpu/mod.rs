@@ -32,7 +32,7 @@ pub use arena::Arena;
 pub use buffer_ref::{BufferRef, USAGE};
 pub use context::{Binding, Gpu, GpuOptions};
 pub use descriptors::{DescriptorPools, DescriptorRoom};
-pub use host::{Enabled, HostDevice};
+pub use host::{EnabledFeatures, HostDevice};
 pub(crate) use kernel::{Access, Arguments, BufferInfo, Kernel, KernelInfo, Specialization};
 pub use memory::{ALIGNMENT, Buffer};
 pub use open::list_devices;

@@ -4,7 +4,7 @@ use crate::gpu::{Access, Arguments, BufferInfo, BufferRef, Kernel, KernelInfo, S
 
 mod rows;
 mod target;
-pub use rows::Row;
+pub use rows::DeviceClass;
 pub(crate) use target::LONGEST_LOOP;
 pub use target::{ScanTarget, SortTarget, Target, TileTarget, WorkgroupLimits};
 

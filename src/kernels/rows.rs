@@ -14,7 +14,7 @@ use std::borrow::Cow;
 
 /// A kind of device.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum Row {
+pub enum DeviceClass {
     /// Any other device with narrow cores.
     Portable,
     /// A processor, which runs a workgroup as a loop over a wide vector.
@@ -34,7 +34,7 @@ pub enum Row {
 }
 
 named!(
-    Row,
+    DeviceClass,
     "target",
     [
         Portable = "portable",
@@ -61,7 +61,7 @@ struct Numbers {
     query: u32,
 }
 
-impl Row {
+impl DeviceClass {
     #[rustfmt::skip]
     #[allow(clippy::match_same_arms, reason = "a row for each kind of device, also where two are equal")]
     fn numbers(self) -> Numbers {
@@ -120,21 +120,21 @@ mod tests {
     #[test]
     fn devices_find_their_rows() {
         let proprietary = DriverId::NVIDIA_PROPRIETARY;
-        assert_eq!(Row::choose(false, proprietary, 0x10de), Row::Nvidia);
-        assert_eq!(Row::choose(false, DriverId::MESA_RADV, 0x1002), Row::Amd);
-        assert_eq!(Row::choose(false, DriverId::from_raw(26), 0x1_0005), Row::Apple);
-        assert_eq!(Row::choose(false, DriverId::MOLTENVK, 0x106b), Row::Apple);
-        assert_eq!(Row::choose(false, DriverId::MOLTENVK, 0x1002), Row::Amd);
-        assert_eq!(Row::choose(false, DriverId::ARM_PROPRIETARY, 0x13b5), Row::Arm);
-        assert_eq!(Row::choose(false, DriverId::QUALCOMM_PROPRIETARY, 0x5143), Row::Qualcomm);
-        assert_eq!(Row::choose(true, DriverId::MESA_LLVMPIPE, 0x1_0005), Row::Cpu);
-        assert_eq!(Row::choose(false, DriverId::from_raw(0), 0x1010), Row::Portable);
+        assert_eq!(DeviceClass::choose(false, proprietary, 0x10de), DeviceClass::Nvidia);
+        assert_eq!(DeviceClass::choose(false, DriverId::MESA_RADV, 0x1002), DeviceClass::Amd);
+        assert_eq!(DeviceClass::choose(false, DriverId::from_raw(26), 0x1_0005), DeviceClass::Apple);
+        assert_eq!(DeviceClass::choose(false, DriverId::MOLTENVK, 0x106b), DeviceClass::Apple);
+        assert_eq!(DeviceClass::choose(false, DriverId::MOLTENVK, 0x1002), DeviceClass::Amd);
+        assert_eq!(DeviceClass::choose(false, DriverId::ARM_PROPRIETARY, 0x13b5), DeviceClass::Arm);
+        assert_eq!(DeviceClass::choose(false, DriverId::QUALCOMM_PROPRIETARY, 0x5143), DeviceClass::Qualcomm);
+        assert_eq!(DeviceClass::choose(true, DriverId::MESA_LLVMPIPE, 0x1_0005), DeviceClass::Cpu);
+        assert_eq!(DeviceClass::choose(false, DriverId::from_raw(0), 0x1010), DeviceClass::Portable);
     }
 
     #[test]
     fn every_row_fits_the_least_device() {
-        for row in Row::EVERY {
-            assert_eq!(row.name().parse::<Row>().unwrap(), row);
+        for row in DeviceClass::EVERY {
+            assert_eq!(row.name().parse::<DeviceClass>().unwrap(), row);
             for subgroup in [4, 8, 16, 32, 64, 128] {
                 let room = WorkgroupLimits::least(subgroup);
                 let target = row.target(&room);
@@ -142,21 +142,31 @@ mod tests {
                 target.check_scale().unwrap();
             }
         }
-        assert!("gpu".parse::<Row>().is_err_and(|e| e.to_string().contains("portable, cpu, nvidia")));
+        assert!("gpu".parse::<DeviceClass>().is_err_and(|e| e.to_string().contains("portable, cpu, nvidia")));
     }
 
     #[test]
     fn rows_keep_their_digits_where_subgroups_are_the_vendors() {
-        for (row, subgroup) in [(Row::Nvidia, 32), (Row::Amd, 64), (Row::Amd, 32), (Row::Intel, 16), (Row::Apple, 32), (Row::Arm, 16)] {
+        for (row, subgroup) in [
+            (DeviceClass::Nvidia, 32),
+            (DeviceClass::Amd, 64),
+            (DeviceClass::Amd, 32),
+            (DeviceClass::Intel, 16),
+            (DeviceClass::Apple, 32),
+            (DeviceClass::Arm, 16),
+        ] {
             assert_eq!(row.target(&WorkgroupLimits::least(subgroup)).sort.digit_bits, 8, "{row:?}");
         }
-        assert_eq!(Row::Cpu.target(&WorkgroupLimits::least(8)).sort, SortTarget { serial: true, workgroup: 8, rows: 8192, digit_bits: 11 });
+        assert_eq!(
+            DeviceClass::Cpu.target(&WorkgroupLimits::least(8)).sort,
+            SortTarget { serial: true, workgroup: 8, rows: 8192, digit_bits: 11 }
+        );
     }
 
     #[test]
     fn what_does_not_fit_is_named() {
         let room = WorkgroupLimits::least(32);
-        let target = Row::Portable.target(&room);
+        let target = DeviceClass::Portable.target(&room);
         let refused = |change: fn(&mut Target)| {
             let mut target = target.clone();
             change(&mut target);

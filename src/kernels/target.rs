@@ -1,5 +1,5 @@
 //! Targets: the tuning parameters of the kernels that can be chosen per device, and their limits. The choices are in a
-//! table, see [`super::Row`].
+//! table, see [`super::DeviceClass`].
 
 use crate::error::{Error, Result};
 use std::borrow::Cow;

@@ -254,14 +254,14 @@ impl PairSort<'_> {
 mod tests {
     use super::*;
     use crate::gpu::GpuOptions;
-    use crate::kernels::{Row, WorkgroupLimits};
+    use crate::kernels::{DeviceClass, WorkgroupLimits};
 
     /// Tiles that begin in reverse order wait for what no workgroup has counted yet, more of them than a device runs at a
     /// time, and must count it themselves.
     #[test]
     fn tiles_count_for_tiles_that_do_not_begin() {
         let gpu = Gpu::new(&GpuOptions::default()).unwrap();
-        let mut target = Row::Portable.target(&WorkgroupLimits::least(gpu.subgroup_size()));
+        let mut target = DeviceClass::Portable.target(&WorkgroupLimits::least(gpu.subgroup_size()));
         (target.sort.workgroup, target.sort.rows, target.sort.digit_bits) = (gpu.subgroup_size(), 16, 7);
         let gpu = gpu.with_target(target).unwrap();
         let (n, bits) = (64 * gpu.target().sort.tile() + 5, 13);

@@ -21,9 +21,9 @@ use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
 use crate::kernels::{
     LbvhSliceLocate, LbvhSliceLocateSpec, LbvhSliceTouch, LbvhSliceTouchSpec, SliceCollect, SliceCollectSpec, SliceLocate, SliceLocateSpec,
-    SlicePlan as PlanKernel, SlicePlanSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec,
+    SlicePlan, SlicePlanSpec, SliceTouch, SliceTouchSpec, SliceValues, SliceValuesSpec,
 };
-use crate::layout::{RunState, SlicePlan, SliceStatus, TouchState};
+use crate::layout::{RunState, SliceStatus, SliceUniforms, TouchState};
 use crate::mesh::On;
 use crate::options::TOLERANCE;
 use crate::primitives::Count;
@@ -93,7 +93,7 @@ impl SliceMemory {
             answers: arena.words(width * rows)?,
             values: arena.words(width * rows)?,
             status: arena.take(size_of::<SliceStatus>() as u64)?,
-            plan: arena.take(size_of::<SlicePlan>() as u64)?,
+            plan: arena.take(size_of::<SliceUniforms>() as u64)?,
             runs: arena.take(size_of::<RunState>() as u64 * width * runs)?,
             touches: arena.take(size_of::<TouchState>() as u64 * width * rows)?,
             groups: arena.words(3)?,
@@ -169,7 +169,7 @@ fn cmd_plan(
     let VoxelGrid { origin, next_voxel, next_row, next_layer, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
     let Rows { layer, first, count: rows } = input.rows;
     let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, cells.unwrap_or(CellRange::WHOLE).words());
-    let arguments = PlanKernel {
+    let arguments = SlicePlan {
         grid,
         plans,
         origin,
@@ -236,7 +236,7 @@ fn cmd_touch_voxels(r: &mut Recorder<'_>, searched: &Searched, memory: &SliceMem
         let spec = SliceCollectSpec { workgroup, run: VOXEL_RUN, ..Default::default() };
         r.dispatch(&collect, spec, Groups::Count(input.runs().div_ceil(workgroup)))?;
         r.barrier("slice.collect → slice.arguments");
-        let listed = Count::device(voxels, plans.part(offset_of!(SlicePlan, listed) as u64, 16));
+        let listed = Count::device(voxels, plans.part(offset_of!(SliceUniforms, listed) as u64, 16));
         let groups = listed.groups(r, workgroup, memory.groups, "slice.arguments → slice.touch")?;
         dispatch!(r, groups, searched, SliceTouch SliceTouchSpec { boundary } {}, LbvhSliceTouch LbvhSliceTouchSpec, {
             cells: cells,

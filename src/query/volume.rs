@@ -22,7 +22,7 @@ use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
     VolumePlan, VolumePlanSpec,
 };
-use crate::layout::{RayState, RenderPlan, RenderStatus, RenderView};
+use crate::layout::{DrawUniforms, RayState, RenderStatus, ViewUniforms};
 use crate::mesh::On;
 use crate::render::{Plan, TABLE_SIZE};
 use std::mem::offset_of;
@@ -40,7 +40,7 @@ const BLOCK: u32 = 8;
 pub struct RenderInput {
     /// Width and height in pixels, those of the settings that the view was made with; of a part, its own height.
     pub size: [u32; 2],
-    /// [`RenderView`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
+    /// [`ViewUniforms`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
     pub view: BufferRef,
     /// Draws iso-surfaces, for the values that the view has, instead of the volume. View and table must have been made for
     /// the same; [`RenderInput::of`] sees to that.
@@ -79,7 +79,7 @@ impl RenderInput {
 
     /// Rejects parts that are too small for a picture of this mesh.
     fn check(&self, mesh: &MeshInput) -> Result<()> {
-        self.view.check(size_of::<RenderView>() as u64, "a view")?;
+        self.view.check(size_of::<ViewUniforms>() as u64, "a view")?;
         self.table.check(16 * TABLE_SIZE as u64, "a transfer function")?;
         check_field(self.field, mesh)?;
         let pixels = u64::from(self.size[0]) * u64::from(self.size[1]);
@@ -121,7 +121,7 @@ pub struct RenderMemory {
     pub colors: BufferRef,
     /// [`RenderStatus`]: numbers of samples, and how many rays are unfinished.
     pub status: BufferRef,
-    /// [`RenderView`], [`RenderPlan`], and the transfer function.
+    /// [`ViewUniforms`], [`DrawUniforms`], and the transfer function.
     pub frame: BufferRef,
     /// [`RayState`] per ray, in blocks of 8×8 pixels, the rays of a block along a Z curve.
     pub rays: BufferRef,
@@ -155,7 +155,7 @@ impl RenderMemory {
         Ok(Self {
             colors: arena.take(16 * pixels)?,
             status: arena.take(size_of::<RenderStatus>() as u64)?,
-            frame: arena.take((size_of::<RenderView>() + size_of::<RenderPlan>() + 16 * TABLE_SIZE) as u64)?,
+            frame: arena.take((size_of::<ViewUniforms>() + size_of::<DrawUniforms>() + 16 * TABLE_SIZE) as u64)?,
             rays: arena.take(size_of::<RayState>() as u64 * rays)?,
             visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
         })

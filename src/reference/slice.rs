@@ -9,7 +9,7 @@ use super::tet::{Tet, Vec3, sub};
 use super::walk::Stand;
 use crate::error::Result;
 use crate::grid::CellRange;
-use crate::layout::{NONE, SlicePlan};
+use crate::layout::{NONE, SliceUniforms};
 use crate::mesh::{Field, Mesh, On};
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, VoxelGrid, WALK};
 use crate::tree::TreeArrays;
@@ -26,7 +26,7 @@ pub struct Slicer<'a> {
     field: Option<&'a Field>,
     extrapolate: Extrapolate,
     voxels: VoxelGrid,
-    plan: SlicePlan,
+    plan: SliceUniforms,
     part: CellRange,
 }
 

@@ -37,7 +37,7 @@ pub struct Picture {
 }
 
 /// What is drawn: a mesh, its tree, a field.
-pub struct Scene<'a> {
+pub struct Drawing<'a> {
     pub(crate) mesh: &'a Mesh,
     pub(crate) topology: &'a Topology,
     pub(crate) tree: &'a TreeArrays,
@@ -53,7 +53,7 @@ pub struct Scene<'a> {
     pub(crate) locator: Locator<'a>,
 }
 
-impl<'a> Scene<'a> {
+impl<'a> Drawing<'a> {
     /// Prepares to draw `field` as `settings` say. `topology` and `tree` must be those of `mesh`.
     ///
     /// # Errors
@@ -123,7 +123,7 @@ impl<'a> Scene<'a> {
 }
 
 /// Draws the scene. `report` receives the number of rows done and the number of rows.
-pub fn render(scene: &Scene<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
+pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
     let [width, height] = plan.size;
     let intervals = Intervals::new(scene.tree, scene.visible.as_deref().filter(|_| plan.iso.is_empty()), plan).within(scene.part);

@@ -12,7 +12,7 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::grid::{canonical, reciprocal, two_to};
-use crate::layout::{Grid, RenderView};
+use crate::layout::{Grid, ViewUniforms};
 use crate::mesh::{Bounds, Field, Mesh, On};
 use glam::DVec3;
 
@@ -194,7 +194,7 @@ impl Plan {
     }
 
     /// The plan as the kernels take it, without the table.
-    pub fn view(&self) -> RenderView {
+    pub fn view(&self) -> ViewUniforms {
         let with = |v: [f32; 3], w: f32| [v[0], v[1], v[2], w];
         let [p, q, r, s] = self.rays.depth;
         let Lighting { to_light: [x, y, z], strength: [ambient, diffuse, specular], fill, rim } =
@@ -203,7 +203,7 @@ impl Plan {
         iso.iter_mut().zip(&self.iso).for_each(|(to, v)| *to = *v);
         let mut clip = [[0.0; 4]; MAX_CLIPS];
         clip.iter_mut().zip(&self.clips).for_each(|(to, plane)| *to = *plane);
-        RenderView {
+        ViewUniforms {
             origin: with(self.rays.origin, p),
             origin_x: with(self.rays.origin_x, q),
             origin_y: with(self.rays.origin_y, r),

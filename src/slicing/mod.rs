@@ -19,7 +19,7 @@ pub use settings::{Plane, SliceSettings};
 
 use crate::error::{Error, Result};
 use crate::grid::{CellRange, canonical, two_to};
-use crate::layout::{Grid, SlicePlan};
+use crate::layout::{Grid, SliceUniforms};
 use crate::named::named;
 use glam::DVec3;
 use std::ops::Range;
@@ -155,7 +155,7 @@ impl VoxelGrid {
 
     /// What the kernels and the reference need to know of these voxels over a mesh with grid `grid`. Twin of
     /// `glsl/query/slice_plan`.
-    pub fn over(&self, grid: &Grid) -> SlicePlan {
+    pub fn over(&self, grid: &Grid) -> SliceUniforms {
         // 2·2^e, see `plan`. Larger half axes are refused as they are, since scaling them could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
         let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
@@ -180,7 +180,7 @@ impl VoxelGrid {
         let largest = (0..3).map(|c| canonical(grid.hi[c] - grid.lo[c])).fold(0.0, f32::max);
         let reach = |c: usize| sum(&self.half, c) * (1.0 + two_to(-10)) + (largest * two_to(-14) + canonical(far * two_to(-18)));
         let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
-        SlicePlan {
+        SliceUniforms {
             origin: pad(self.origin),
             next_voxel: pad(self.next_voxel),
             next_row: pad(self.next_row),
@@ -193,7 +193,7 @@ impl VoxelGrid {
             height: self.size[1],
             refused: if large { 2 } else { u32::from(flat) },
             last_cell: CellRange::WHOLE.words()[1],
-            ..SlicePlan::default()
+            ..SliceUniforms::default()
         }
     }
 
@@ -202,7 +202,7 @@ impl VoxelGrid {
     /// # Errors
     /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or too large: along each axis a box
     /// measures at most 4·2^e, where the largest extent of the mesh lies in [2^e, 2^(e+1)).
-    pub fn plan(&self, grid: &Grid) -> Result<SlicePlan> {
+    pub fn plan(&self, grid: &Grid) -> Result<SliceUniforms> {
         self.check()?;
         let plan = self.over(grid);
         match plan.refused {

@@ -232,7 +232,7 @@ fn gains(work: &dyn Work, start: &Target, best: &Target) -> Result<Vec<Gain>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::kernels::Row;
+    use crate::kernels::DeviceClass;
     use std::cell::{Cell, RefCell};
 
     /// A fake device that is fastest with queries of 64 and runs of 256, computes wrong results with spines of 128, and
@@ -270,7 +270,7 @@ mod tests {
         let fake = Fake { noise, calls: Cell::new(0), verified: RefCell::default() };
         let events = RefCell::new(Vec::new());
         let report = |event: &Event, _: f64| events.borrow_mut().push(event.clone());
-        let tuned = tune(&fake, &room, &Row::Portable.target(&room), time, &report).unwrap();
+        let tuned = tune(&fake, &room, &DeviceClass::Portable.target(&room), time, &report).unwrap();
         (tuned, events.into_inner())
     }
 
@@ -288,7 +288,7 @@ mod tests {
     #[test]
     fn noise_changes_nothing() {
         let (tuned, _) = run(2.0, Duration::from_secs(60));
-        let start = Row::Portable.target(&WorkgroupLimits::least(32));
+        let start = DeviceClass::Portable.target(&WorkgroupLimits::least(32));
         assert_eq!((tuned.kept, tuned.target), (0, start));
         assert!(tuned.gains.is_empty());
     }

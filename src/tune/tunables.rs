@@ -1,6 +1,6 @@
 //! The parameters that can be changed.
 
-use crate::kernels::{Row, Target, WorkgroupLimits};
+use crate::kernels::{DeviceClass, Target, WorkgroupLimits};
 
 /// One parameter of a [`Target`].
 pub struct Tunable {
@@ -131,7 +131,7 @@ impl Tunable {
 
 /// The target with the other kind of sort, with the parameters of the best known row of that kind.
 pub(super) fn other_sort(target: &Target, room: &WorkgroupLimits) -> Target {
-    let row = if target.sort.serial { Row::Portable } else { Row::Cpu };
+    let row = if target.sort.serial { DeviceClass::Portable } else { DeviceClass::Cpu };
     Target { sort: row.target(room).sort, ..target.clone() }
 }
 
@@ -143,7 +143,7 @@ mod tests {
     fn steps_stay_within_the_room() {
         for subgroup in [4, 8, 32, 64, 128] {
             let room = WorkgroupLimits::least(subgroup);
-            for row in Row::EVERY {
+            for row in DeviceClass::EVERY {
                 let target = row.target(&room);
                 for tunable in &TUNABLES {
                     for up in [false, true] {

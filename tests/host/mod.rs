@@ -11,7 +11,7 @@ use ash::vk;
 use olbvh::build::{
     BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
 };
-use olbvh::gpu::{Arena, Buffer, Enabled, Gpu, HostDevice, RayTracing, Recorder, Requirements};
+use olbvh::gpu::{Arena, Buffer, EnabledFeatures, Gpu, HostDevice, RayTracing, Recorder, Requirements};
 use olbvh::mesh::Mesh;
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_locate};
@@ -120,9 +120,9 @@ impl Host {
         }
     }
 
-    pub fn enabled(&self) -> Enabled {
+    pub fn enabled(&self) -> EnabledFeatures {
         let (buffer_addresses, shader_int64, subgroup_size_control) = (self.addresses, self.int64, self.control);
-        Enabled { buffer_addresses, shader_int64, subgroup_size_control, ray_tracing: self.rays, debug_utils: false }
+        EnabledFeatures { buffer_addresses, shader_int64, subgroup_size_control, ray_tracing: self.rays, debug_utils: false }
     }
 
     pub fn queue(&self) -> Arc<Mutex<vk::Queue>> {

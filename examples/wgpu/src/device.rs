@@ -6,7 +6,7 @@
 
 use anyhow::{Context, Result, ensure};
 use ash::vk;
-use olbvh::gpu::{Enabled, Gpu, GpuOptions, HostDevice, Requirements};
+use olbvh::gpu::{EnabledFeatures, Gpu, GpuOptions, HostDevice, Requirements};
 use std::sync::{Arc, Mutex};
 use wgpu::hal::api::Vulkan;
 use wgpu::hal::vulkan::CreateDeviceCallback;
@@ -63,11 +63,11 @@ impl Device {
                 allocator: None,
                 pipeline_cache: None,
                 // No `subgroup_size_control`: wgpu enables that without `computeFullSubgroups`.
-                enabled: Enabled {
+                enabled: EnabledFeatures {
                     buffer_addresses: self.addresses,
                     shader_int64: self.device.features().contains(wgpu::Features::SHADER_INT64),
                     debug_utils: instance.extensions().contains(&ash::ext::debug_utils::NAME),
-                    ..Enabled::default()
+                    ..EnabledFeatures::default()
                 },
             };
             Ok(Gpu::from_raw(lent, &GpuOptions::default())?)

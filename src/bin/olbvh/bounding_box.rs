@@ -20,7 +20,7 @@ struct Line {
 }
 
 /// Where points lie in a picture, which follows from its rays.
-struct View {
+struct Projector {
     /// Where all rays meet, or where the first one starts, if they are parallel.
     eye: DVec3,
     meet: bool,
@@ -31,7 +31,7 @@ struct View {
     place: DMat3,
 }
 
-impl View {
+impl Projector {
     fn new(rays: &RayGrid) -> Self {
         let [origin, origin_x, origin_y] = [rays.origin, rays.origin_x, rays.origin_y].map(double);
         let [forward, direction_x, direction_y] = [rays.direction, rays.direction_x, rays.direction_y].map(double);
@@ -72,7 +72,7 @@ fn corner(bounds: &Bounds, i: usize) -> DVec3 {
 
 /// Draws the edges of the bounds into the `colors` of the rays (premultiplied), of which a pixel has `across` by `across`.
 pub fn draw(colors: &mut [[f32; 4]], plan: &Plan, bounds: &Bounds, across: u32) {
-    let lines = lines(&View::new(&plan.rays), bounds);
+    let lines = lines(&Projector::new(&plan.rays), bounds);
     let height = plan.size[1];
     let width = f64::from(across) * (f64::from(height / across) / FINE).max(1.0);
     let [r, g, b, _] = ink(&plan.background, height);
@@ -90,12 +90,12 @@ pub fn draw(colors: &mut [[f32; 4]], plan: &Plan, bounds: &Bounds, across: u32) 
 }
 
 /// The twelve edges, without what is not before the eye.
-fn lines(view: &View, bounds: &Bounds) -> Vec<Line> {
+fn lines(projector: &Projector, bounds: &Bounds) -> Vec<Line> {
     let near = NEAR * bounds.diagonal();
     let edges = (0..3).flat_map(|axis| (0..8).filter(move |i| i >> axis & 1 == 0).map(move |i| (axis, i)));
     let line = |(axis, i): (usize, usize)| {
-        let ends = view.line([i, i | 1 << axis].map(|i| corner(bounds, i)), near)?;
-        let before = (0..3).any(|side| side != axis && view.sees(bounds, side, i >> side & 1 != 0));
+        let ends = projector.line([i, i | 1 << axis].map(|i| corner(bounds, i)), near)?;
+        let before = (0..3).any(|side| side != axis && projector.sees(bounds, side, i >> side & 1 != 0));
         Some(Line { ends, before })
     };
     edges.filter_map(line).collect()
@@ -145,7 +145,7 @@ mod tests {
             ["iso", "top,ortho", "azimuth=20,elevation=-35,fov=80", "eye=1e5,2e5,3e5,target=3,1,4,fov=0.001", "front,ortho,zoom=0.5"]
         {
             let plan = plan(name, &bounds);
-            let lines = lines(&View::new(&plan.rays), &bounds);
+            let lines = lines(&Projector::new(&plan.rays), &bounds);
             assert_eq!(lines.len(), 12, "{name}");
             for end in lines.iter().flat_map(|line| line.ends) {
                 let (origin, way) = plan.rays.ray(end.x.round() as u32, end.y.round() as u32);
@@ -160,7 +160,7 @@ mod tests {
     fn edges_before_the_mesh_cover_it_and_those_behind_do_not() {
         let bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
         let plan = plan("iso", &bounds);
-        let before = lines(&View::new(&plan.rays), &bounds).iter().filter(|line| line.before).count();
+        let before = lines(&Projector::new(&plan.rays), &bounds).iter().filter(|line| line.before).count();
         assert_eq!(before, 9); // three sides are seen, with nine edges
         let drawn = |color: [f32; 4]| {
             let mut colors = vec![color; 320 * 200];
@@ -175,7 +175,7 @@ mod tests {
     fn an_eye_within_sees_what_is_before_it() {
         let bounds = Bounds { lo: [0.0; 3], hi: [1.0; 3] };
         let plan = plan("eye=0.5,0.5,0.5,target=1,0.5,0.5,fov=60", &bounds);
-        let lines = lines(&View::new(&plan.rays), &bounds);
+        let lines = lines(&Projector::new(&plan.rays), &bounds);
         assert_eq!(lines.len(), 8); // four lie behind the eye
         assert!(lines.iter().all(|line| !line.before));
     }

@@ -7,7 +7,7 @@ mod shapes;
 pub use shapes::{Origin, Shapes};
 
 use crate::common::{Common, Failure, Outcome};
-use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
+use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Bounds, Fault, Mesh};
@@ -34,17 +34,17 @@ pub trait Engine {
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds the owner and barycentric coordinates of each point.
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
+    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
-    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
+    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
     /// Builds a tree over a mesh and finds the place of its surface that is closest to each point, at most `within` away.
-    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
     /// Builds a tree over each of two meshes and finds where they overlap.
-    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>>;
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>>;
     /// Builds a tree over a mesh and draws a field.
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
+    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>>;
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>>;
 }
 
 /// Figures about a mesh and its tree.

@@ -5,7 +5,7 @@ use crate::engine::{self, Engine, OnProgress};
 use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{InBlocks, Points};
+use olbvh::blocks::{InBlocks, LocateRequest};
 use olbvh::formats::{
     LoadOptions, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json, write_located,
     write_npy,
@@ -129,7 +129,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
     let method = if args.coherent { LocateMethod::Descent } else { LocateMethod::Suited };
-    let asked = Points { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
+    let asked = LocateRequest { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);
     let start = Instant::now();
@@ -195,7 +195,7 @@ fn probed(path: &Path, points: usize) -> Option<Mesh> {
 /// 0 in the mesh, NaN if nothing is so near.
 fn beside(
     engine: &dyn Engine,
-    asked: &Points<'_>,
+    asked: &LocateRequest<'_>,
     located: &mut query::Located,
     within: f32,
     memory: Option<u64>,
@@ -207,7 +207,7 @@ fn beside(
     if points.is_empty() {
         return Ok(distances);
     }
-    let (nearest, _) = engine.nearest(&Points { points: &points, ..*asked }, within, memory, report)?.into_parts();
+    let (nearest, _) = engine.nearest(&LocateRequest { points: &points, ..*asked }, within, memory, report)?.into_parts();
     for (k, (&i, distance)) in outside.iter().zip(nearest.distances()).enumerate() {
         (located.owners[i], located.barycentrics[i], distances[i]) = (nearest.owners[k], nearest.barycentrics[k], distance);
     }

@@ -7,7 +7,7 @@ use crate::input::{self, MemoryArgs, TreeArgs};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, milliseconds};
 use glam::{DQuat, DVec3};
-use olbvh::blocks::{InBlocks, Meshes};
+use olbvh::blocks::{InBlocks, OverlapRequest};
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Bounds, Field, Mesh, On, is_usable, valid_grid};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
@@ -63,7 +63,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut b = args.tree.mesh(&args.b, common)?.mesh;
     pose(&mut b, &a, args)?;
     let progress = Progress::new(common, "overlap");
-    let asked = Meshes { meshes: [&a, &b], options, pairs: args.pairs };
+    let asked = OverlapRequest { meshes: [&a, &b], options, pairs: args.pairs };
     let start = Instant::now();
     let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;

@@ -8,7 +8,7 @@ use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{Picture, View};
+use olbvh::blocks::{Picture, RenderRequest};
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
@@ -153,7 +153,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
-    let asked = View { mesh: &loaded.mesh, options, field: &field, settings: &settings };
+    let asked = RenderRequest { mesh: &loaded.mesh, options, field: &field, settings: &settings };
     let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     let Picture { mut rendered, plan, range: [lo, hi] } = picture;
     let (mut pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);

@@ -8,7 +8,7 @@ use crate::output::{self, Progress};
 use crate::slice_output::{Appearance, Layers, layer_file, materials};
 use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
-use olbvh::blocks::{InBlocks, Stack};
+use olbvh::blocks::{InBlocks, SliceRequest};
 use olbvh::formats::{OutputFormat, printable};
 use olbvh::mesh::{Bounds, Field, On, valid_grid};
 use olbvh::options::Fineness;
@@ -124,7 +124,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "slicing");
     let start = Instant::now();
     let mut sink = |band: Band| layers.band(band);
-    let asked = Stack { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
+    let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
     let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
     let (tally, took) = sliced.into_parts();
     layers.finish()?;

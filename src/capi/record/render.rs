@@ -7,7 +7,7 @@ use crate::capi::query::OlbvhPictureSettings;
 use crate::capi::{OlbvhStatus, border, handle, put};
 use crate::error::Result;
 use crate::gpu::Arena;
-use crate::layout::RenderView;
+use crate::layout::ViewUniforms;
 use crate::mesh::Bounds;
 use crate::query::{RenderInput, RenderMemory, Scene, Visibility, cmd_render};
 use crate::render::{Plan, ProjectedView};
@@ -31,7 +31,7 @@ pub struct OlbvhView {
 }
 
 // The view of a picture must fit, since it is copied as far as there is room.
-const _: () = assert!(size_of::<RenderView>() <= size_of::<[u32; 64]>());
+const _: () = assert!(size_of::<ViewUniforms>() <= size_of::<[u32; 64]>());
 
 /// What is drawn, and where. The contents of the buffers are read when the commands are executed, so a new view or new
 /// values need no new recording.

@@ -4,7 +4,7 @@ use super::pictures::pictures;
 use super::*;
 use crate::capi::query::*;
 use crate::gpu::Buffer;
-use crate::layout::{NearState, RenderView};
+use crate::layout::{NearState, ViewUniforms};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
@@ -139,7 +139,7 @@ fn projected(settings: &OlbvhPictureSettings) {
     for (view, reversed) in views.iter().zip([false, true]) {
         let (view, bounds) = (&view.frame, Bounds { lo: LO, hi: HI });
         let plan = Plan::with_projected(&settings.read().unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None).unwrap();
-        assert_eq!(bytemuck::cast_slice::<u32, u8>(&view[..size_of::<RenderView>() / 4]), bytemuck::bytes_of(&plan.view()));
+        assert_eq!(bytemuck::cast_slice::<u32, u8>(&view[..size_of::<ViewUniforms>() / 4]), bytemuck::bytes_of(&plan.view()));
     }
     assert!(views[0].frame != views[1].frame);
     let mut none = std::mem::MaybeUninit::uninit();

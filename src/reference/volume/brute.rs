@@ -1,7 +1,7 @@
 //! The oracle for the renderers: it uses another camera formula, tests every tetrahedron at every sample in double
 //! precision, and has neither tree nor table.
 
-use super::Scene;
+use super::Drawing;
 use crate::mesh::{Bounds, On};
 use crate::render::shading::SKIN;
 use crate::render::{OPACITY_UNIT, Projection, RenderSettings, Shade};
@@ -17,7 +17,7 @@ struct Cell {
 
 /// Draws what [`super::render`] should draw for `settings`, in time proportional to samples × tetrahedra, as straight
 /// RGBA. The transfer function of `settings` must have opacities. Only size, clips and light are taken from the scene's plan.
-pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
+pub fn brute_force(scene: &Drawing<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
     let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.range(), &scene.prepared.camera);
     let [width, height] = plan.size.map(f64::from);
     let diagonal = bounds.diagonal();
@@ -94,7 +94,7 @@ pub fn brute_force(scene: &Scene<'_>, settings: &RenderSettings, bounds: &Bounds
 }
 
 /// The valid tetrahedra that have a volume.
-fn cells(scene: &Scene<'_>) -> Vec<Cell> {
+fn cells(scene: &Drawing<'_>) -> Vec<Cell> {
     let cell = |(id, ids): (usize, &[u32; 4])| {
         let [a, b, c, d] = ids.map(|i| DVec3::from_array(scene.mesh.points[i as usize].map(f64::from)));
         let edges = DMat3::from_cols(b - a, c - a, d - a);
@@ -128,14 +128,14 @@ fn mix(b: [f64; 4], v: [f32; 4]) -> f64 {
     (0..4).map(|i| b[i] * f64::from(v[i])).sum()
 }
 
-fn value_at(scene: &Scene<'_>, cell: &Cell, b: [f64; 4]) -> f64 {
+fn value_at(scene: &Drawing<'_>, cell: &Cell, b: [f64; 4]) -> f64 {
     match scene.field.on {
         On::Points => mix(b, scene.mesh.tets[cell.id].map(|i| scene.field.values[i as usize])),
         On::Cells => f64::from(scene.field.values[cell.id]),
     }
 }
 
-fn normal_at(scene: &Scene<'_>, cell: &Cell, b: [f64; 4]) -> DVec3 {
+fn normal_at(scene: &Drawing<'_>, cell: &Cell, b: [f64; 4]) -> DVec3 {
     let of = |c: usize| scene.mesh.tets[cell.id].map(|i| scene.prepared.normals.get(i as usize).map_or(0.0, |n| n[c]));
     DVec3::new(mix(b, of(0)), mix(b, of(1)), mix(b, of(2)))
 }

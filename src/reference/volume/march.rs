@@ -1,6 +1,6 @@
 //! Marching: takes the samples of a ray, front to back.
 
-use super::Scene;
+use super::Drawing;
 use super::skip::{Skips, inverse_of};
 use crate::grid::{canonical, per_axis, reciprocal};
 use crate::reference::tet::Sides;
@@ -12,7 +12,7 @@ const WALK: u32 = 6;
 
 /// Marches rays, one after the other.
 pub struct Marcher<'a> {
-    scene: &'a Scene<'a>,
+    scene: &'a Drawing<'a>,
     plan: &'a Plan,
     /// The tetrahedron of the last sample, if it lay in one. After a gap the tree is searched first.
     cell: Option<u32>,
@@ -65,7 +65,7 @@ impl Gathered<'_> {
 
 impl<'a> Marcher<'a> {
     /// A marcher for any rays of the scene.
-    pub fn new(scene: &'a Scene<'a>) -> Self {
+    pub fn new(scene: &'a Drawing<'a>) -> Self {
         Self { scene, plan: scene.plan(), cell: None, samples: 0, skipped_samples: 0, found_samples: 0 }
     }
 

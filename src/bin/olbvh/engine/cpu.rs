@@ -1,7 +1,7 @@
 //! The engine that computes on the CPU with the reference implementation.
 
 use super::{Engine, OnProgress, Sink, Summary};
-use olbvh::blocks::{InBlocks, Meshes, Picture, Points, Stack, View};
+use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::error::{Error, Result};
 use olbvh::mesh::Mesh;
 use olbvh::options::{BuildOptions, POINT_CHUNK, POINT_CODE_BITS};
@@ -13,7 +13,7 @@ use olbvh::reference::nearest::Surface;
 use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
-use olbvh::reference::volume::{self, Scene};
+use olbvh::reference::volume::{self, Drawing};
 use olbvh::slicing::{BAND_VOXELS, Tally, bands};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
@@ -64,18 +64,18 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
         on_host(asked.mesh, &asked.options, memory, |tree| Ok(tree.locate(asked.points, &asked.how, report)))
     }
 
-    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
             Ok(each(asked.points, |p| locator.owners(p), report))
         })
     }
 
-    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
             let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report);
@@ -88,7 +88,7 @@ impl Engine for Cpu {
         })
     }
 
-    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
         no_memory(memory)?;
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
@@ -103,16 +103,16 @@ impl Engine for Cpu {
         Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
+    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
-            let scene = Scene::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
+            let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
             let volume::Picture { colors, stats } = volume::render(&scene, report);
             Ok(Picture { rendered: Rendered { colors, stats }, plan: scene.plan().clone(), range: scene.range() })
         })
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
-        let Stack { field, voxels, extrapolate, .. } = *asked;
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
+        let SliceRequest { field, voxels, extrapolate, .. } = *asked;
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
             let (mut tally, mut done) = (Tally::default(), 0);
@@ -214,7 +214,7 @@ mod tests {
             owners.extend(band.owners);
             Ok(())
         };
-        Cpu.slice(&Stack { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| (), &mut sink)?;
+        Cpu.slice(&SliceRequest { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| (), &mut sink)?;
         let CpuTree { topology, tree, .. } = &CpuTree::new(mesh, &options)?;
         let whole = Slicer::new(mesh, topology, tree, None, *voxels, extrapolate)?.band(Rows { layer: 0, first: 0, count: 130 });
         assert!(owners == whole.owners, "{} owners differ", owners.iter().zip(&whole.owners).filter(|(a, b)| a != b).count());

@@ -2,7 +2,7 @@
 
 use super::{Engine, OnProgress, Shapes, Sink, Summary};
 use crate::common::{Common, Outcome};
-use olbvh::blocks::{self, InBlocks, Meshes, Picture, Points, Stack, View};
+use olbvh::blocks::{self, InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions, StageTime};
@@ -88,28 +88,28 @@ impl Engine for Device {
         })
     }
 
-    fn locate(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
+    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
         blocks::locate(&self.0, self.memory(memory), asked, None, report)
     }
 
-    fn locate_all(&self, asked: &Points<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
         blocks::locate_all(&self.0, self.memory(memory), asked, report)
     }
 
-    fn nearest(&self, asked: &Points<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
+    fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
         blocks::nearest(&self.0, self.memory(memory), asked, within, report)
     }
 
-    fn overlap(&self, asked: &Meshes<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
         let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.into_parts();
         Ok(took.with(found.overlap))
     }
 
-    fn render(&self, asked: &View<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
+    fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         blocks::render(&self.0, self.memory(memory), asked, report)
     }
 
-    fn slice(&self, asked: &Stack<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
         blocks::slice(&self.0, self.memory(memory), asked, report, sink)
     }
 }

@@ -3,7 +3,7 @@
 use crate::arguments::named;
 use crate::common::{Common, Failure, Outcome};
 use olbvh::gpu::DeviceReport;
-use olbvh::kernels::{Row, Target};
+use olbvh::kernels::{DeviceClass, Target};
 use olbvh::tune::{Profile, Search, folder};
 use std::path::{Path, PathBuf};
 
@@ -36,7 +36,7 @@ impl Shapes {
         if let Some((wanted, named_by)) = common.wanted_target() {
             return Wanted::read(&wanted).and_then(|wanted| wanted.on(device)).map_err(|failure| failure.about(named_by));
         }
-        let kind = || Self { target: Row::of(device).target(&device.room), origin: Origin::Kind };
+        let kind = || Self { target: DeviceClass::of(device).target(&device.room), origin: Origin::Kind };
         let Some(folder) = folder().filter(|_| !common.no_profile) else { return Ok(kind()) };
         Ok(match Profile::find(&folder, device) {
             Search::Found(path, profile) => Self { target: profile.target, origin: Origin::Profile(path) },
@@ -58,7 +58,7 @@ impl Shapes {
 /// A target that was asked for.
 enum Wanted {
     /// A built-in row.
-    Row(Row),
+    Row(DeviceClass),
     /// The target of a profile in a file.
     File(PathBuf, Target),
 }
@@ -66,7 +66,7 @@ enum Wanted {
 impl Wanted {
     /// The built-in row with this name, or the profile in this file.
     fn read(wanted: &str) -> Outcome<Self> {
-        match named::<Row>(wanted) {
+        match named::<DeviceClass>(wanted) {
             Ok(row) => Ok(Self::Row(row)),
             // This is a misspelt name, not a file.
             Err(error) if !wanted.contains(['.', '/', '\\']) && !Path::new(wanted).exists() => {
