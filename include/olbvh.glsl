@@ -42,7 +42,7 @@ const uint olbvh_NONE = OLBVH_NONE;
 // Records of four words are read as they are. Kernels of the library can also read them as two 64-bit words.
 uvec4 olbvh_words(uvec4 record) { return record; }
 vec4 olbvh_floats(vec4 record) { return record; }
-// The structs by which shaders of other programs know a tree; all others are in layout.glsl.
+// The structs by which shaders of other programs, too, know a tree.
 
 // The grid of a mesh (SPEC 2.1).
 struct olbvh_Grid {

@@ -24,42 +24,34 @@
 //!
 //! # In your own renderer
 //! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], exported
-//! here like [`glam`]). At start-up, compute the sizes ([`gpu::Arena::measure`] runs a `carve` function without memory),
-//! create one buffer, and run the same `carve` over it. Then record the commands in every frame.
+//! here like [`glam`]). At start-up, ask for the sizes, create buffers, and have them divided. Then record the commands in
+//! every frame.
 //! ```no_run
-//! use olbvh::{build::*, gpu::{Arena, Buffer, BufferRef, Gpu, Recorder}, options::BuildOptions, query::*, Result};
-//!
-//! struct Frame { input: MeshInput, arrays: MeshArrays, scratch: MeshScratch, tree: TreeMemory, build_scratch: BuildScratch, memory: Buffer }
+//! use olbvh::{build::{PlacedScene, ScenePlan}, gpu::{BufferRef, Gpu, Recorder}, query::*, Result};
 //!
 //! /// `positions`: three floats per point; `cells`: four indices per tetrahedron. Either buffer is yours.
-//! fn plan(gpu: &Gpu, (positions, points): (BufferRef, u32), (cells, tets): (BufferRef, u32)) -> Result<Frame> {
-//!     let capacity = Capacity::usual(tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
-//!     let carve = |a: &mut Arena| {
-//!         let (arrays, scratch) = (MeshArrays::carve(a, points, tets)?, MeshScratch::carve(a, points, tets)?);
-//!         let tree = TreeMemory::carve(a, &capacity, &BuildOptions::default())?;
-//!         Ok((arrays, scratch, tree, BuildScratch::carve(gpu, a, tets, &capacity, &BuildOptions::default())?))
-//!     };
-//!     let memory = gpu.buffer("olbvh.frame.memory", Arena::measure(carve)?)?;
-//!     let (arrays, scratch, tree, build_scratch) = carve(&mut Arena::new(memory.all()))?;
-//!     let input = MeshInput { positions, stride: 3, points, cells, tets };
-//!     Ok(Frame { input, arrays, scratch, tree, build_scratch, memory })
+//! fn place(gpu: &Gpu, (positions, points): (BufferRef, u32), (cells, tets): (BufferRef, u32)) -> Result<PlacedScene> {
+//!     let plan = ScenePlan::usual(points, tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
+//!     let bytes = plan.bytes(gpu)?;
+//!     let [memory, scratch]: [BufferRef; 2] = todo!("buffers of yours of {} and {} bytes", bytes.memory, bytes.scratch);
+//!     plan.place(gpu, positions, cells, memory, scratch)
 //! }
 //!
 //! /// Records into your command buffer; `r` comes from `Recorder::new(&gpu, commands, None)`, which is unsafe.
-//! fn record(r: &mut Recorder, frame: &Frame, asked: &PointInput, found: &LocateOutput) -> Result<()> {
+//! fn record(r: &mut Recorder, placed: &PlacedScene, first: bool, asked: &PointInput, found: &LocateOutput) -> Result<()> {
 //!     // For the compute shaders and transfers of the frame before, which `r` does not see. If a draw of that frame reads
 //!     // this memory, its stage needs a barrier of yours.
 //!     r.barrier("frame before → mesh");
-//!     cmd_prepare_mesh(r, &frame.input, &frame.arrays, &frame.scratch)?; // positions must be visible to compute shaders
-//!     r.barrier("mesh → tree");
-//!     let mesh = MeshView { input: frame.input, arrays: frame.arrays };
-//!     cmd_build(r, &mesh, &frame.tree, &BuildOptions::default(), &frame.build_scratch)?; // ends with a barrier
-//!     let scene = Scene::recorded(mesh, frame.tree);
-//!     cmd_locate(r, &scene, asked, found, &LocateOptions::default())
+//!     // Positions must be visible to compute shaders. Either ends with a barrier.
+//!     if first { placed.cmd_build(r)? } else { placed.cmd_rebuild(r)? }
+//!     cmd_locate(r, &Scene::recorded(placed.mesh, placed.tree), asked, found, &LocateOptions::default())
 //! } // then a barrier from compute writes to the reader of `found`, and `Recorder::finish`
 //! ```
-//! - **Moved points**: after the first frame, [`build::cmd_move_mesh`] in place of [`build::cmd_prepare_mesh`] spares the
-//!   search for neighbours, most of stage 0.
+//! Other memory is divided likewise: [`gpu::Arena::measure`] runs a `carve` function, such as
+//! [`query::RenderMemory::carve`], without memory, and an arena over a buffer of that size runs it again.
+//!
+//! - **Moved points**: after the first frame, [`build::PlacedScene::cmd_rebuild`] spares the search for neighbours, most of
+//!   the preparation of a mesh.
 //! - **Your scene**: draw what is opaque, copy the depth attachment to a buffer (a `D32_SFLOAT` as it is, with a barrier from
 //!   the transfer to compute shaders), and record [`query::cmd_render`] with it ([`query::RenderInput::depth`]) and with the
 //!   view of your matrix ([`render::Plan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over

@@ -5,13 +5,10 @@ use anyhow::{Context, Result};
 use ash::vk;
 use glam::Vec3;
 use gpu_allocator::MemoryLocation;
-use olbvh::build::{
-    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
-};
+use olbvh::build::{PlacedScene, ScenePlan};
 use olbvh::glsl::SceneBuffers;
-use olbvh::gpu::{Arena, BufferRef, Gpu, Recorder, USAGE};
+use olbvh::gpu::{BufferRef, Gpu, Recorder, USAGE};
 use olbvh::mesh::Mesh;
-use olbvh::options::BuildOptions;
 use std::path::Path;
 
 /// What each frame in flight has of its own.
@@ -21,8 +18,7 @@ pub struct Deformed {
     pub tree: HostBuffer,
     pub set: Option<vk::DescriptorSet>,
     memory: HostBuffer,
-    mesh: MeshView,
-    arrays: TreeMemory,
+    scene: PlacedScene,
 }
 
 pub struct Body {
@@ -36,9 +32,6 @@ pub struct Body {
     pub slots: Vec<Deformed>,
     cells: HostBuffer,
     scratch: HostBuffer,
-    mesh_scratch: MeshScratch,
-    build_scratch: BuildScratch,
-    options: BuildOptions,
     sets: Option<(vk::DescriptorPool, vk::DescriptorSetLayout)>,
 }
 
@@ -75,45 +68,24 @@ impl Body {
 
         // Sizes come first: those that most trees need. If the tree of a deformed body needs more, the device builds a
         // coarser one.
-        let options = BuildOptions::default();
-        let capacity = Capacity::usual(tets, 7);
-        let carve_slot = |a: &mut Arena| Ok((MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?));
-        let carve_scratch =
-            |a: &mut Arena| Ok((MeshScratch::carve(a, points, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?));
+        let plan = ScenePlan::usual(points, tets, 7);
+        let bytes = plan.bytes(gpu)?;
         let device_buffer = |name: &str, size| host.buffer(name, size, USAGE, MemoryLocation::GpuOnly);
-        let scratch = device_buffer("scratch", Arena::measure(carve_scratch)?)?;
-        let (mesh_scratch, build_scratch) = carve_scratch(&mut Arena::new(scratch.part()))?;
+        let scratch = device_buffer("scratch", bytes.scratch)?;
         let sets = if host.addresses { None } else { Some(descriptor_pool(host, slots)?) };
         let slots = (0..slots).map(|_| {
             let positions = host.filled("positions", &mesh.points, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
-            let memory = device_buffer("tree", Arena::measure(carve_slot)?)?;
-            let (mesh_arrays, arrays) = carve_slot(&mut Arena::new(memory.part()))?;
-            let input = MeshInput { positions: positions.part(), stride: 3, points, cells: cells.part(), tets };
-            let view = MeshView { input, arrays: mesh_arrays };
-            let buffers = SceneBuffers::new(&view, &arrays, Some(values.part()));
+            let memory = device_buffer("tree", bytes.memory)?;
+            let scene = plan.place(gpu, positions.part(), cells.part(), memory.part(), scratch.part())?;
+            let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, Some(values.part()));
             let tree = host.filled("addresses", &[buffers.addresses()], USAGE)?;
             let set = sets.map(|(pool, layout)| descriptor_set(host, pool, layout, &buffers.list(tree.part()))).transpose()?;
-            Ok(Deformed { positions, tree, set, memory, mesh: view, arrays })
+            Ok(Deformed { positions, tree, set, memory, scene })
         });
         let slots = slots.collect::<Result<Vec<_>>>()?;
         let (centre, radius) = ((low + high) * 0.5, (high - low).length() * 0.5);
         let indices = faces.len() as u32;
-        Ok(Self {
-            mesh,
-            tets,
-            centre,
-            radius,
-            values,
-            triangles,
-            indices,
-            slots,
-            cells,
-            scratch,
-            mesh_scratch,
-            build_scratch,
-            options,
-            sets,
-        })
+        Ok(Self { mesh, tets, centre, radius, values, triangles, indices, slots, cells, scratch, sets })
     }
 
     pub fn set_layout(&self) -> Option<vk::DescriptorSetLayout> {
@@ -134,16 +106,13 @@ impl Body {
         self.slots[slot].positions.write(&moved);
     }
 
-    /// Records stage 0 and the construction of a slot's tree. Which tetrahedra are neighbours is found out in the
+    /// Records the construction of a slot's tree. Which tetrahedra are neighbours is found out in the
     /// slot's first frame only: it stays so, however the body moves.
     pub fn record(&self, r: &mut Recorder<'_>, slot: usize, first: bool) -> olbvh::Result<()> {
-        let Deformed { mesh, arrays, .. } = &self.slots[slot];
+        let scene = &self.slots[slot].scene;
         // The frame before used the same scratch memory.
         r.barrier("frame.before → frame.mesh");
-        let prepare = if first { cmd_prepare_mesh } else { cmd_move_mesh };
-        prepare(r, &mesh.input, &mesh.arrays, &self.mesh_scratch)?;
-        r.barrier("frame.mesh → frame.tree");
-        cmd_build(r, mesh, arrays, &self.options, &self.build_scratch)
+        if first { scene.cmd_build(r) } else { scene.cmd_rebuild(r) }
     }
 
     pub fn free(self, host: &Host) {

@@ -5,7 +5,7 @@ use anyhow::{Context, Result, bail};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
-use std::ffi::{CStr, c_void};
+use std::ffi::c_void;
 use std::sync::{Arc, Mutex};
 
 /// Messages of a validation layer, if one is loaded.
@@ -76,7 +76,7 @@ impl Host {
             }
             let (addresses, size_control) = (addresses && wanted.buffer_addresses, wanted.subgroup_size_control);
             let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-            let names: Vec<_> = wanted.extensions_without_rays().map(CStr::as_ptr).collect();
+            let names: Vec<_> = wanted.extensions.iter().map(|name| name.as_ptr()).collect();
             let mut address = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(addresses);
             let mut control =
                 vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);

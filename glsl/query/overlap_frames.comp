@@ -4,7 +4,7 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-ARGUMENTS(8)
+ARGUMENTS(10)
     uint tets_a;
     uint tets_b;
 END_ARGUMENTS
@@ -12,10 +12,12 @@ BUFFER16(0, readonly, Grid, grid_a)
 BUFFER16(1, readonly, Grid, grid_b)
 BUFFER(2, readonly, MeshStatus, mesh_a)
 BUFFER(3, readonly, MeshStatus, mesh_b)
-BUFFER16(4, writeonly, NodeFrame, frame_a)
-BUFFER16(5, writeonly, NodeFrame, frame_b)
-BUFFER(6, READ_WRITE, OverlapStatus, status_a)
-BUFFER(7, READ_WRITE, OverlapStatus, status_b)
+BUFFER(4, readonly, BuildStatus, tree_a)
+BUFFER(5, readonly, BuildStatus, tree_b)
+BUFFER16(6, writeonly, NodeFrame, frame_a)
+BUFFER16(7, writeonly, NodeFrame, frame_b)
+BUFFER(8, READ_WRITE, OverlapStatus, status_a)
+BUFFER(9, READ_WRITE, OverlapStatus, status_b)
 
 NodeFrame frame_of(Grid g, Grid joint) {
     NodeFrame f;
@@ -38,7 +40,8 @@ NodeFrame frame_of(Grid g, Grid joint) {
 void main() {
     if (item_index() > 0u) return;
     Grid a = grid_a.at[0], b = grid_b.at[0], joint = a;
-    uint empty = uint(mesh_a.at[0].bad == tets_a || mesh_b.at[0].bad == tets_b);
+    bool none = mesh_a.at[0].bad == tets_a || mesh_b.at[0].bad == tets_b;
+    uint empty = uint(none || tree_a.at[0].overflow != 0u || tree_b.at[0].overflow != 0u);
     status_a.at[0].empty = empty;
     status_b.at[0].empty = empty;
     float largest = two_to(-103);

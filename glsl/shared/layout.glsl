@@ -185,7 +185,7 @@ struct OverlapStatus {
     uint unfilled;   // Tetrahedra whose pairs need another dispatch to be written; not 0 while pairs are counted.
     uint narrow[2];  // Tests of two tetrahedra by separating axes.
     uint pairs[2];   // Pairs that touch.
-    uint empty;      // Not 0: one of the meshes has no valid tetrahedron, so nothing intersects.
+    uint empty;      // Not 0: nothing intersects, since a mesh has no valid tetrahedron, or a tree did not fit its capacity.
     uint pad;        // Unused.
 };
 

@@ -21,6 +21,7 @@ mod mesh;
 mod plan;
 mod prepare;
 mod ranges;
+mod scene;
 mod stages;
 mod tree;
 
@@ -35,6 +36,7 @@ pub(crate) use prepare::check_points;
 pub use prepare::{MAX_TETS, MeshArrays, MeshInput, MeshScratch, MeshView, cmd_move_mesh, cmd_prepare_mesh};
 pub(crate) use ranges::check_field;
 pub use ranges::{cmd_ranges, range_bytes};
+pub use scene::{PlacedScene, SceneBytes, ScenePlan};
 pub use tree::Tree;
 
 use crate::error::{Error, Result};

@@ -56,7 +56,7 @@ pub extern "C" fn olbvh_host_check(
             extension_count: 0,
             extensions: [null(); 4],
         };
-        for (name, place) in found.extensions_without_rays().zip(&mut told.extensions) {
+        for (name, place) in found.extensions.iter().zip(&mut told.extensions) {
             *place = name.as_ptr();
             told.extension_count += 1;
         }

@@ -143,7 +143,7 @@ impl Gpu {
 fn make_device(instance: &ash::Instance, physical: vk::PhysicalDevice, requirements: &Requirements) -> Result<ash::Device> {
     let (family, _) = requirements.queue_family.unwrap_or_default();
     let queues = [vk::DeviceQueueCreateInfo::default().queue_family_index(family).queue_priorities(&[1.0])];
-    let extensions: Vec<_> = requirements.extensions.iter().map(|e| e.as_ptr()).collect();
+    let extensions: Vec<_> = requirements.extensions.iter().chain(&requirements.ray_extensions).map(|e| e.as_ptr()).collect();
     let mut addresses = vk::PhysicalDeviceBufferDeviceAddressFeatures::default().buffer_device_address(true);
     let mut control = vk::PhysicalDeviceSubgroupSizeControlFeatures::default().subgroup_size_control(true).compute_full_subgroups(true);
     let core = vk::PhysicalDeviceFeatures::default().shader_int64(requirements.shader_int64);

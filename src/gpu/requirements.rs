@@ -8,9 +8,8 @@ use std::ffi::{CStr, c_char};
 /// Vendor id of Intel.
 pub(super) const INTEL: u32 = 0x8086;
 
-/// Extensions that are not for ray tracing. The second must be enabled on a device that does not implement all of
-/// Vulkan, such as MoltenVK's.
-const WITHOUT_RAYS: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
+/// Extensions of use. The second must be enabled on a device that does not implement all of Vulkan, such as MoltenVK's.
+const OF_USE: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
 
 /// Ways in which a device supports ray tracing; only a baseline uses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -33,9 +32,10 @@ impl RayTracing {
 pub struct Requirements {
     /// What the device lacks; empty if it meets the requirements.
     pub missing: Vec<String>,
-    /// Device extensions that the device supports of those that are of use, ray tracing for the baselines included. A host
-    /// enables [`Requirements::extensions_without_rays`].
+    /// Device extensions to enable: those of use that the device supports.
     pub extensions: Vec<&'static CStr>,
+    /// More extensions, for the ray tracing that the library's own measurements compare with.
+    pub ray_extensions: Vec<&'static CStr>,
     /// Whether buffers can be passed by address; otherwise descriptors are used.
     pub buffer_addresses: bool,
     /// Whether kernels can compute with 64-bit integers; a driver that runs on a processor then reads cells and
@@ -184,11 +184,6 @@ fn query_subgroup_of(usual: u32, least: u32, control: bool) -> u32 {
 }
 
 impl Requirements {
-    /// Device extensions to enable where no rays are traced, which only a baseline does.
-    pub fn extensions_without_rays(&self) -> impl Iterator<Item = &'static CStr> {
-        self.extensions.iter().copied().filter(|e| WITHOUT_RAYS.contains(e))
-    }
-
     /// Whether the driver may choose the size of subgroups.
     pub(super) fn sizes_vary(&self) -> bool {
         self.subgroup_sizes[0] != self.subgroup_sizes[2]
@@ -257,15 +252,13 @@ impl Requirements {
         } else {
             [subgroup.subgroup_size; 3]
         };
-        let mut extensions: Vec<_> = WITHOUT_RAYS.into_iter().filter(|e| has(e)).collect();
-        if ray_tracing.any() {
-            extensions.extend(for_structures);
-        }
-        extensions.extend(ray_tracing.queries.then_some(ash::khr::ray_query::NAME));
-        extensions.extend(ray_tracing.pipelines.then_some(ash::khr::ray_tracing_pipeline::NAME));
+        let mut ray_extensions = if ray_tracing.any() { for_structures.to_vec() } else { Vec::new() };
+        ray_extensions.extend(ray_tracing.queries.then_some(ash::khr::ray_query::NAME));
+        ray_extensions.extend(ray_tracing.pipelines.then_some(ash::khr::ray_tracing_pipeline::NAME));
         Self {
             missing,
-            extensions,
+            extensions: OF_USE.into_iter().filter(|e| has(e)).collect(),
+            ray_extensions,
             buffer_addresses: addresses.buffer_device_address != 0,
             shader_int64: core.shader_int64 != 0,
             subgroup_size_control,

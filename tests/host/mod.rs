@@ -96,8 +96,8 @@ impl Host {
             let mut ray_queries = vk::PhysicalDeviceRayQueryFeaturesKHR::default().ray_query(true);
             let mut ray_pipelines = vk::PhysicalDeviceRayTracingPipelineFeaturesKHR::default().ray_tracing_pipeline(true);
             let rays = if rays { needs.ray_tracing } else { RayTracing::default() };
-            let plain: Vec<_> = needs.extensions_without_rays().collect();
-            let extensions: Vec<_> = if rays.any() { &needs.extensions } else { &plain }.iter().map(|e| e.as_ptr()).collect();
+            let for_rays = if rays.any() { &needs.ray_extensions[..] } else { &[] };
+            let extensions: Vec<_> = needs.extensions.iter().chain(for_rays).map(|e| e.as_ptr()).collect();
             let mut info =
                 vk::DeviceCreateInfo::default().queue_create_infos(&queues).push_next(&mut addresses).enabled_extension_names(&extensions);
             let core = vk::PhysicalDeviceFeatures::default().shader_int64(needs.shader_int64);

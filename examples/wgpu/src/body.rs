@@ -1,10 +1,9 @@
 //! The body: a mesh that wgpu moves, the arrays of olbvh for it, and the pixels of a cut through it.
 
 use anyhow::{Context, Result};
-use olbvh::build::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh};
-use olbvh::gpu::{Arena, Buffer, Gpu, Recorder};
+use olbvh::build::{PlacedScene, ScenePlan};
+use olbvh::gpu::{Buffer, Gpu, Recorder};
 use olbvh::mesh::{Mesh, On};
-use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, LocateOutput, PointInput, Scene, cmd_interpolate, cmd_locate};
 
 /// The size of the picture. Its rows are multiples of 256 bytes, as wgpu copies them.
@@ -20,14 +19,11 @@ pub struct Body {
     pub field: Vec<f32>,
     pub centre: [f32; 3],
     pub radius: f32,
-    scene: Scene,
-    mesh_scratch: MeshScratch,
-    build_scratch: BuildScratch,
-    options: BuildOptions,
+    scene: PlacedScene,
     input: PointInput,
     output: LocateOutput,
-    /// Field, cells, places, and everything that olbvh computes.
-    held: [Buffer; 4],
+    /// Field, cells, places, and memory of olbvh.
+    held: [Buffer; 6],
 }
 
 impl Body {
@@ -56,35 +52,15 @@ impl Body {
 
         // Sizes come first: those that most trees need. If the tree of the moved body needs more, the device builds a
         // coarser one.
-        let (options, capacity) = (BuildOptions::default(), Capacity::usual(tets, 7));
-        let carve = |a: &mut Arena| {
-            let (arrays, tree) = (MeshArrays::carve(a, points, tets)?, TreeMemory::carve(a, &capacity, &options)?);
-            let (mesh, build) = (MeshScratch::carve(a, points, tets)?, BuildScratch::carve(gpu, a, tets, &capacity, &options)?);
-            Ok((arrays, tree, mesh, build, a.take(16 * pixels)?))
-        };
-        let memory = buffer("memory", Arena::measure(carve)?)?;
-        let (arrays, tree, mesh_scratch, build_scratch, barycentrics) = carve(&mut Arena::new(memory.all()))?;
-        let mesh = MeshView { input: MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets }, arrays };
-        let scene = Scene::recorded(mesh, tree);
+        let plan = ScenePlan::usual(points, tets, 7);
+        let bytes = plan.bytes(gpu)?;
+        let (memory, scratch) = (buffer("memory", bytes.memory)?, buffer("scratch", bytes.scratch)?);
+        let scene = plan.place(gpu, positions.all(), cells.all(), memory.all(), scratch.all())?;
+        let barycentrics = buffer("barycentrics", 16 * pixels)?;
         let input = PointInput { points: asked.all(), stride: 3, count: pixels as u32, hints: None, order: None };
-        let output = LocateOutput { owners: owners.all(), barycentrics };
-        let held = [on_device, cells, asked, memory];
-        Ok(Self {
-            positions,
-            owners,
-            values,
-            places,
-            field,
-            centre,
-            radius,
-            scene,
-            mesh_scratch,
-            build_scratch,
-            options,
-            input,
-            output,
-            held,
-        })
+        let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
+        let held = [on_device, cells, asked, memory, scratch, barycentrics];
+        Ok(Self { positions, owners, values, places, field, centre, radius, scene, input, output, held })
     }
 
     /// Records the work of olbvh in a frame. It reads the positions and writes owners and values, all in compute
@@ -93,12 +69,14 @@ impl Body {
         let Self { scene, input, output, .. } = self;
         // The frame before used the same memory.
         r.barrier("frame.before → frame.mesh");
-        let prepare = if first { cmd_prepare_mesh } else { cmd_move_mesh };
-        prepare(r, &scene.mesh.input, &scene.mesh.arrays, &self.mesh_scratch)?;
-        r.barrier("frame.mesh → frame.tree");
-        cmd_build(r, &scene.mesh, &scene.tree, &self.options, &self.build_scratch)?;
-        cmd_locate(r, scene, input, output, &LocateOptions::default())?;
+        if first {
+            scene.cmd_build(r)?
+        } else {
+            scene.cmd_rebuild(r)?
+        }
+        let scene = Scene::recorded(scene.mesh, scene.tree);
+        cmd_locate(r, &scene, input, output, &LocateOptions::default())?;
         r.barrier("frame.owners → frame.values");
-        cmd_interpolate(r, scene, self.held[0].all(), On::Points, output, self.values.all(), input.count)
+        cmd_interpolate(r, &scene, (self.held[0].all(), On::Points), output, self.values.all(), input.count)
     }
 }

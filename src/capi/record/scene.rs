@@ -1,15 +1,12 @@
 //! The C interface to a mesh and its tree in the host's memory, and to their construction.
 
 use super::{OlbvhBuffer, OlbvhRecording, recorded};
-use crate::build::{
-    BuildScratch, Capacity, MAX_ENTRIES, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh,
-    cmd_prepare_mesh,
-};
+use crate::build::{Capacity, MAX_ENTRIES, MeshArrays, PlacedScene, SceneBytes, ScenePlan};
 use crate::capi::{OlbvhBuildOptions, OlbvhGpu, OlbvhStatus, border, check_level, give, handle, put, release};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{ALIGNMENT, Arena, Gpu, Recorder};
-use crate::options::{BuildOptions, Lists, usual_capacity};
+use crate::gpu::{ALIGNMENT, Gpu, Recorder};
+use crate::options::{Lists, usual_capacity};
 use crate::query::Scene;
 
 /// Entries per tetrahedron for which there is room by default, if all leaves have full lists.
@@ -58,9 +55,7 @@ pub struct OlbvhPlanSizes {
 pub struct OlbvhScene {
     pub(super) gpu: Gpu,
     pub(super) scene: Scene,
-    options: BuildOptions,
-    mesh_scratch: MeshScratch,
-    build_scratch: BuildScratch,
+    placed: PlacedScene,
 }
 
 /// A scene to record with, which must lie on the device of the recording.
@@ -150,14 +145,9 @@ pub struct OlbvhMeshStatus {
     pub branched: u32,
 }
 
-/// A plan with its defaults resolved.
-struct Planned {
-    options: BuildOptions,
-    capacity: Capacity,
-}
-
 impl OlbvhPlan {
-    fn read(&self) -> Result<Planned> {
+    /// The plan with its defaults resolved.
+    fn read(&self) -> Result<ScenePlan> {
         let mut options = self.build.read()?;
         check_level(self.level)?;
         let level = if self.level == 0 { options.level.unwrap_or(DEFAULT_LEVEL) } else { self.level };
@@ -173,16 +163,8 @@ impl OlbvhPlan {
         };
         // The planned entries are the limit, not candidates, unless more of them are asked for than are usual.
         options.capacity = options.capacity.filter(|&entries| entries > usual);
-        Ok(Planned { options, capacity: capacity.with_candidates(self.tets, &options) })
-    }
-
-    fn memory(&self, arena: &mut Arena, planned: &Planned) -> Result<(MeshArrays, TreeMemory)> {
-        Ok((MeshArrays::carve(arena, self.points, self.tets)?, TreeMemory::carve(arena, &planned.capacity, &planned.options)?))
-    }
-
-    fn scratch(&self, gpu: &Gpu, arena: &mut Arena, planned: &Planned) -> Result<(MeshScratch, BuildScratch)> {
-        let Planned { options, capacity } = planned;
-        Ok((MeshScratch::carve(arena, self.points, self.tets)?, BuildScratch::carve(gpu, arena, self.tets, capacity, options)?))
+        let Self { points, stride, tets, .. } = *self;
+        Ok(ScenePlan { points, stride, tets, capacity: capacity.with_candidates(tets, &options), options })
     }
 }
 
@@ -191,14 +173,8 @@ impl OlbvhPlan {
 pub extern "C" fn olbvh_plan_measure(gpu: *const OlbvhGpu, plan: *const OlbvhPlan, out: *mut OlbvhPlanSizes) -> OlbvhStatus {
     border(|| {
         let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
-        let planned = plan.read()?;
-        let sizes = OlbvhPlanSizes {
-            memory: Arena::measure(|a| plan.memory(a, &planned))?,
-            scratch: Arena::measure(|a| plan.scratch(gpu, a, &planned))?,
-            alignment: ALIGNMENT,
-            usage: gpu.usage().as_raw(),
-        };
-        put(out, sizes)
+        let SceneBytes { memory, scratch } = plan.read()?.bytes(gpu)?;
+        put(out, OlbvhPlanSizes { memory, scratch, alignment: ALIGNMENT, usage: gpu.usage().as_raw() })
     })
 }
 
@@ -217,21 +193,11 @@ pub extern "C" fn olbvh_scene_place(
 ) -> OlbvhStatus {
     border(|| {
         let (gpu, plan) = (&handle(gpu, "gpu")?.0, handle(plan, "plan")?);
-        let OlbvhPlan { points, stride, tets, .. } = *plan;
-        let needed = ((u64::from(stride) * u64::from(points.saturating_sub(1)) + 3).saturating_mul(4), 16 * u64::from(tets));
-        if positions.size < needed.0 || cells.size < needed.1 {
-            let text =
-                format!("{} bytes of positions and {} of cells; the plan has {} and {}", positions.size, cells.size, needed.0, needed.1);
-            return Err(Error::Invalid(text));
-        }
         let (positions, cells) = (positions.aligned("positions")?, cells.aligned("cells")?);
-        let planned = plan.read()?;
-        let (arrays, tree) = plan.memory(&mut Arena::new(memory.part()), &planned)?;
-        let (mesh_scratch, build_scratch) = plan.scratch(gpu, &mut Arena::new(scratch.part()), &planned)?;
-        let input = MeshInput { positions, stride, points, cells, tets };
-        let longest_leaf = if plan.longest_leaf == 0 { tets } else { plan.longest_leaf };
-        let scene = Scene { mesh: MeshView { input, arrays }, tree, longest_leaf };
-        give(out, OlbvhScene { gpu: gpu.clone(), scene, options: planned.options, mesh_scratch, build_scratch })
+        let placed = plan.read()?.place(gpu, positions, cells, memory.part(), scratch.part())?;
+        let scene = Scene::recorded(placed.mesh, placed.tree);
+        let longest_leaf = if plan.longest_leaf == 0 { scene.longest_leaf } else { plan.longest_leaf };
+        give(out, OlbvhScene { gpu: gpu.clone(), scene: Scene { longest_leaf, ..scene }, placed })
     })
 }
 
@@ -262,7 +228,7 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
 /// `olbvh_cmd_barrier`.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
-    build(recording, scene, cmd_prepare_mesh)
+    recorded(recording, |r| scene_on(r, scene, "scene")?.placed.cmd_build(r))
 }
 
 /// As `olbvh_cmd_build`, for positions that have changed since a tree of the scene was built: neighbours, whose search
@@ -270,17 +236,5 @@ pub extern "C" fn olbvh_cmd_build(recording: *mut OlbvhRecording, scene: *const 
 /// bad, see `olbvh_mesh_status.bad`, has no neighbours until the next `olbvh_cmd_build`; no point is lost.
 #[unsafe(no_mangle)]
 pub extern "C" fn olbvh_cmd_rebuild(recording: *mut OlbvhRecording, scene: *const OlbvhScene) -> OlbvhStatus {
-    build(recording, scene, cmd_move_mesh)
-}
-
-/// One of the two functions of stage 0.
-type Prepare = fn(&mut Recorder<'_>, &MeshInput, &MeshArrays, &MeshScratch) -> Result<()>;
-
-fn build(recording: *mut OlbvhRecording, scene: *const OlbvhScene, prepare: Prepare) -> OlbvhStatus {
-    recorded(recording, |r| {
-        let OlbvhScene { scene, options, mesh_scratch, build_scratch, .. } = scene_on(r, scene, "scene")?;
-        prepare(r, &scene.mesh.input, &scene.mesh.arrays, mesh_scratch)?;
-        r.barrier("scene.mesh → scene.tree");
-        cmd_build(r, &scene.mesh, &scene.tree, options, build_scratch)
-    })
+    recorded(recording, |r| scene_on(r, scene, "scene")?.placed.cmd_rebuild(r))
 }

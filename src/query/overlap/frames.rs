@@ -43,6 +43,8 @@ impl Frames {
             grid_b: b.tree.grid,
             mesh_a: a.mesh.arrays.status,
             mesh_b: b.mesh.arrays.status,
+            tree_a: a.tree.status,
+            tree_b: b.tree.status,
             frame_a: self.of[0],
             frame_b: self.of[1],
             status_a: self.status[0],
