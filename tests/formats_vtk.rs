@@ -66,6 +66,16 @@ fn empty_lines_before_the_coding_of_legacy_files() {
     assert_eq!(open_bytes("lines.vtk", replace("binary.vtk", b"BINARY", b"\nBINARY ")).mesh.tets.len(), 6);
 }
 
+/// Text files have them as fractions of 255, binary files as they are.
+#[test]
+fn bytes_that_are_the_active_scalars() {
+    let fractions = "COLOR_SCALARS c 1\n0 0.00392157 0.00784314 0.0117647 0.0156863 0.0196078\n";
+    is_whole("colours.vtk", replace("ascii.vtk", b"SCALARS c int 1\nLOOKUP_TABLE default\n0 1 2 3 4 5\n", fractions.as_bytes()));
+    let shorts: Vec<u8> = (0..6i16).flat_map(i16::to_be_bytes).collect();
+    let old = [b"SCALARS c short\nLOOKUP_TABLE default\n", shorts.as_slice()].concat();
+    is_whole("colours.vtk", replace("binary.vtk", &old, b"COLOR_SCALARS c 1\n\x00\x01\x02\x03\x04\x05"));
+}
+
 #[test]
 fn parametric_volumes_are_missed() {
     let report = open_bytes("odd.vtk", replace("ascii.vtk", b"CELL_TYPES 6\n10", b"CELL_TYPES 6\n55")).report;

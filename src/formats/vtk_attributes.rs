@@ -43,9 +43,13 @@ impl Reader<'_> {
             let values = self.typed(&name, n * components)?;
             return Ok(values.map(|values| (name, components, values)).into_iter().collect());
         }
-        // Colours are bytes in binary files and fractions in text files.
+        // Colours are bytes in binary files and fractions of 255 in text files. VTK writes any bytes so that are the active
+        // scalars, such as the numbers of materials.
         let scalar = Some(if self.binary { Scalar::U8 } else { Scalar::F32 });
-        let values = self.values(scalar, n * components, &value_of(&name))?;
+        let mut values: Vec<f32> = self.values(scalar, n * components, &value_of(&name))?;
+        if !self.binary {
+            values.iter_mut().for_each(|value| *value = (*value * 255.0).round());
+        }
         Ok(vec![(name, components, values)])
     }
 
