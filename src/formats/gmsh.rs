@@ -39,16 +39,30 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
         let name = name.as_slice();
         match (name, version) {
             (b"MeshFormat", None) => version = Some(reader.format()?),
+            (b"MeshFormat", Some(version)) => {
+                if reader.format()? != version {
+                    return Err(source.error_line(at, "a second section $MeshFormat, with another version"));
+                }
+            }
             (b"NOD" | b"ELM", _) => return Err(old(source, at, "1.0")),
             (b"Comments", None) => reader.skip(name, at)?,
             (_, None) => return Err(source.error_line(at, format!("section ${} before $MeshFormat", excerpt(name)))),
+            (b"Nodes" | b"Elements" | b"ParametricNodes", Some(version)) if content.has[usize::from(name == b"Elements")] => {
+                let n = if name == b"Elements" { content.elements.types.len() } else { content.points.len() };
+                reader.repeated(version, name, at, n)?;
+            }
             (b"Nodes", Some(version)) => {
-                reader.once(&mut content.has[0], name, at)?;
-                reader.nodes(version, &mut content)?;
+                content.has[0] = true;
+                reader.nodes(version, false, &mut content)?;
                 reader.end(b"$EndNodes")?;
             }
+            (b"ParametricNodes", Some(Version::V2)) => {
+                content.has[0] = true;
+                reader.nodes(Version::V2, true, &mut content)?;
+                reader.end(b"$EndParametricNodes")?;
+            }
             (b"Elements", Some(version)) => {
-                reader.once(&mut content.has[1], name, at)?;
+                content.has[1] = true;
                 match version {
                     Version::V2 => reader.elements_2(&mut content.elements)?,
                     _ => reader.elements_4(version, &mut content.elements)?,
@@ -159,7 +173,9 @@ impl Content {
 }
 
 impl Reader<'_> {
-    fn nodes(&mut self, version: Version, content: &mut Content) -> Result<()> {
+    /// Reads nodes. `parametric` tells that those of version 2 have parameters on the geometric entity that they lie on; in
+    /// version 4, each block tells.
+    fn nodes(&mut self, version: Version, parametric: bool, content: &mut Content) -> Result<()> {
         if version == Version::V2 {
             let n = self.tokens.integer("the number of nodes")?;
             if self.binary {
@@ -171,6 +187,14 @@ impl Reader<'_> {
             for _ in 0..n {
                 content.tags.push(self.int("the number of a node")?);
                 content.points.push(self.point()?);
+                if parametric {
+                    let dimension = self.int("the dimension of an entity")?;
+                    self.int("the number of an entity")?;
+                    // Points and volumes have no parameters.
+                    for _ in 0..if matches!(dimension, 1 | 2) { dimension } else { 0 } {
+                        self.real("a parametric coordinate")?;
+                    }
+                }
             }
             return Ok(());
         }

@@ -27,15 +27,30 @@ impl<'a> Reader<'a> {
         Self { source, tokens: Tokens::new(source, None), binary: false, big_endian: false }
     }
 
-    /// Refuses a second section of the same kind.
-    pub fn once(&self, seen: &mut bool, name: &[u8], at: usize) -> Result<()> {
-        if std::mem::replace(seen, true) {
-            return Err(self.source.error_line(at, format!("a second section ${}", excerpt(name))));
+    /// Skips a section that was read before, with `n` nodes or elements: with each view that is appended to a file, Gmsh
+    /// writes the mesh again.
+    pub fn repeated(&mut self, version: Version, name: &[u8], at: usize, n: usize) -> Result<()> {
+        if version != Version::V2 {
+            if self.binary {
+                self.tokens.line()?;
+            }
+            self.long("the number of blocks")?;
         }
-        Ok(())
+        let again = if version == Version::V2 {
+            self.tokens.integer("a number of nodes or elements")
+        } else {
+            self.long("a number of nodes or elements")
+        }?;
+        if usize::try_from(again) != Ok(n) {
+            let remedy = "the file has several meshes; save views without theirs (PostProcessing.SaveMesh=0)";
+            return Err(self
+                .source
+                .error_line(at, format!("a second section ${}, with {again} entries instead of {n}: {remedy}", excerpt(name))));
+        }
+        self.skip(name, at)
     }
 
-    /// Reads the first section.
+    /// Reads the section that states the format.
     pub fn format(&mut self) -> Result<Version> {
         let (number, at) = self.tokens.word("the version")?;
         let version = match number {

@@ -56,9 +56,14 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
     ]
 }
 
+/// One of the small files.
+pub fn small(name: &str) -> Vec<u8> {
+    all().into_iter().find(|f| f.0 == name).unwrap().1
+}
+
 /// One of the small files, with the bytes `old` replaced by `new`.
 pub fn replace(name: &str, old: &[u8], new: &[u8]) -> Vec<u8> {
-    let mut bytes = all().into_iter().find(|f| f.0 == name).unwrap().1;
+    let mut bytes = small(name);
     let at = bytes.windows(old.len()).position(|w| w == old).unwrap();
     bytes.splice(at..at + old.len(), new.iter().copied());
     bytes
