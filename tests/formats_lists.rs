@@ -81,9 +81,14 @@ fn listed_grids_are_pieces_of_one_mesh() {
 #[test]
 fn files_without_volumes_are_left_out() {
     let folder = folder();
-    let content = file("vtkMultiBlockDataSet", "<DataSet file='walls.vtp'/><DataSet file='c/grid.vtu'/><DataSet file='inlet.VTP'/>");
+    let sets = "<DataSet file='walls.vtp'/><DataSet file='c/grid.vtu'/><DataSet file='inlet.VTP'/>";
+    let content = file("vtkMultiBlockDataSet", sets);
     let report = read(&folder, "case.vtm", &content).unwrap().report;
     assert_eq!(report.warnings, ["listed files without volume cells are left out: 2 .vtp"]);
+    let with_volumes = file("vtkMultiBlockDataSet", &format!("{sets}<DataSet file='air.vti'/><DataSet file='box.pvts'/>"));
+    let warnings = read(&folder, "case.vtm", &with_volumes).unwrap().report.warnings;
+    assert_eq!(warnings.len(), 2);
+    assert!(warnings[1].starts_with("listed files are left out: 1 .pvts, 1 .vti; structured grids cannot be read, so the mesh has holes"));
     let none = read(&folder, "case.vtm", &content.replace("c/grid.vtu", "grid.vti")).unwrap_err();
     assert_eq!(none, "case.vtm: it lists no file with an unstructured grid, only 1 .vti, 2 .vtp");
 }
@@ -117,8 +122,10 @@ fn errors_name_the_list_or_the_listed_file() {
     let empty = read(&folder, "case.pvtu", &file("PUnstructuredGrid", "<PPointData/>")).unwrap_err();
     assert_eq!(empty, "case.pvtu: it lists no file with an unstructured grid");
     let steps = "<DataSet timestep='0' file='0.vtu'/><DataSet timestep='0' file='1.vtu'/><DataSet timestep='0.5' file='2.vtu'/>";
-    let series = read(&folder, "case.pvd", &file("Collection", steps)).unwrap_err();
-    assert_eq!(series, "case.pvd: a series of 2 time steps; open one of its files, for example `2.vtu`");
+    let series = |steps: &str| read(&folder, "case.pvd", &file("Collection", steps)).unwrap_err();
+    assert!(series(steps).ends_with("open a copy of the list with the files of one step only, for example timestep=\"0.5\""));
+    let whole = series(&steps.replace("<DataSet timestep='0' file='1.vtu'/>", ""));
+    assert_eq!(whole, "case.pvd: a series of 2 time steps; open one of its files, for example `2.vtu`");
 }
 
 #[test]

@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::{all, open_bytes, replace};
+use formats_small::{all, open_bytes, replace, small};
 use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load_bytes};
 
 /// The cell field `c`, 0 to 5, serves as marks of ghosts here.
@@ -74,6 +74,29 @@ fn bytes_that_are_the_active_scalars() {
     let shorts: Vec<u8> = (0..6i16).flat_map(i16::to_be_bytes).collect();
     let old = [b"SCALARS c short\nLOOKUP_TABLE default\n", shorts.as_slice()].concat();
     is_whole("colours.vtk", replace("binary.vtk", &old, b"COLOR_SCALARS c 1\n\x00\x01\x02\x03\x04\x05"));
+}
+
+/// VTK writes several time steps into one file on demand; what stays the same names several.
+#[test]
+fn of_several_time_steps_the_first_is_read() {
+    let text = String::from_utf8(small("ascii.vtu")).unwrap();
+    let again = |text: &str, name: &str, first: &str| {
+        let at = text.find(&format!("Name=\"{name}\"")).unwrap();
+        let [begin, end] = [text[..at].rfind("<DataArray").unwrap(), at + text[at..].find("</DataArray>").unwrap() + 12];
+        let array = &text[begin..end];
+        let step = |steps: &str| array.replace("Name=", &format!("TimeStep=\"{steps}\" Name="));
+        let later = step("5").replace('1', "7").replace(">0 ", ">9 ");
+        format!("{}{}{later}{}", &text[..begin], step(first), &text[end..])
+    };
+    let steps = again(&again(&again(&text, "s", "3"), "Points", "3 4"), "connectivity", "3");
+    let Loaded { mesh, report } = open_bytes("steps.vtu", steps.into_bytes());
+    let plain = open_bytes("ascii.vtu", text.clone().into_bytes()).mesh;
+    assert_eq!((&mesh.points, &mesh.tets), (&plain.points, &plain.tets));
+    assert_eq!((mesh.fields.len(), &mesh.field("s").unwrap().values), (2, &plain.field("s").unwrap().values));
+    assert!(report.warnings.len() == 1 && report.warnings[0].starts_with("the file has 3 time steps, of which the first"), "{report}");
+    let points = again(&text, "Points", "3").replace(" TimeStep=\"5\"", "").replace(" TimeStep=\"3\"", "");
+    let Loaded { mesh, report } = open_bytes("points.vtu", points.into_bytes());
+    assert_eq!((mesh.points, report.warnings), (plain.points, vec!["<Points> has several arrays, of which the first is read".to_owned()]));
 }
 
 #[test]

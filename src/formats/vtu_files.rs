@@ -15,8 +15,10 @@ use crate::error::Result;
 const MOST_FILES: usize = 1 << 16;
 /// Most lists within each other.
 const MOST_DEEP: usize = 4;
-/// Endings of files of VTK that hold no unstructured grid.
-const OTHERS: [&str; 11] = ["vtp", "vti", "vtr", "vts", "vth", "htg", "vtt", "pvtp", "pvti", "pvtr", "pvts"];
+/// Endings of files of VTK with surfaces and tables.
+const NO_VOLUMES: [&str; 3] = ["vtp", "pvtp", "vtt"];
+/// Endings of files of VTK with volumes of another kind than unstructured grids.
+const STRUCTURED: [&str; 8] = ["vti", "vtr", "vts", "vth", "htg", "pvti", "pvtr", "pvts"];
 
 /// Where a grid is.
 pub(crate) enum Origin<'a> {
@@ -64,26 +66,30 @@ pub(crate) struct Files<'a> {
 pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Files<'a>> {
     let bytes = source.len();
     let list = match parse(source)? {
-        Document::Grid(skeleton) => {
-            let format = skeleton.format.clone();
-            return Ok(Files {
-                format,
-                grids: vec![Grid::new(Origin::Named(source), skeleton, bytes, options)],
-                bytes,
-                warnings: Vec::new(),
-            });
+        Document::Grid(mut skeleton) => {
+            let (format, warnings) = (std::mem::take(&mut skeleton.format), std::mem::take(&mut skeleton.warnings));
+            return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, bytes, options)], bytes, warnings });
         }
         Document::List(list) => list,
     };
-    let mut found = Found { options, grids: Vec::new(), bytes, seen: HashSet::new(), others: BTreeMap::new() };
+    let mut found =
+        Found { options, grids: Vec::new(), bytes, seen: HashSet::new(), others: BTreeMap::new(), warnings: BTreeSet::new() };
     found.add(source, &list, 1)?;
-    let others = found.others.iter().map(|(ending, n)| format!("{n} .{ending}")).collect::<Vec<_>>().join(", ");
     if found.grids.is_empty() {
+        let others = found.others(|_| true);
         let others = if others.is_empty() { others } else { format!(", only {others}") };
         return Err(source.error(format!("it lists no file with an unstructured grid{others}")));
     }
-    let warnings = if others.is_empty() { Vec::new() } else { vec![format!("listed files without volume cells are left out: {others}")] };
     let format = format!("{}, {} listed files", list.format, found.grids.len());
+    let mut warnings: Vec<String> = found.warnings.iter().cloned().collect();
+    let (surfaces, structured) = (found.others(|kind| NO_VOLUMES.contains(&kind)), found.others(|kind| STRUCTURED.contains(&kind)));
+    if !surfaces.is_empty() {
+        warnings.push(format!("listed files without volume cells are left out: {surfaces}"));
+    }
+    if !structured.is_empty() {
+        let why = "structured grids cannot be read, so the mesh has holes there; save them as unstructured grids (.vtu)";
+        warnings.push(format!("listed files are left out: {structured}; {why}"));
+    }
     Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
 }
 
@@ -95,24 +101,37 @@ struct Found<'a, 'o> {
     seen: HashSet<PathBuf>,
     /// Files of other kinds, by ending.
     others: BTreeMap<String, usize>,
+    /// Warnings about the grids.
+    warnings: BTreeSet<String>,
 }
 
 impl Found<'_, '_> {
+    /// How many files there are of those other kinds that `chosen` names.
+    fn others(&self, chosen: impl Fn(&str) -> bool) -> String {
+        let counts = self.others.iter().filter(|(kind, _)| chosen(kind)).map(|(kind, n)| format!("{n} .{kind}"));
+        counts.collect::<Vec<_>>().join(", ")
+    }
+
     /// Adds the grids of a list that lies in `deep - 1` others.
     fn add(&mut self, source: &Source, list: &List, deep: usize) -> Result<()> {
         let steps: BTreeSet<_> = list.files.iter().filter_map(|file| file.step.as_deref()).collect();
-        if steps.len() > 1 {
-            let last = list.files.last().map_or("", |file| &file.path);
-            let message =
-                format!("a series of {} time steps; open one of its files, for example `{}`", steps.len(), excerpt(last.as_bytes()));
-            return Err(source.error(message));
+        if let Some(last) = list.files.last().filter(|_| steps.len() > 1) {
+            let remedy = if list.files.len() == steps.len() {
+                format!("open one of its files, for example `{}`", excerpt(last.path.as_bytes()))
+            } else {
+                let step = excerpt(last.step.as_deref().unwrap_or("").as_bytes());
+                format!(
+                    "each may have several files: open a copy of the list with the files of one step only, for example timestep=\"{step}\""
+                )
+            };
+            return Err(source.error(format!("a series of {} time steps; {remedy}", steps.len())));
         }
         let folder = source.path.parent().unwrap_or(Path::new(""));
         for listed in &list.files {
             let fail = |message: String| Err(source.error_line(listed.at, format!("`{}`: {message}", excerpt(listed.path.as_bytes()))));
             let path = folder.join(&listed.path);
             let kind = ending(&path);
-            if OTHERS.contains(&kind.as_str()) {
+            if NO_VOLUMES.contains(&kind.as_str()) || STRUCTURED.contains(&kind.as_str()) {
                 *self.others.entry(kind).or_default() += 1;
                 continue;
             }
@@ -131,7 +150,11 @@ impl Found<'_, '_> {
             };
             self.bytes += opened.len();
             match parse(&opened)? {
-                Document::Grid(skeleton) => self.grids.push(Grid::new(Origin::Listed(path), skeleton, opened.len(), self.options)),
+                Document::Grid(mut skeleton) => {
+                    self.warnings.extend(std::mem::take(&mut skeleton.warnings));
+                    let grid = Grid::new(Origin::Listed(path), skeleton, opened.len(), self.options);
+                    self.grids.push(grid);
+                }
                 Document::List(list) if deep < MOST_DEEP => self.add(&opened, &list, deep + 1)?,
                 Document::List(_) => return fail(format!("lists lie more than {MOST_DEEP} deep within each other")),
             }

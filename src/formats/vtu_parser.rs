@@ -1,6 +1,7 @@
 //! Parser for the structure of VTK XML files: unstructured grids, without the values of their arrays, and files that list
 //! other files.
 
+use std::collections::BTreeSet;
 use std::ops::Range;
 
 use quick_xml::Reader;
@@ -24,6 +25,7 @@ pub(crate) struct Skeleton {
     pub codec: Codec,
     pub pieces: Vec<Piece>,
     pub format: String,
+    pub warnings: Vec<String>,
 }
 
 /// One `Piece` of the grid.
@@ -68,7 +70,36 @@ const LISTS: [&str; 4] = ["vtkMultiBlockDataSet", "vtkPartitionedDataSet", "vtkP
 pub(crate) fn parse(source: &Source) -> Result<Document> {
     let outline = Outline::read(source)?;
     let reader = Reader::from_str(&outline.text);
-    Parser { source, outline: &outline, reader, stack: Vec::new(), root: None, pieces: Vec::new() }.run()
+    Parser {
+        source,
+        outline: &outline,
+        reader,
+        stack: Vec::new(),
+        root: None,
+        pieces: Vec::new(),
+        steps: Steps::default(),
+        left_out: false,
+        second_points: false,
+    }
+    .run()
+}
+
+/// The time steps of a file. VTK writes several into one file on demand: arrays of each follow each other, and those
+/// that stay the same name several.
+#[derive(Default)]
+struct Steps {
+    first: Option<String>,
+    all: BTreeSet<String>,
+}
+
+impl Steps {
+    /// Whether an array of these steps, numbers separated by spaces, belongs to the first that the file names.
+    fn is_first(&mut self, of: &str) -> bool {
+        let steps = || of.split_ascii_whitespace();
+        self.all.extend(steps().map(str::to_owned));
+        let first = self.first.get_or_insert_with(|| steps().next().unwrap_or("").to_owned());
+        steps().any(|step| step == first)
+    }
 }
 
 struct Parser<'a, 't> {
@@ -78,6 +109,11 @@ struct Parser<'a, 't> {
     stack: Vec<String>,
     root: Option<Root>,
     pieces: Vec<Piece>,
+    steps: Steps,
+    /// Whether the innermost array is left out.
+    left_out: bool,
+    /// Whether a piece has more than one array of points.
+    second_points: bool,
 }
 
 impl Parser<'_, '_> {
@@ -138,7 +174,15 @@ impl Parser<'_, '_> {
         if let Some((attributes, end)) = appended {
             codec.appended = self.appended(&attributes, end)?;
         }
-        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format }))
+        let mut warnings = Vec::new();
+        if self.steps.all.len() > 1 {
+            let n = self.steps.all.len();
+            warnings.push(format!("the file has {n} time steps, of which the first is read; save the step you need in a file of its own"));
+        }
+        if self.second_points {
+            warnings.push("<Points> has several arrays, of which the first is read".into());
+        }
+        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format, warnings }))
     }
 
     /// Locates the appended data, whose element starts before byte `end` of the file; `None` if it is empty.
@@ -231,7 +275,15 @@ impl Parser<'_, '_> {
             }
             ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
                 let group = group.to_owned();
-                let array = self.array(&self.attributes(element, at)?, at)?;
+                let attributes = self.attributes(element, at)?;
+                self.left_out = get(&attributes, "TimeStep").is_some_and(|steps| !self.steps.is_first(steps));
+                if group == "Points" && !self.left_out && self.pieces.last().is_some_and(|piece| piece.positions.is_some()) {
+                    (self.left_out, self.second_points) = (true, true);
+                }
+                if self.left_out {
+                    return Ok(());
+                }
+                let array = self.array(&attributes, at)?;
                 if let Some(piece) = self.pieces.last_mut() {
                     match group.as_str() {
                         "PointData" => piece.point_data.push(array),
@@ -277,7 +329,7 @@ impl Parser<'_, '_> {
     /// Assigns text to the array whose element is innermost.
     fn text(&mut self, range: Range<usize>) {
         let [.., group, last] = self.stack.as_slice() else { return };
-        if last != "DataArray" {
+        if last != "DataArray" || self.left_out {
             return;
         }
         let Some(piece) = self.pieces.last_mut() else { return };
