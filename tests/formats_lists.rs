@@ -1,11 +1,11 @@
 //! Files that list unstructured grids in other files (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`).
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used)] // also in helpers of tests
+#![allow(clippy::unwrap_used, clippy::format_collect)] // also in helpers of tests
 
 mod formats_small;
 
 use formats_small::shared;
-use olbvh::formats::{Fate, LoadOptions, Loaded, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load};
 use olbvh::mesh::{Mesh, On};
 use std::fs;
 use tempfile::TempDir;
@@ -126,6 +126,128 @@ fn errors_name_the_list_or_the_listed_file() {
     assert!(series(steps).ends_with("open a copy of the list with the files of one step only, for example timestep=\"0.5\""));
     let whole = series(&steps.replace("<DataSet timestep='0' file='1.vtu'/>", ""));
     assert_eq!(whole, "case.pvd: a series of 2 time steps; open one of its files, for example `2.vtu`");
+}
+
+/// The content of a `.vtu` file: points, cells of one type with the nodes of all one after the other, marks of ghosts, and
+/// fields of the points.
+fn grid(points: &str, (kind, n): (u8, usize), nodes: &str, ghosts: &str, fields: &[(&str, &str)]) -> String {
+    let array = |name: &str, kind: &str, n: usize, values: &str| {
+        format!("<DataArray type='{kind}' Name='{name}' NumberOfComponents='{n}'>{values}</DataArray>")
+    };
+    let fields: String = fields.iter().map(|(name, values)| array(name, "Float32", 1, values)).collect();
+    let (n_points, n_cells) = (points.split_whitespace().count() / 3, nodes.split_whitespace().count() / n);
+    let ends: Vec<String> = (1..=n_cells).map(|cell| (n * cell).to_string()).collect();
+    let cells = [
+        array("connectivity", "Int32", 1, nodes),
+        array("offsets", "Int32", 1, &ends.join(" ")),
+        array("types", "UInt8", 1, &format!("{kind} ").repeat(n_cells)),
+    ];
+    let piece = format!(
+        "<Piece NumberOfPoints='{n_points}' NumberOfCells='{n_cells}'><PointData>{fields}</PointData><CellData>{}</CellData>\
+         <Points>{}</Points><Cells>{}</Cells></Piece>",
+        array("vtkGhostType", "UInt8", 1, ghosts),
+        array("p", "Float64", 3, points),
+        cells.concat()
+    );
+    file("UnstructuredGrid", &piece)
+}
+
+const TET: (u8, usize) = (10, 4);
+const HEX: (u8, usize) = (12, 8);
+
+/// Reads two files as the two blocks of one list, and as the two pieces of one mesh.
+fn blocks_and_pieces(files: &[String; 2], merge: Merge) -> [Loaded; 2] {
+    let folder = tempfile::tempdir().unwrap();
+    files.iter().zip(["0.vtu", "1.vtu"]).for_each(|(content, name)| fs::write(folder.path().join(name), content).unwrap());
+    let sets = "<DataSet file='0.vtu'/><DataSet file='1.vtu'/>";
+    [("l.vtm", "vtkMultiBlockDataSet", sets.to_owned()), ("l.pvtu", "PUnstructuredGrid", sets.replace("DataSet file", "Piece Source"))].map(
+        |(name, kind, sets)| {
+            fs::write(folder.path().join(name), file(kind, &sets)).unwrap();
+            load(folder.path().join(name), &LoadOptions { merge, ..LoadOptions::default() }).unwrap()
+        },
+    )
+}
+
+/// The values of a field of points; 99 where there is none.
+fn values(loaded: &Loaded, field: &str) -> Vec<f32> {
+    loaded.mesh.field(field).unwrap().values.iter().map(|v| if v.is_nan() { 99.0 } else { *v }).collect()
+}
+
+#[test]
+fn merged_points_have_the_first_value_that_there_is() {
+    let first = grid("0 0 0 1 0 0 0 1 0 0 0 1", TET, "0 1 2 3", "0", &[("t", "1 2 3 4")]);
+    let second = grid("1 1 1 1 0 0 0 1 0 0 0 1", TET, "0 1 2 3", "0", &[("t", "9 2 nan 4.000002"), ("p", "5 6 7 8")]);
+    for loaded in blocks_and_pieces(&[first, second], Merge::Pieces) {
+        assert_eq!((values(&loaded, "t"), values(&loaded, "p")), (vec![1.0, 2.0, 3.0, 4.0, 9.0], vec![99.0, 6.0, 7.0, 8.0, 5.0]));
+        let wanted = [
+            "2 pieces; 3 points that coincide with others are merged",
+            "array `p` has no value, or none that is finite in single precision, at 1 of 5 points",
+        ];
+        assert_eq!(loaded.report.warnings, wanted);
+    }
+}
+
+#[test]
+fn a_field_may_jump_between_blocks() {
+    let first = grid("0 0 0 1 0 0 0 1 0 0 0 1", TET, "0 1 2 3", "0", &[("t", "1 2 3 4")]);
+    let second = grid("1 1 1 1 0 0 0 1 0 0 0 1", TET, "0 1 2 3", "0", &[("t", "9 2 3.1 5")]);
+    let [blocks, pieces] = blocks_and_pieces(&[first.clone(), second.clone()], Merge::Pieces);
+    assert_eq!(values(&blocks, "t"), [1.0, 2.0, 3.0, 4.0, 9.0, 3.1, 5.0]);
+    assert_eq!(blocks.mesh.tets, [[0, 1, 2, 3], [4, 1, 5, 6]]);
+    let wanted = "2 points coincide with one of another block, but have another value of `t` or of other arrays: ";
+    assert!(blocks.report.warnings[1].starts_with(wanted), "{}", blocks.report);
+    assert_eq!((values(&pieces, "t"), pieces.report.warnings.len()), (vec![1.0, 2.0, 3.0, 4.0, 9.0], 1));
+    for loaded in blocks_and_pieces(&[first, second], Merge::All) {
+        assert_eq!((values(&loaded, "t"), loaded.report.warnings.len()), (vec![1.0, 2.0, 3.0, 4.0, 9.0], 1));
+    }
+}
+
+/// A face that is not plane is cut in the same way on both sides, also where its points stay two.
+#[test]
+fn blocks_fit_each_other_where_a_field_jumps() {
+    let first = "0 0 0 1 0 0 1.3 1 0 0 1 0 0 0 1 1.2 0 1 1 1 1 0 1 1";
+    // The corners of the shared face in another order.
+    let second = "1.3 1 0 1 1 1 1.2 0 1 1 0 0 2 1 0 2 1 1 2 0 1 2 0 0";
+    let files =
+        [(first, "1"), (second, "2")].map(|(points, t)| grid(points, HEX, "0 1 2 3 4 5 6 7", "0", &[("t", &format!("{t} ").repeat(8))]));
+    let [blocks, pieces] = blocks_and_pieces(&files, Merge::Pieces);
+    assert_eq!((blocks.mesh.points.len(), pieces.mesh.points.len()), (16, 12));
+    let corners = |mesh: &Mesh| mesh.tets.iter().map(|tet| tet.map(|v| mesh.points[v as usize])).collect::<Vec<_>>();
+    assert_eq!(corners(&blocks.mesh), corners(&pieces.mesh));
+}
+
+/// Points that only ghost cells use have values that may mean nothing.
+#[test]
+fn points_of_ghost_cells_do_not_count() {
+    let first = grid("0 0 0 1 0 0 0 1 0 0 0 1 1 1 1", TET, "0 1 2 3 4 1 2 3", "0 1", &[("t", "1 2 3 4 -999")]);
+    let second = grid("1 1 1 1 0 0 0 1 0 0 0 1 0 0 0", TET, "0 1 2 3 4 1 2 3", "0 1", &[("t", "9 2 3 4 -999")]);
+    for loaded in blocks_and_pieces(&[first.clone(), second], Merge::Pieces) {
+        assert_eq!(values(&loaded, "t"), [1.0, 2.0, 3.0, 4.0, 9.0]);
+        assert_eq!((loaded.mesh.tets.as_slice(), loaded.report.warnings.len()), (&[[0, 1, 2, 3], [4, 1, 2, 3]][..], 1));
+    }
+    let alone = formats_small::open_bytes("ghost.vtu", first.into_bytes());
+    assert_eq!((alone.mesh.field("t").unwrap().range(), alone.report.warnings), (Some([1.0, 4.0]), Vec::new()));
+}
+
+/// Which of listed files are pieces of one block.
+#[test]
+fn parts_of_a_block_are_one_mesh() {
+    let folder = tempfile::tempdir().unwrap();
+    let one = |points: &str, t: &str| grid(points, TET, "0 1 2 3", "0", &[("t", t)]);
+    fs::write(folder.path().join("0.vtu"), one("0 0 0 1 0 0 0 1 0 0 0 1", "1 1 1 1")).unwrap();
+    fs::write(folder.path().join("1.vtu"), one("1 1 1 1 0 0 0 1 0 0 0 1", "2 2 2 2")).unwrap();
+    let sets = "<DataSet file='0.vtu'/><DataSet file='1.vtu'/>";
+    let apart = sets.replace("/><", "/></Partitions><Partitions><");
+    for (name, kind, content, points) in [
+        ("l.vtm", "vtkMultiBlockDataSet", format!("<Block>{sets}</Block>"), 8),
+        ("l.vtm", "vtkMultiBlockDataSet", format!("<Block><Piece>{sets}</Piece></Block>"), 5),
+        ("l.vtpd", "vtkPartitionedDataSet", sets.to_owned(), 5),
+        ("l.vtpc", "vtkPartitionedDataSetCollection", format!("<Partitions>{sets}</Partitions>"), 5),
+        ("l.vtpc", "vtkPartitionedDataSetCollection", format!("<Partitions>{apart}</Partitions>"), 8),
+        ("l.pvd", "Collection", sets.to_owned(), 8),
+    ] {
+        assert_eq!(read(&folder, name, &file(kind, &content)).unwrap().mesh.points.len(), points, "{content}");
+    }
 }
 
 #[test]

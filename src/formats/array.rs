@@ -26,6 +26,18 @@ impl Array {
         Ok(())
     }
 
+    /// The values of a point or cell; empty if the array has none for it.
+    pub fn tuple(&self, i: usize) -> &[f32] {
+        self.values.get(i * self.components..(i + 1) * self.components).unwrap_or_default()
+    }
+
+    /// Copies the values of `from` to `to`, an earlier point or cell, if that has none.
+    pub fn complete(&mut self, to: usize, from: usize) {
+        if !self.tuple(from).is_empty() && self.tuple(to).iter().all(|v| v.is_nan()) {
+            self.values.copy_within(from * self.components..(from + 1) * self.components, to * self.components);
+        }
+    }
+
     /// Suffixes that are appended to the array's name to name its fields.
     pub fn suffixes(&self) -> &'static [&'static str] {
         suffixes(self.components)

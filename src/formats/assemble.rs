@@ -24,8 +24,10 @@ pub(crate) struct Assembly {
     /// Size of all files read.
     pub bytes: u64,
     points: Vec<[f64; 3]>,
-    /// The point that replaces each point, an earlier one or itself; empty: no point is replaced.
-    merged: Vec<u32>,
+    /// The first point and the block of each piece.
+    pieces: Vec<[usize; 2]>,
+    /// The first point, of those that may become one, at the place of each point; empty: no two points coincide.
+    places: Vec<u32>,
     merge: Merge,
     /// Number of the first point in the format, for messages.
     pub first_point: i64,
@@ -45,7 +47,6 @@ pub(crate) struct Assembly {
     tangled: u64,
     /// Cells with nodes besides their corners.
     curved: u64,
-    corners: Vec<u32>,
     /// Number of corners of all cells together.
     n_corners: u64,
 }
@@ -58,7 +59,8 @@ impl Assembly {
             format,
             bytes: source.len() as u64,
             points: Vec::new(),
-            merged: Vec::new(),
+            pieces: Vec::new(),
+            places: Vec::new(),
             merge: options.merge,
             first_point: 0,
             point_tags: Vec::new(),
@@ -73,7 +75,6 @@ impl Assembly {
             flat: 0,
             tangled: 0,
             curved: 0,
-            corners: Vec::new(),
             n_corners: 0,
         }
     }
@@ -128,17 +129,14 @@ impl Assembly {
             let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
             return fail(format!("names point {shown}, but {range}"));
         }
-        let point = |&v: &i64| {
-            let point = piece.start + v as usize;
-            self.merged.get(point).copied().unwrap_or(point as u32)
-        };
+        let point = |i: usize| (piece.start + nodes[i] as usize) as u32;
         self.curved += u64::from(nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other));
         let before = self.tets.len();
         let fate = match kind.shape {
             Shape::Flat => Fate::Boundary,
             Shape::Other => Fate::Unsupported,
             Shape::Tetrahedron => {
-                let tet = [0, 1, 2, 3].map(|i| point(&nodes[i]));
+                let tet = [0, 1, 2, 3].map(point);
                 let volume = self.volume(tet);
                 self.negative += u64::from(volume < 0.0);
                 self.flat += u64::from(volume == 0.0);
@@ -146,12 +144,12 @@ impl Assembly {
                 if nodes.len() == 4 { Fate::Kept } else { Fate::Straightened }
             }
             shape => {
-                let mut vertices = std::mem::take(&mut self.corners);
-                vertices.clear();
-                vertices.extend(nodes[..corners].iter().map(point));
+                // Points at the same place count as one here, so that cells which share a face cut it in the same way.
+                let place = |i: usize| self.places.get(point(i) as usize).copied().unwrap_or(point(i));
+                let mut places = [0; 8];
+                places[..corners].iter_mut().enumerate().for_each(|(i, at)| *at = place(i));
                 let tets = &mut self.tets;
-                split(shape, &vertices, |tet| tets.push(tet));
-                self.corners = vertices;
+                split(shape, &places[..corners], |tet| tets.push(tet.map(|v| places.iter().position(|p| *p == v).map_or(v, point))));
                 self.orient(before);
                 Fate::Split
             }
@@ -216,7 +214,8 @@ impl Assembly {
             let message = format!("{}: {} points and {} tetrahedra", self.path.display(), self.points.len(), self.tets.len());
             return Err(Error::TooLarge(message));
         }
-        let used = self.used()?;
+        let mut used = self.used()?;
+        let merged = self.merge_points(&mut used);
         let (lo, hi) = bounds(&self.points, &used);
         let origin = Self::origin(lo, hi);
         let mut points = self.convert(&used, origin)?;
@@ -225,8 +224,8 @@ impl Assembly {
             let remedy = "--merge all (Merge::All) makes coinciding points one";
             self.warnings.push(format!("each cell has points of its own, so every face counts as boundary and queries are slow; {remedy}"));
         }
-        self.remove_replaced(&mut points);
-        let fields = self.fields(points.len());
+        self.remove_replaced(&merged, &mut points, &mut used);
+        let fields = self.fields(&used);
         if self.curved > 0 {
             let curved = self.curved;
             self.warnings.push(format!(
@@ -303,27 +302,36 @@ impl Assembly {
         Ok(self.points.iter().map(|p| moved(p).map(|x| x as f32)).collect())
     }
 
-    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron.
-    fn fields(&mut self, n_points: usize) -> Vec<Field> {
+    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron. Where ghost cells were left out,
+    /// points that no tetrahedron uses have no value, lest theirs count in ranges: writers fill them with anything.
+    fn fields(&mut self, used_points: &[bool]) -> Vec<Field> {
         let mut fields = Vec::new();
+        let ghosts = self.counts.iter().any(|cells| cells.fate == Fate::Ghost);
+        let mut used_cells = vec![false; self.n_cells];
+        self.ids.iter().for_each(|&id| used_cells[id as usize] = true);
         let mut names = Names::default();
         // What marks ghost cells and points is no field.
         for mut array in std::mem::take(&mut self.arrays).into_iter().filter(|array| ghost(&array.name).is_none()) {
-            let count = if array.on == On::Points { n_points } else { self.n_cells };
+            let (used, what) = if array.on == On::Points { (used_points, "points") } else { (&used_cells[..], "cells") };
             let shown = excerpt(array.name.as_bytes());
             if array.components == 0 || array.components > MOST_COMPONENTS {
                 self.warnings.push(format!("array `{shown}` is left out: {} components", array.components));
                 continue;
             }
-            let wanted = count * array.components;
+            let wanted = used.len() * array.components;
             if array.values.len() != wanted {
                 self.warnings.push(format!("array `{shown}` is left out: {} values instead of {wanted}", array.values.len()));
                 continue;
             }
-            let odd = array.values.iter().filter(|v| !v.is_finite()).count();
-            if odd > 0 {
-                array.values.iter_mut().filter(|v| !v.is_finite()).for_each(|v| *v = f32::NAN);
-                self.warnings.push(format!("array `{shown}`: {odd} of {} values are not finite in single precision", array.values.len()));
+            let (mut missing, mut of) = (0, 0);
+            for (tuple, &used) in array.values.chunks_exact_mut(array.components).zip(used) {
+                of += usize::from(used);
+                missing += usize::from(used && tuple.iter().any(|v| !v.is_finite()));
+                tuple.iter_mut().filter(|v| ghosts && !used || !v.is_finite()).for_each(|v| *v = f32::NAN);
+            }
+            if missing > 0 {
+                let none = "has no value, or none that is finite in single precision,";
+                self.warnings.push(format!("array `{shown}` {none} at {missing} of {of} {what}"));
             }
             let name = names.free(&array);
             if name != array.name {

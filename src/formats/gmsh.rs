@@ -115,7 +115,7 @@ impl Content {
         }
         let points = Tags::new(&self.tags, false);
         let points = points.map_err(|tag| source.error_in("$Nodes", format!("two nodes have the number {tag}")))?;
-        assembly.set_points(std::mem::take(&mut self.points), &[0]);
+        assembly.set_points(std::mem::take(&mut self.points));
         assembly.point_tags = std::mem::take(&mut self.tags);
         let elements = &mut self.elements;
         assembly.reserve(elements.types.len());

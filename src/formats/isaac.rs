@@ -42,7 +42,7 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     if !skipped.is_empty() {
         assembly.warnings.push(format!("lines that are not read, as they start with neither v nor t: {}", skipped.join(", ")));
     }
-    assembly.set_points(points, &[0]);
+    assembly.set_points(points);
     assembly.reserve(tets.len());
     tets.iter().try_for_each(|tet| assembly.push(TETRAHEDRON, tet))?;
     Ok(assembly)

@@ -54,7 +54,7 @@ impl Content {
     /// Builds the mesh; points are numbered from 1.
     pub fn assemble(self, source: &Source, assembly: &mut Assembly) -> Result<()> {
         let missing = || source.error_line(source.len(), "the file ends, and there was no section Vertices");
-        assembly.set_points(self.points.ok_or_else(missing)?, &[0]);
+        assembly.set_points(self.points.ok_or_else(missing)?);
         assembly.first_point = 1;
         for (kind, mut nodes) in self.cells {
             for node in &mut nodes {

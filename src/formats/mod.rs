@@ -67,7 +67,7 @@ pub use write::{
 /// How to read a mesh.
 #[derive(Clone, Debug)]
 pub struct LoadOptions {
-    /// Which points that have equal coordinates become one; the values of the first one count.
+    /// Which points that have equal coordinates become one. Of each array, the first value that there is at them counts.
     pub merge: Merge,
     /// Compressed arrays may unpack to this many times the size of the file plus 64 MiB; a file that needs more is
     /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
@@ -86,8 +86,10 @@ impl Default for LoadOptions {
 pub enum Merge {
     /// None of them.
     Nothing,
-    /// A point and the first one of an earlier piece of the file, or of an earlier file of a list, so that the seams between pieces do not become
-    /// boundary.
+    /// A point and the first one of an earlier piece of the file, or of an earlier file of a list, so that the seams
+    /// between pieces do not become boundary. Where files of different blocks (of a `.vtm`, `.vtpc` or `.pvd`) have
+    /// different values at a point, it stays two, so that a field may jump between blocks; each then keeps its boundary
+    /// there. The pieces of a `.vtu`, `.pvtu` or `.vtpd` are one mesh, and so are those of one block.
     #[default]
     Pieces,
     /// All of them: for files in which each cell has points of its own. Slits, that is boundaries whose two sides
@@ -108,6 +110,8 @@ pub struct Loaded {
 
 /// Reads a mesh file, or makes a procedural mesh: `kuhn:NX,NY,NZ` (optionally with `,jitter=J` and `,seed=S`) calls
 /// [`crate::mesh::kuhn`]; `graded:N`, `shell:N` and `slivers:N` call the functions of [`crate::mesh`] with these names.
+///
+/// Fields have no value (NaN) at points that only ghost cells use, which are left out.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken or in no

@@ -153,7 +153,7 @@ fn nodes(source: &Source, assembly: &mut Assembly) -> Result<Tags> {
         let name = if c < attributes { format!("attribute{c}") } else { "boundary_marker".into() };
         assembly.arrays.push(Array { name, on: On::Points, components: 1, values });
     }
-    assembly.set_points(points, &[0]);
+    assembly.set_points(points);
     let numbers = Tags::new(&tags, false).map_err(|tag| source.error(format!("two points have the number {tag}")))?;
     assembly.point_tags = tags;
     Ok(numbers)

@@ -62,7 +62,7 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
         }
     }
     let missing = |what: &str| source.error_line(source.len(), format!("the file ends, and there was no {what}"));
-    assembly.set_points(points.ok_or_else(|| missing("POINTS"))?, &[0]);
+    assembly.set_points(points.ok_or_else(|| missing("POINTS"))?);
     let mut cells: Cells<'_> = cells.ok_or_else(|| missing("CELLS"))?;
     let mut types: Integers<'_> = types.ok_or_else(|| missing("CELL_TYPES"))?;
     if types.len() != cells.count {

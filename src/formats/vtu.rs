@@ -22,23 +22,23 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut assembly = Assembly::new(source, options, format);
     (assembly.bytes, assembly.padding, assembly.warnings) = (bytes as u64, Budget::new(bytes, options), warnings);
     let (mut points, mut starts) = (Vec::new(), Vec::new());
-    for Grid { origin, codec, pieces } in &mut grids {
+    for Grid { origin, codec, pieces, block } in &mut grids {
         let mut opened = None;
         let source = origin.open(&mut opened)?;
         for (i, piece) in pieces.iter().enumerate() {
-            starts.push(points.len());
+            starts.push([points.len(), *block]);
             read_points(source, codec, &mut points, piece, i)?;
         }
     }
-    assembly.set_points(points, &starts);
+    assembly.set_pieces(points, starts.clone());
     let (mut places, mut starts) = (Places::new(), starts.into_iter());
-    for Grid { origin, codec, pieces } in &mut grids {
+    for Grid { origin, codec, pieces, .. } in &mut grids {
         let mut opened = None;
         let source = origin.open(&mut opened)?;
         if let Origin::Listed(path) = &*origin {
             assembly.enter(path);
         }
-        for (i, (piece, start)) in pieces.iter().zip(&mut starts).enumerate() {
+        for (i, (piece, [start, _])) in pieces.iter().zip(&mut starts).enumerate() {
             let first_cell = assembly.cells();
             read_cells(source, codec, &mut assembly, piece, i, start)?;
             read_arrays(source, codec, &mut assembly, &mut places, piece, [start, first_cell])?;

@@ -43,13 +43,15 @@ pub(crate) struct Grid<'a> {
     pub origin: Origin<'a>,
     pub codec: Codec,
     pub pieces: Vec<Piece>,
+    /// Number of the block of a list; the grids of a block are pieces of one mesh.
+    pub block: usize,
 }
 
 impl<'a> Grid<'a> {
-    fn new(origin: Origin<'a>, skeleton: Skeleton, bytes: usize, options: &LoadOptions) -> Self {
+    fn new(origin: Origin<'a>, skeleton: Skeleton, block: usize, bytes: usize, options: &LoadOptions) -> Self {
         let Skeleton { mut codec, pieces, .. } = skeleton;
         codec.budget = Budget::new(bytes, options);
-        Self { origin, codec, pieces }
+        Self { origin, codec, pieces, block }
     }
 }
 
@@ -68,12 +70,12 @@ pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Fil
     let list = match parse(source)? {
         Document::Grid(mut skeleton) => {
             let (format, warnings) = (std::mem::take(&mut skeleton.format), std::mem::take(&mut skeleton.warnings));
-            return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, bytes, options)], bytes, warnings });
+            return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, 0, bytes, options)], bytes, warnings });
         }
         Document::List(list) => list,
     };
     let mut found =
-        Found { options, grids: Vec::new(), bytes, seen: HashSet::new(), others: BTreeMap::new(), warnings: BTreeSet::new() };
+        Found { options, grids: Vec::new(), bytes, blocks: 0, seen: HashSet::new(), others: BTreeMap::new(), warnings: BTreeSet::new() };
     found.add(source, &list, 1)?;
     if found.grids.is_empty() {
         let others = found.others(|_| true);
@@ -98,6 +100,8 @@ struct Found<'a, 'o> {
     options: &'o LoadOptions,
     grids: Vec<Grid<'a>>,
     bytes: usize,
+    /// Number of blocks.
+    blocks: usize,
     seen: HashSet<PathBuf>,
     /// Files of other kinds, by ending.
     others: BTreeMap<String, usize>,
@@ -127,7 +131,11 @@ impl Found<'_, '_> {
             return Err(source.error(format!("a series of {} time steps; {remedy}", steps.len())));
         }
         let folder = source.path.parent().unwrap_or(Path::new(""));
+        let mut block = None;
         for listed in &list.files {
+            if block.replace(listed.block) != Some(listed.block) {
+                self.blocks += 1;
+            }
             let fail = |message: String| Err(source.error_line(listed.at, format!("`{}`: {message}", excerpt(listed.path.as_bytes()))));
             let path = folder.join(&listed.path);
             let kind = ending(&path);
@@ -152,7 +160,7 @@ impl Found<'_, '_> {
             match parse(&opened)? {
                 Document::Grid(mut skeleton) => {
                     self.warnings.extend(std::mem::take(&mut skeleton.warnings));
-                    let grid = Grid::new(Origin::Listed(path), skeleton, opened.len(), self.options);
+                    let grid = Grid::new(Origin::Listed(path), skeleton, self.blocks, opened.len(), self.options);
                     self.grids.push(grid);
                 }
                 Document::List(list) if deep < MOST_DEEP => self.add(&opened, &list, deep + 1)?,

@@ -53,6 +53,8 @@ pub(crate) struct Listed {
     pub path: String,
     /// Time step in a series.
     pub step: Option<String>,
+    /// Number of the block in the list. The files of a block are pieces of one mesh.
+    pub block: usize,
     /// Position of the XML element.
     pub at: usize,
 }
@@ -60,7 +62,8 @@ pub(crate) struct Listed {
 /// The root of a file.
 enum Root {
     Grid(Codec, String),
-    List(List),
+    /// A list, and whether all its files are of one block.
+    List(List, bool),
 }
 
 /// Types of files that list others in elements `DataSet`.
@@ -77,6 +80,7 @@ pub(crate) fn parse(source: &Source) -> Result<Document> {
         stack: Vec::new(),
         root: None,
         pieces: Vec::new(),
+        block: 0,
         steps: Steps::default(),
         left_out: false,
         second_points: false,
@@ -109,6 +113,8 @@ struct Parser<'a, 't> {
     stack: Vec<String>,
     root: Option<Root>,
     pieces: Vec<Piece>,
+    /// Number of the block that was begun last in a list.
+    block: usize,
     steps: Steps,
     /// Whether the innermost array is left out.
     left_out: bool,
@@ -165,7 +171,7 @@ impl Parser<'_, '_> {
         }
         let (mut codec, format) = match self.root.take() {
             None => return Err(self.source.error("no element <VTKFile>: not a VTK file")),
-            Some(Root::List(list)) => return Ok(Document::List(list)),
+            Some(Root::List(list, _)) => return Ok(Document::List(list)),
             Some(Root::Grid(codec, format)) => (codec, format),
         };
         if self.pieces.is_empty() {
@@ -233,7 +239,8 @@ impl Parser<'_, '_> {
         let kind = get(attributes, "type").unwrap_or("");
         let version = excerpt(get(attributes, "version").unwrap_or("without a version").as_bytes());
         if kind == "PUnstructuredGrid" || LISTS.contains(&kind) {
-            return Ok(Root::List(List { format: format!("VTK XML {kind} {version}"), files: Vec::new() }));
+            let list = List { format: format!("VTK XML {kind} {version}"), files: Vec::new() };
+            return Ok(Root::List(list, matches!(kind, "PUnstructuredGrid" | "vtkPartitionedDataSet")));
         }
         if kind != "UnstructuredGrid" {
             return Err(self.source.error_line(at, format!("a VTK XML file of type `{}`, not UnstructuredGrid", excerpt(kind.as_bytes()))));
@@ -254,13 +261,15 @@ impl Parser<'_, '_> {
                 let message = format!("an XML or HTML document <{}>, not a VTK file", excerpt(name.as_bytes()));
                 return Err(self.source.error_line(at, message));
             }
-            (name @ ("Piece" | "DataSet"), _) if matches!(self.root, Some(Root::List(_))) => {
+            (name @ ("Piece" | "Partitions" | "DataSet"), parent) if matches!(self.root, Some(Root::List(..))) => {
+                let is_part = name == "DataSet" && matches!(parent, Some("Piece" | "Partitions"));
                 let attributes = self.attributes(element, at)?;
                 let path = get(&attributes, if name == "Piece" { "Source" } else { "file" });
-                let listed = path.map(|path| Listed { path: path.into(), step: get(&attributes, "timestep").map(Into::into), at });
-                // A block without a file is empty.
-                if let Some(Root::List(list)) = &mut self.root {
-                    list.files.extend(listed);
+                if let Some(Root::List(list, one_block)) = &mut self.root {
+                    self.block += usize::from(!*one_block && !is_part);
+                    // A block without a file is empty.
+                    let step = get(&attributes, "timestep").map(Into::into);
+                    list.files.extend(path.map(|path| Listed { path: path.into(), step, block: self.block, at }));
                 }
             }
             ("Piece", _) => {

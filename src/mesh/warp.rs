@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 
 impl Mesh {
     /// Moves every point by `factor` times a vector of the mesh, such as a displacement: the fields `vector.x`, `vector.y`
-    /// and `vector.z`, which must belong to points. Returns how many points stay where they are because their vector is
-    /// not finite.
+    /// and `vector.z`, which must belong to points. Returns how many points of cells stay where they are because their
+    /// vector is not finite.
     ///
     /// # Errors
     /// [`Error::Invalid`] if there is no such vector of points, [`Error::TooLarge`] if a point would lie beyond single
@@ -19,12 +19,14 @@ impl Mesh {
         let (Some(x), Some(y), Some(z)) = (component("x"), component("y"), component("z")) else {
             return Err(Error::Invalid(format!("no vector `{vector}` of the points")));
         };
+        let mut of_cells = vec![false; self.points.len()];
+        self.tets.as_flattened().iter().for_each(|&v| of_cells.get_mut(v as usize).into_iter().for_each(|of_cell| *of_cell = true));
         let mut still = 0;
         let mut moved = self.points.clone();
         for (i, p) in moved.iter_mut().enumerate() {
             let by = [x[i], y[i], z[i]];
             if !by.iter().all(|v| v.is_finite()) {
-                still += 1;
+                still += usize::from(of_cells[i]);
                 continue;
             }
             for (x, by) in p.iter_mut().zip(by) {
@@ -59,6 +61,9 @@ mod tests {
     fn points_move_by_the_vector() {
         let (still, mut mesh) = (kuhn([1, 2, 3]).unwrap().points, with_vector(On::Points));
         mesh.fields[2].values[4] = f32::NAN;
+        // A point of no cell needs no vector.
+        mesh.points.push([0.0; 3]);
+        mesh.fields.iter_mut().for_each(|field| field.values.push(f32::NAN));
         assert_eq!(mesh.warp("u", -2.0).unwrap(), 1);
         for (i, (a, b)) in still.iter().zip(&mesh.points).enumerate() {
             assert_eq!(*b, a.map(|x| if i == 4 { x } else { x - 1.0 }));

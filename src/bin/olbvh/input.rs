@@ -55,9 +55,11 @@ pub struct TreeArgs {
 /// Arguments that say how a mesh file is read.
 #[derive(clap::Args)]
 pub struct ReadArgs {
-    /// Which points that have equal coordinates become one. pieces: those of different pieces of a .vtu file, or of
-    /// different files of a .pvtu, so that no boundary lies between pieces. all: for files in which each cell has points of its own; closes slits as well.
-    /// nothing: none, so that the pieces remain separate parts.
+    /// Which points that have equal coordinates become one. pieces: those of different pieces of a .vtu or .pvtu, or of
+    /// different files of another list, so that no boundary lies between them; but not where blocks, the files of a .vtm,
+    /// .vtpc or .pvd, have different values, as a field may jump from one block to the next. all: any, for files in which
+    /// each cell has points of its own; closes slits as well. nothing: none, so that the pieces remain separate parts. Of
+    /// points that become one, the first counts that has a value.
     #[arg(long, default_value_t = Merge::default(), value_parser = named::<Merge>, value_name = "nothing|pieces|all")]
     merge: Merge,
 }

@@ -6,7 +6,7 @@ use super::*;
 fn finish(arrays: &[(&str, On, usize, usize)]) -> (Vec<String>, Vec<String>) {
     let source = Source::new("one".as_ref(), Vec::new());
     let mut assembly = Assembly::new(&source, &LoadOptions::default(), "one tetrahedron".into());
-    assembly.set_points(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], &[0]);
+    assembly.set_points(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     assembly.push(crate::formats::cells::vtk(10).unwrap(), &[0, 1, 2, 3]).unwrap();
     for &(name, on, components, values) in arrays {
         assembly.arrays.push(Array { name: name.into(), on, components, values: vec![0.0; values] });
