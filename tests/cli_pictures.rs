@@ -100,4 +100,14 @@ fn odd_pictures_are_remarked_on() {
     let out = olbvh(folder.path(), &["render", "flat.vtk", "-o", "a.png", "--size", "9", "--device", "cpu"]);
     assert!(text(&out.stderr).contains("flat.vtk: 1 bad cell is left out"), "{}", text(&out.stderr));
     assert_eq!(json(folder.path(), &["render", "flat.vtk", "-o", "a.png", "--size", "9", "--device", "cpu"])["bad_cells"], 1);
+    // The camera is not to blame for these.
+    let told = |name: &str, content: String, more: &[&str]| {
+        std::fs::write(folder.path().join(name), content).unwrap();
+        text(&olbvh(folder.path(), &[&["render", name, "-o", "a.png", "--size", "64", "--device", "cpu"], more].concat()).stderr)
+    };
+    let values = |value: &str| format!("{file}POINT_DATA 5\nSCALARS t float 1\nLOOKUP_TABLE default\n{}", format!("{value}\n").repeat(5));
+    let message = told("one.vtk", values("1"), &["--iso", "1"]);
+    assert!(message.contains("no surface to be seen: all values of t are 1") && !message.contains(empty), "{message}");
+    assert!(told("none.vtk", values("nan"), &[]).contains("the picture is empty: t has no value"));
+    assert!(told("flat.vtk", values("1").replace("0 0 1 1 1 0", "1 1 0 1 1 0"), &[]).contains("the picture is empty: all cells are flat"));
 }

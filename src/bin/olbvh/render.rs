@@ -162,11 +162,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let [width, height] = settings.size.map(|rays| rays / args.supersample);
     let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height);
     if expected && pixels.chunks(4 * width as usize).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
-        common.remark(if stats.samples == 0 && loaded.report.flat == loaded.report.tetrahedra {
-            "the picture is empty: all cells are flat"
+        let why = if field.range().is_none() {
+            format!("{} has no value", printable(&field.name))
+        } else if stats.found_samples == 0 && loaded.report.flat == loaded.report.tetrahedra {
+            "all cells are flat".into()
         } else {
-            "the picture is empty: the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)"
-        });
+            "the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)".into()
+        };
+        common.remark(format_args!("the picture is empty: {why}"));
     }
     if args.bounds {
         let bounds = Bounds::from(&valid_grid(&loaded.mesh));
@@ -266,14 +269,18 @@ impl Args {
 fn remark_on_iso(iso: &[f32], field: &Field, common: &Common) -> bool {
     // Those of a field of cells are an error, which says more.
     let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty() && field.on == On::Points) else { return true };
+    let name = printable(&field.name);
+    if lo == hi {
+        common.remark(format_args!("no surface to be seen: all values of {name} are {lo}"));
+        return false;
+    }
     let seen = iso.iter().any(|iso| (lo..=hi).contains(iso));
     if !seen {
-        common.remark(format_args!("no surface to be seen: values of {} go from {lo} to {hi}", printable(&field.name)));
+        common.remark(format_args!("no surface to be seen: values of {name} go from {lo} to {hi}"));
     }
-    for (end, what) in [(lo, "smallest"), (hi, "largest")].into_iter().filter(|(end, _)| lo < hi && iso.contains(end)) {
+    for (end, what) in [(lo, "smallest"), (hi, "largest")].into_iter().filter(|(end, _)| iso.contains(end)) {
         common.remark(format_args!(
-            "{end} is the {what} value of {}: its surface is speckled, or not to be seen; take one within {lo} to {hi}",
-            printable(&field.name)
+            "{end} is the {what} value of {name}: its surface is speckled, or not to be seen; take one within {lo} to {hi}"
         ));
     }
     seen
