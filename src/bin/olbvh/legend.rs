@@ -140,9 +140,16 @@ impl<'a> Ink<'a> {
     }
 }
 
-/// The first `most` characters of a name; two dots stand for what is left out.
+/// A name in at most `most` characters. What is left out is in the middle, where two dots stand for it: the ends tell the
+/// components of a vector from each other.
 fn short(name: &str, most: usize) -> String {
-    if name.chars().count() <= most { name.into() } else { name.chars().take(most - 2).chain("..".chars()).collect() }
+    let n = name.chars().count();
+    if n <= most {
+        return name.into();
+    }
+    let kept = most.saturating_sub(2);
+    let tail = kept.div_ceil(3);
+    name.chars().take(kept - tail).chain("..".chars()).chain(name.chars().skip(n - tail)).collect()
 }
 
 /// Whether the values of a range cannot be told apart.
@@ -263,6 +270,6 @@ mod tests {
         let values = [0.125, 40.0];
         assert_eq!(digits(&values), Digits::Fixed(3));
         assert_eq!(short("temperature", 20), "temperature");
-        assert_eq!(short("temperature", 6), "temp..");
+        assert_eq!(["displacement.x", "displacement.y"].map(|name| short(name, 12)), ["displa..nt.x", "displa..nt.y"]);
     }
 }
