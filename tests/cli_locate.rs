@@ -126,6 +126,15 @@ fn fields_go_from_one_mesh_to_another() {
             is("v", (x * x + y * y + z * z).sqrt());
         }
     }
+    // Cells that cannot be read are missing in the result, which is told where it has cells.
+    let with_prism =
+        hexahedron.replace("CELLS 1 9\n", "CELLS 2 20\n10 0 1 2 3 4 5 6 7 8 0\n").replace("CELL_TYPES 1\n", "CELL_TYPES 2\n15 ");
+    for (content, out, is_told) in [(hexahedron, "out.vtu", false), (&with_prism, "out.vtu", true), (&with_prism, "out.csv", false)] {
+        std::fs::write(folder.path().join("prism.vtk"), content).unwrap();
+        let run = olbvh(folder.path(), &["locate", "from.vtu", "prism.vtk", "-o", out, "--device", "cpu"]);
+        let told = text(&run.stderr);
+        assert_eq!(told.contains("prism.vtk: 1 pentagonal prism: NOT READ, so the mesh has holes there"), is_told, "{out}: {told}");
+    }
     // A mesh without volume cells has its points located, too.
     let result = locate("triangle.vtk", "out.vtu");
     assert_eq!((result["points"].as_u64(), result["found"].as_u64()), (Some(3), Some(2)));

@@ -7,8 +7,8 @@ use crate::output::{Progress, ResultOutput};
 use crate::text::{counted, grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{InBlocks, LocateRequest};
 use olbvh::formats::{
-    LoadOptions, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json, write_located,
-    write_npy,
+    Fate, LoadOptions, Loaded, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json,
+    write_located, write_npy,
 };
 use olbvh::mesh::{Bounds, Field, Mesh, valid_grid};
 use olbvh::options::Fineness;
@@ -146,7 +146,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
-        let of = if output.format == OutputFormat::Vtu { probed(&args.points, points.len()) } else { None };
+        let of = if output.format == OutputFormat::Vtu { probed(&args.points, points.len(), common) } else { None };
         write_located(
             output.path(),
             &Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values },
@@ -186,9 +186,13 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 }
 
 /// The mesh whose points were located, if it has volume cells.
-fn probed(path: &Path, points: usize) -> Option<Mesh> {
+fn probed(path: &Path, points: usize, common: &Common) -> Option<Mesh> {
     let options = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
-    load(path, &options).ok().map(|loaded| loaded.mesh).filter(|mesh| mesh.points.len() == points)
+    let Loaded { mesh, report } = load(path, &options).ok().filter(|loaded| loaded.mesh.points.len() == points)?;
+    for cells in report.cells.iter().filter(|cells| cells.fate == Fate::Unsupported) {
+        common.remark(format_args!("{}: {}: {cells}", path.display(), counted(cells.count, &cells.name)));
+    }
+    Some(mesh)
 }
 
 /// Gives points without an owner the closest place of the surface within a distance. Returns the distance of every point,
