@@ -55,8 +55,9 @@ pub struct Args {
     /// `-`: a .csv on standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT")]
     output: PathBuf,
-    /// Name of a field to interpolate; can be given several times. A vector's name stands for its length, and name.x,
-    /// name.y and name.z for its components. Default: the first field of points, or else the first field of cells.
+    /// Name of a field to interpolate; can be given several times. A vector's name stands for its length at the points,
+    /// and name.x, name.y and name.z for its components. The interpolated length is not that of the interpolated vector,
+    /// but as long or longer. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Vec<String>,
     /// Interpolate every field of the mesh.

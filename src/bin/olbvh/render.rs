@@ -47,8 +47,8 @@ pub struct Args {
     /// Output file, a .png picture. `-`: standard output, while the summary goes to standard error.
     #[arg(short, long, value_name = "OUT.png")]
     output: PathBuf,
-    /// Name of the field to draw; a vector's name stands for its length, and name.x, name.y and name.z for its
-    /// components. Default: the first field of points, or else of cells; without any field, the height z.
+    /// Name of the field to draw; a vector's name stands for its length at the points, which is interpolated, and name.x,
+    /// name.y and name.z for its components. Default: the first field of points, or else of cells; without any field, the height z.
     #[arg(long)]
     field: Option<String>,
     /// Width and height in pixels; a single number gives a square.

@@ -67,8 +67,8 @@ pub struct Args {
     /// Default: the thickness.
     #[arg(long, value_name = "D", allow_hyphen_values = true)]
     spacing: Option<f64>,
-    /// Name of the field to slice; a vector's name stands for its length, and name.x, name.y and name.z for its
-    /// components. Default: the first field of points, or else the first field of cells.
+    /// Name of the field to slice; a vector's name stands for its length at the points, which is interpolated, and name.x,
+    /// name.y and name.z for its components. Default: the first field of points, or else the first field of cells.
     #[arg(long)]
     field: Option<String>,
     /// Value of voxels that the mesh only touches. nearest: that at the closest point of the mesh. linear: the field of
