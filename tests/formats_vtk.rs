@@ -4,8 +4,8 @@
 
 mod formats_small;
 
-use formats_small::{all, open_bytes, replace, small};
-use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load_bytes};
+use formats_small::{POINTS, all, open_bytes, replace, small};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load_bytes, load_points};
 
 /// The cell field `c`, 0 to 5, serves as marks of ghosts here.
 #[test]
@@ -232,4 +232,19 @@ fn texts_of_legacy_files_are_skipped() {
         let error = load_bytes("cut.vtk", cut, &LoadOptions::default()).unwrap_err().to_string();
         assert!(error.contains(wanted), "{error}");
     }
+}
+
+/// As points to locate; there are no cells in it.
+#[test]
+fn surfaces_have_points() {
+    let text = String::from_utf8(small("ascii.vtu")).unwrap();
+    let (head, cells) = (text.find("<Cells>").unwrap(), text.find("</Cells>").unwrap() + "</Cells>".len());
+    let surface = format!("{}<Polys><DataArray type=\"Int32\" Name=\"offsets\">4</DataArray></Polys>{}", &text[..head], &text[cells..]);
+    let surface = surface.replace("UnstructuredGrid", "PolyData").replace("NumberOfCells=\"6\"", "NumberOfPolys=\"6\"");
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("surface.vtp");
+    std::fs::write(&path, surface).unwrap();
+    assert_eq!(load_points(&path).unwrap(), POINTS);
+    let error = load_bytes(&path, std::fs::read(&path).unwrap(), &LoadOptions::default()).unwrap_err().to_string();
+    assert!(error.ends_with("and no other cells (a surface, of which only the points can be read)"), "{error}");
 }

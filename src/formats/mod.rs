@@ -32,6 +32,7 @@ mod report;
 mod scalar;
 mod source;
 mod stored;
+mod surfaces;
 mod tags;
 mod tetgen;
 mod tokens;

@@ -1,4 +1,4 @@
-//! Readers for points to locate: NumPy arrays, text tables, and the points of meshes.
+//! Readers for points to locate: NumPy arrays, text tables, and the points of meshes and surfaces.
 
 use rayon::prelude::*;
 use std::io::Read;
@@ -10,7 +10,7 @@ use super::detect;
 use super::source::ending;
 use super::source::{Source, excerpt};
 use super::tokens::parse_float;
-use super::{LoadOptions, Merge, assembled, npy, procedural};
+use super::{LoadOptions, Merge, assembled, npy, procedural, surfaces};
 use crate::error::{Error, Result};
 
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
@@ -20,7 +20,8 @@ use crate::error::{Error, Result};
 /// Lines that start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
-/// that no cell uses; it may consist of surfaces only.
+/// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl` are surfaces, whose
+/// vertices are taken in their order, in an `.stl` three of each triangle.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken, and as
@@ -30,7 +31,10 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
     if let Some(made) = path.to_str().and_then(procedural::make) {
         return made.map(|(_, mesh)| mesh.points.iter().map(|p| p.map(f64::from)).collect());
     }
-    let source = Source::open(path, ".npy, a table of text, or a mesh")?;
+    let source = Source::open(path, ".npy, a table of text, a surface, or a mesh")?;
+    if let Some(points) = surfaces::points(&source) {
+        return points;
+    }
     if detect::is_mesh(&source)? { of_mesh(&source) } else { points(&source.whole()?) }
 }
 

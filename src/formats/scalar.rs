@@ -110,6 +110,21 @@ impl Scalar {
         })
     }
 
+    /// The type with this name in PLY files.
+    pub fn ply(name: &[u8]) -> Option<Self> {
+        Some(match name {
+            b"char" | b"int8" => Scalar::I8,
+            b"uchar" | b"uint8" => Scalar::U8,
+            b"short" | b"int16" => Scalar::I16,
+            b"ushort" | b"uint16" => Scalar::U16,
+            b"int" | b"int32" => Scalar::I32,
+            b"uint" | b"uint32" => Scalar::U32,
+            b"float" | b"float32" => Scalar::F32,
+            b"double" | b"float64" => Scalar::F64,
+            _ => return None,
+        })
+    }
+
     /// Converts stored numbers; a remainder shorter than one number is left out.
     pub fn convert<T: Number>(self, bytes: &[u8], big: bool) -> Vec<T> {
         let mut values = Vec::with_capacity(bytes.len() / self.size());

@@ -84,6 +84,7 @@ pub(crate) fn parse(source: &Source) -> Result<Document> {
         steps: Steps::default(),
         left_out: false,
         second_points: false,
+        is_surface: false,
     }
     .run()
 }
@@ -120,6 +121,8 @@ struct Parser<'a, 't> {
     left_out: bool,
     /// Whether a piece has more than one array of points.
     second_points: bool,
+    /// Whether the file has a surface, of which only the points are read.
+    is_surface: bool,
 }
 
 impl Parser<'_, '_> {
@@ -185,6 +188,9 @@ impl Parser<'_, '_> {
             let n = self.steps.all.len();
             warnings.push(format!("the file has {n} time steps, of which the first is read; save the step you need in a file of its own"));
         }
+        if self.is_surface {
+            warnings.push("a surface, of which only the points can be read".into());
+        }
         if self.second_points {
             warnings.push("<Points> has several arrays, of which the first is read".into());
         }
@@ -242,11 +248,12 @@ impl Parser<'_, '_> {
             let list = List { format: format!("VTK XML {kind} {version}"), files: Vec::new() };
             return Ok(Root::List(list, matches!(kind, "PUnstructuredGrid" | "vtkPartitionedDataSet")));
         }
-        if kind != "UnstructuredGrid" {
+        if !["UnstructuredGrid", "PolyData"].contains(&kind) {
             return Err(self.source.error_line(at, format!("a VTK XML file of type `{}`, not UnstructuredGrid", excerpt(kind.as_bytes()))));
         }
         let codec = Codec::new(|name| get(attributes, name)).map_err(|message| self.source.error_line(at, message))?;
-        let format = format!("VTK XML unstructured grid {version}{}", codec.describe());
+        let grid = if kind == "PolyData" { "surface" } else { "unstructured grid" };
+        let format = format!("VTK XML {grid} {version}{}", codec.describe());
         Ok(Root::Grid(codec, format))
     }
 
@@ -256,6 +263,7 @@ impl Parser<'_, '_> {
             ("VTKFile", None) => {
                 let attributes = self.attributes(element, at)?;
                 self.root = Some(self.root(&attributes, at)?);
+                self.is_surface = get(&attributes, "type") == Some("PolyData");
             }
             (name, None) => {
                 let message = format!("an XML or HTML document <{}>, not a VTK file", excerpt(name.as_bytes()));
@@ -279,9 +287,11 @@ impl Parser<'_, '_> {
                     let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", excerpt(text.as_bytes())));
                     text.trim().parse::<u64>().map_err(|_| wrong())
                 };
-                let piece = Piece { at, points: number("NumberOfPoints")?, cells: number("NumberOfCells")?, ..Piece::default() };
+                let cells = if self.is_surface { 0 } else { number("NumberOfCells")? };
+                let piece = Piece { at, points: number("NumberOfPoints")?, cells, ..Piece::default() };
                 self.pieces.push(piece);
             }
+            ("DataArray", Some("CellData")) if self.is_surface => self.left_out = true,
             ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
                 let group = group.to_owned();
                 let attributes = self.attributes(element, at)?;

@@ -48,8 +48,8 @@ With --all, the result has one row per point and cell: .csv, .npy (n×2) or .jso
 pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
-    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers), .csv (x,y,z), or another mesh, whose
-    /// points are taken in the order of its file. `-`: standard input.
+    /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers), .csv (x,y,z), or another mesh or a
+    /// surface (.vtp, .obj, .ply, .stl), whose points are taken in the order of its file. `-`: standard input.
     points: PathBuf,
     /// Output file; its extension selects the format: .csv, .npy, .npz, .vtu or .json (with --all .csv, .npy or .json).
     /// `-`: a .csv on standard output, while the summary goes to standard error.
