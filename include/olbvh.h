@@ -431,7 +431,7 @@ typedef struct olbvh_plan {
   uint32_t level;
   /*
    Upper bound on the number of entries of a leaf; 0: unknown. If it is too low, points are lost. Location records
-   one dispatch for every 16,384 entries, at most 16 dispatches.
+   one dispatch for every 16,384 entries, on a GPU at most 16 dispatches.
    */
   uint32_t longest_leaf;
   /*

@@ -314,7 +314,7 @@ fn other_programs_see_what_is_theirs() {
     for ours in ["OLBVH_WIDE", "u64vec2", "BUFFER16", "RECORDS", ".olbvh_"] {
         assert!(!OLBVH.contains(ours), "{ours}");
     }
-    for member in ["    uvec2 grid; ", "    float smallest; "] {
+    for member in ["    uvec2 grid; ", "    uint first_leaf; "] {
         assert!(OLBVH.contains(member), "{member}");
     }
 }

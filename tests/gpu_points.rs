@@ -12,7 +12,7 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
 use olbvh::options::{Assign, BuildOptions, Lists};
-use olbvh::query::{LocateOptions, OwnersMemory, SILENT, locate, locate_all};
+use olbvh::query::{LocateOptions, OwnersMemory, SILENT, locate, locate_all, overlap};
 use std::cell::RefCell;
 use std::env;
 
@@ -171,6 +171,35 @@ fn all_owners_of_points_on_a_crowded_edge() {
     for (i, owners) in found.iter().enumerate() {
         assert!(if on_edge(i) { owners.iter().copied().eq(0..n) } else { owners.is_empty() }, "point {i}: {} owners", owners.len());
     }
+}
+
+/// Leaves that list more tetrahedra than 16 dispatches of the usual length search. Mesa 22 ends the loops of an invocation
+/// after 65,535 passes.
+#[test]
+fn long_lists_are_searched_to_their_end() {
+    let mesh = kuhn([37; 3]).unwrap();
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let [single, fine] = [Some(0), None]
+        .map(|level| Tree::build(&gpu, &device, &BuildOptions { level, lists: Lists::All, ..BuildOptions::default() }).unwrap());
+    assert!(single.status().longest_leaf > 16 * 16_384);
+    let points: Vec<_> = (0..60u32).map(|i| [0, 1, 2].map(|c| mix(3 * i + c) as f32 * (37.0 / 4_294_967_296.0))).collect();
+    let found = |tree| locate(tree, &points, None, &LocateOptions::default(), SILENT).unwrap().owners;
+    let owners = found(&single);
+    assert!(owners == found(&fine) && owners.iter().all(|&owner| owner != u32::MAX), "{owners:?}");
+    let all = locate_all(&single, &points, 0.0, SILENT).unwrap();
+    assert!(all.iter().zip(&owners).all(|(all, owner)| all.first() == Some(owner)), "{all:?}");
+    let other = Mesh::new(
+        points
+            .iter()
+            .flat_map(|&p| [[0.0; 3], [0.01, 0.0, 0.0], [0.0, 0.01, 0.0], [0.0, 0.0, 0.01]].map(|d| [0, 1, 2].map(|c| p[c] + d[c])))
+            .collect(),
+        (0..60).map(|i| [0, 1, 2, 3].map(|k| 4 * i + k)).collect(),
+    );
+    let other = DeviceMesh::upload(&gpu, &other, BadCells::Skip).unwrap();
+    let other = Tree::build(&gpu, &other, &BuildOptions::default()).unwrap();
+    let [a, b] = [&single, &fine].map(|tree| overlap(&other, tree, false, SILENT).unwrap().overlap);
+    assert_eq!((a.a, a.b, a.effort[0].by_vertex), (b.a, b.b, b.effort[0].by_vertex));
 }
 
 /// Six times the signed volume of four points with integer coordinates, exactly.

@@ -4,6 +4,7 @@
 // voxels that need no test are counted.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
+#include "shared/grid.glsl"
 #include "shared/voxels.glsl"
 layout(constant_id = 2) const uint RUN = 64;
 ARGUMENTS(5)

@@ -21,7 +21,7 @@ impl Pool {
     /// Takes the smallest buffer that holds `size` bytes and is at most an eighth larger.
     pub(super) fn take(&self, kind: Kind, size: u64) -> Option<Memory> {
         let mut kept = self.kept.lock().ok()?;
-        let fits = |m: &Memory| m.kind == kind && (size..=size + size / 8).contains(&m.size);
+        let fits = |m: &Memory| m.kind == kind && (size..=size.saturating_add(size / 8)).contains(&m.size);
         let (i, _) = kept.iter().enumerate().filter(|(_, m)| fits(m)).min_by_key(|(_, m)| m.size)?;
         Some(kept.remove(i))
     }

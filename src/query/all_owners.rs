@@ -96,7 +96,7 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
     let fill = u32::from(found.is_some());
     let places = if fill == 0 { memory.counts } else { memory.ends };
     let found = found.unwrap_or_else(|| r.gpu().nothing());
-    let (length, parts) = list_parts(scene.longest_leaf);
+    let (length, parts) = list_parts(r.gpu().report().kind, scene.longest_leaf);
     let spec = LocateAllSpec { workgroup, fill, part_length: length, lists: tree.lists as u32, ..Default::default() };
     r.stage("query.locate_all", |r| {
         for part in 0..parts {

@@ -201,7 +201,7 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
                 groups(1),
             );
         }
-        let (length, parts) = list_parts(scene.longest_leaf);
+        let (length, parts) = list_parts(r.gpu().report().kind, scene.longest_leaf);
         let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;
         let guides = guides.unwrap_or_else(|| r.gpu().nothing());
         for part in 0..parts {

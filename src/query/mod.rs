@@ -27,7 +27,7 @@ pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_render, re
 
 use crate::build::{MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
-use crate::gpu::{Buffer, BufferRef, Gpu};
+use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu};
 use crate::mesh::On;
 use crate::options::LIST_PART;
 
@@ -87,8 +87,8 @@ pub struct Scene {
     pub longest_leaf: u32,
 }
 
-/// Most dispatches for one search of the lists. For long lists the parts get longer than [`LIST_PART`] instead of more
-/// numerous.
+/// Most dispatches for one search of the lists on a GPU. For long lists the parts get longer than [`LIST_PART`] instead of
+/// more numerous; not on a processor, whose driver may end the loops of an invocation after 65,535 passes.
 pub const MAX_LIST_PARTS: u32 = 16;
 
 /// Number of items of `bytes` bytes that `found` holds, as far as shaders number them: an index is a signed word.
@@ -98,8 +98,9 @@ fn capacity_of(found: BufferRef, bytes: u64) -> u32 {
 
 /// The number of entries of a list that one dispatch searches, and the number of dispatches that the longest list
 /// takes.
-fn list_parts(longest: u32) -> (u32, u32) {
-    let part = LIST_PART.max(longest.div_ceil(MAX_LIST_PARTS).next_power_of_two());
+fn list_parts(device: DeviceKind, longest: u32) -> (u32, u32) {
+    let few = longest.div_ceil(MAX_LIST_PARTS).next_power_of_two();
+    let part = if device == DeviceKind::Cpu { LIST_PART } else { LIST_PART.max(few) };
     (part, longest.div_ceil(part).max(1))
 }
 
@@ -123,7 +124,9 @@ mod tests {
     fn few_parts_hold_the_longest_list() {
         for longest in [0, 1, LIST_PART, LIST_PART + 1, MAX_LIST_PARTS * LIST_PART, MAX_LIST_PARTS * LIST_PART + 1, 12_290_298, 536_870_911]
         {
-            let (part, count) = list_parts(longest);
+            let (part, count) = list_parts(DeviceKind::Cpu, longest);
+            assert!(part == LIST_PART && u64::from(part) * u64::from(count) >= u64::from(longest), "{longest}: {count} of {part}");
+            let (part, count) = list_parts(DeviceKind::Discrete, longest);
             assert!(part >= LIST_PART && count <= MAX_LIST_PARTS && part * count >= longest, "{longest}: {count} of {part}");
             assert!(longest > MAX_LIST_PARTS * LIST_PART || (part, count) == (LIST_PART, longest.div_ceil(LIST_PART).max(1)), "{longest}");
         }

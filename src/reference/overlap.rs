@@ -304,10 +304,11 @@ fn sets(direction: &Direction, places: &[Place], around: &[u32], effort: &mut Ef
 impl Effort {
     /// Adds the counts of `other`.
     pub(crate) fn add(&mut self, other: &Self) {
-        self.by_vertex += other.by_vertex;
-        self.by_node += other.by_node;
-        self.searched += other.searched;
-        self.located += other.located;
+        // A tetrahedron counts in every pair of blocks that it is in.
+        self.by_vertex = self.by_vertex.saturating_add(other.by_vertex);
+        self.by_node = self.by_node.saturating_add(other.by_node);
+        self.searched = self.searched.saturating_add(other.searched);
+        self.located = self.located.saturating_add(other.located);
         self.narrow += other.narrow;
     }
 }

@@ -340,8 +340,7 @@ impl RenderSettings {
     /// # Errors
     /// [`Error::Invalid`] if a setting is out of its limits, or for iso-surfaces of a field of cells.
     pub fn for_field(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Result<Self> {
-        let own = || used_range(mesh, valid, field);
-        let range = self.range.or(self.transfer.range()).or_else(own).unwrap_or([0.0, 1.0]);
+        let range = self.range_for(mesh, valid, field);
         let mut settings = Self { range: Some(range), ..self.clone() };
         settings.check()?;
         if !settings.iso.is_empty() && field.on == On::Cells {
@@ -357,14 +356,18 @@ impl RenderSettings {
         Ok(settings)
     }
 
-    /// A normal per point of the mesh for the light of these settings, which come from [`RenderSettings::for_field`]; empty
-    /// without light.
+    /// A normal per point of the mesh for the light of these settings; empty without light.
     pub fn normals(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Vec<[f32; 3]> {
         match (self.shading, self.iso.is_empty()) {
             (false, _) => Vec::new(),
-            (true, true) => shading_normals(mesh, valid, field, self.range.unwrap_or([0.0, 1.0])),
+            (true, true) => shading_normals(mesh, valid, field, self.range_for(mesh, valid, field)),
             (true, false) => gradient_normals(mesh, valid, field),
         }
+    }
+
+    /// The range of values that is asked for, or that of the field.
+    fn range_for(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> [f32; 2] {
+        self.range.or(self.transfer.range()).or_else(|| used_range(mesh, valid, field)).unwrap_or([0.0, 1.0])
     }
 }
 

@@ -70,6 +70,8 @@ impl SliceSettings {
             Plane::Axis(_) => return invalid("an axis is x, y or z"),
             Plane::Normal(n) => {
                 let n = DVec3::from_array(n);
+                // Its square may be too large, or too small.
+                let n = n / n.abs().max_element();
                 let Some(n) = n.try_normalize() else { return invalid("the normal of a slice has no length") };
                 let (u, v) = in_plane(n);
                 (n, u, v)

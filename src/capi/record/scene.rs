@@ -28,7 +28,7 @@ pub struct OlbvhPlan {
     /// Deepest level that the leaves may have, from 1 to 10. 0: the level of `build`, or 7 if that has none.
     pub level: u32,
     /// Upper bound on the number of entries of a leaf; 0: unknown. If it is too low, points are lost. Location records
-    /// one dispatch for every 16,384 entries, at most 16 dispatches.
+    /// one dispatch for every 16,384 entries, on a GPU at most 16 dispatches.
     pub longest_leaf: u32,
     /// How to build the tree. If both a capacity and a budget are given, the smaller one holds. If neither is given,
     /// there is room for 8 entries per tetrahedron, or 24 if all leaves have full lists. A tree that would need more is

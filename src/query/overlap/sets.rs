@@ -95,9 +95,11 @@ pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapM
         r.stage("overlap.vertices", |r| {
             memory.frames.cmd(r, a, b)?;
             directions.iter().try_for_each(|w| w.cmd_used(r))?;
-            for part in 0..directions.iter().map(Direction::parts).max().unwrap_or(1) {
+            let parts = directions.each_ref().map(|d| list_parts(r.gpu().report().kind, d.other.longest_leaf));
+            for part in 0..parts[0].1.max(parts[1].1) {
                 r.barrier("overlap.used → overlap.places");
-                directions.iter().filter(|d| part < d.parts()).try_for_each(|d| d.cmd_places(r, part))?;
+                let with_more = directions.iter().zip(parts).filter(|(_, (_, count))| part < *count);
+                with_more.into_iter().try_for_each(|(d, (length, _))| d.cmd_places(r, part, length))?;
             }
             Ok(())
         })?;
@@ -141,11 +143,7 @@ impl Direction {
         r.dispatch(&arguments, OverlapUsedSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(workgroup)))
     }
 
-    fn parts(&self) -> u32 {
-        list_parts(self.other.longest_leaf).1
-    }
-
-    fn cmd_places(&self, r: &mut Recorder<'_>, part: u32) -> Result<()> {
+    fn cmd_places(&self, r: &mut Recorder<'_>, part: u32, part_length: u32) -> Result<()> {
         let (tree, mesh, own) = (&self.other.tree, &self.other.mesh, &self.own.mesh.input);
         let workgroup = r.gpu().target().query;
         let arguments = OverlapPlaces {
@@ -166,7 +164,7 @@ impl Direction {
             stride: own.stride,
             part,
         };
-        let spec = OverlapPlacesSpec { workgroup, part_length: list_parts(self.other.longest_leaf).0, ..Default::default() };
+        let spec = OverlapPlacesSpec { workgroup, part_length, ..Default::default() };
         r.dispatch(&arguments, spec, Groups::Count(own.points.div_ceil(workgroup)))
     }
 
