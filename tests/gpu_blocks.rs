@@ -1,4 +1,4 @@
-//! OverlapRequest that do not fit into the memory allowed are processed in blocks: the answers are those of the whole mesh, and
+//! Meshes that do not fit into the memory allowed are processed in blocks: the answers are those of the whole mesh, and
 //! the limit of memory is kept.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
@@ -390,4 +390,60 @@ fn large_pictures_are_drawn_in_strips() {
     assert!(drawn.stats.found_samples > 100_000 && pixels(&drawn.colors) == pixels(&expected.colors));
     let (told, all) = (told.into_inner(), 4096 * 270);
     assert!(told.iter().any(|&(done, _)| done == 4096 * 256) && told.last() == Some(&(all, all)), "{told:?}");
+}
+
+/// A cylinder of sectors round an axis, and a box beside it. So many sectors meet on the axis that its vertices are crowded,
+/// and the tetrahedra there count as boundary. A block at the rim has a few sectors only.
+fn swept(sectors: u32, layers: u32) -> Mesh {
+    let height = 0.004;
+    let (mut axis, mut ring) = (Vec::new(), Vec::new());
+    for layer in 0..=layers {
+        axis.push([0.0, 0.0, layer as f32 * height]);
+        for sector in 0..sectors {
+            let angle = std::f64::consts::TAU * f64::from(sector) / f64::from(sectors) + 0.01;
+            let radius = 1.0 + 0.02 * f64::from(layer % 2);
+            ring.push([(radius * angle.cos()) as f32, (radius * angle.sin()) as f32, layer as f32 * height]);
+        }
+    }
+    let (mut inner, mut outer) = (Vec::new(), Vec::new());
+    for (layer, sector) in (0..layers).flat_map(|layer| (0..sectors).map(move |sector| (layer, sector))) {
+        let next = (sector + 1) % sectors;
+        let at = |layer: u32, sector: u32| layers + 1 + layer * sectors + sector;
+        let [p0, q0, p1, q1] = [at(layer, sector), at(layer, next), at(layer + 1, sector), at(layer + 1, next)];
+        outer.extend(if sector < next { [[layer, p0, q0, q1], [layer, p0, p1, q1]] } else { [[layer, p0, q0, p1], [layer, q0, q1, p1]] });
+        inner.push([layer, layer + 1, p1, q1]);
+    }
+    let grid = kuhn_jittered([11; 3], 0.0, 1).unwrap();
+    let first = (axis.len() + ring.len()) as u32;
+    let place = |p: &[f32; 3]| [0.6 + 2.4 * p[0] / 11.0, 1.1 + 0.5 * p[1] / 11.0, layers as f32 * height * p[2] / 11.0];
+    let points = axis.into_iter().chain(ring).chain(grid.points.iter().map(place)).collect();
+    let beside = grid.tets.iter().map(|tet| tet.map(|v| v + first));
+    Mesh::new(points, inner.into_iter().chain(outer).chain(beside).collect())
+}
+
+#[test]
+fn crowded_vertices_are_known_to_every_block() {
+    let gpu = &Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = &swept(24, 100);
+    let options = BuildOptions { level: Some(4), ..BuildOptions::default() };
+    let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
+    assert!(device.status().crowded > 90, "{:?}", device.status());
+    let tree = Tree::build(gpu, &device, &options).unwrap();
+    let settings = SliceSettings { at: Some(0.204), size: [1000, 0], thickness: Some(0.0005), ..SliceSettings::default() };
+    let [lo, hi] = [device.grid().lo, device.grid().hi].map(|v| [v[0], v[1], v[2]]);
+    let voxels = &settings.voxels(lo, hi, mesh.origin).unwrap();
+    let mut owners = [Vec::new(), Vec::new()];
+    let mut sink = |band: Band| {
+        owners[0].extend(band.owners);
+        Ok(())
+    };
+    query::slice(&tree, None, voxels, Extrapolate::Nearest, SILENT, &mut sink).unwrap();
+    let asked = SliceRequest { mesh, options, field: None, voxels, extrapolate: Extrapolate::Nearest };
+    let mut sink = |band: Band| {
+        owners[1].extend(band.owners);
+        Ok(())
+    };
+    let found = slice(gpu, 440_000, &asked, SILENT, &mut sink).unwrap();
+    let other = (0..owners[0].len()).filter(|&i| owners[0][i] != owners[1][i]).count();
+    assert!(found.trees > 2 && found.answer.inside > 10_000 && other == 0, "{} trees: {other} other owners", found.trees);
 }

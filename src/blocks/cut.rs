@@ -10,6 +10,7 @@ use crate::layout::Grid;
 use crate::mesh::{Mesh, On};
 use crate::options::{BuildOptions, Fineness, Lists};
 use crate::reference::boundary::{Topology, neighbours};
+use crate::reference::corners::crowded_vertices;
 use crate::reference::depth::measure;
 use crate::reference::vertices::Vertices;
 use rayon::prelude::*;
@@ -33,6 +34,8 @@ pub(super) struct Source<'a> {
     wanted: u32,
     topology: Arc<Topology>,
     vertices: Arc<Vertices>,
+    /// Crowded vertices. A block may have so few of the tetrahedra there that it would not notice.
+    crowded: Arc<Vec<u32>>,
 }
 
 /// A set of points of the mesh.
@@ -75,8 +78,9 @@ impl<'a> Source<'a> {
         let wanted = sizes.level(options)?.max((0..=MAX_LEVEL).rev().find(cheap).unwrap_or(0));
         let level = Some(wanted);
         let options = BuildOptions { level, capacity: Some(u32::MAX), budget: None, fineness: Fineness::Alpha, ..*options };
+        let crowded = Arc::new(crowded_vertices(mesh, &grid, &topology.valid));
         let (topology, vertices) = (Arc::new(topology), Arc::new(vertices));
-        Ok(Self { mesh, grid, options, level: wanted, wanted, topology, vertices })
+        Ok(Self { mesh, grid, options, level: wanted, wanted, topology, vertices, crowded })
     }
 
     /// The same mesh, with trees of the finest level, up to the one wanted, that suits `memory` bytes: the marks of
@@ -89,7 +93,8 @@ impl<'a> Source<'a> {
         while level > 0 && !(marks_fit(level) && self.largest(level).bytes(gpu, &at(level))? <= memory / 2) {
             level -= 1;
         }
-        Ok(Self { level, options: at(level), topology: self.topology.clone(), vertices: self.vertices.clone(), ..*self })
+        let (topology, vertices, crowded) = (self.topology.clone(), self.vertices.clone(), self.crowded.clone());
+        Ok(Self { level, options: at(level), topology, vertices, crowded, ..*self })
     }
 
     /// The size of a block of the [`LEAST`] tetrahedra with the most candidates at a level.
@@ -290,7 +295,8 @@ impl Block {
     /// Uploads the block and builds its tree.
     pub(super) fn place(&self, gpu: &Gpu, source: &Source<'_>) -> Result<Placed> {
         let (part, points) = self.part(source.mesh);
-        let mesh = DeviceMesh::upload_in(gpu, &part, BadCells::Skip, Some(&source.grid))?;
+        let crowded: Vec<u32> = source.crowded.iter().filter_map(|v| Some(points.binary_search(v).ok()? as u32)).collect();
+        let mesh = DeviceMesh::upload_arrays(gpu, &part.points, &part.tets, Some(&source.grid), &crowded)?;
         let tree = Tree::build(gpu, &mesh, &source.options)?;
         Ok(Placed { mesh, tree, ids: Some([Rc::new(points), self.tets.clone()]) })
     }

@@ -1,11 +1,12 @@
 //! A mesh on the device, in memory of its own.
 
-use super::prepare::{MeshArrays, MeshInput, MeshScratch, MeshView, Stage0, check_tets};
+use super::prepare::{Given, MeshArrays, MeshInput, MeshScratch, MeshView, Stage0, check_tets};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{Grid, MeshStatus, set_bits};
 use crate::mesh::{Mesh, fault_of};
+use crate::reference::corners::MOST_THIN;
 use std::sync::Arc;
 
 /// Meshes of this many tetrahedra are prepared in several submissions, since a system may end one that takes seconds.
@@ -63,7 +64,7 @@ impl DeviceMesh {
     /// # Errors
     /// Those of [`DeviceMesh::upload`].
     pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
-        let made = Self::upload_arrays(gpu, &mesh.points, &mesh.tets, grid)?;
+        let made = Self::upload_arrays(gpu, &mesh.points, &mesh.tets, grid, &[])?;
         if policy == BadCells::Reject && made.status.bad > 0 {
             let list = made.bad_cells()?;
             let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
@@ -74,21 +75,34 @@ impl DeviceMesh {
     }
 
     /// Uploads the points and the vertices of the tetrahedra of a mesh, as [`DeviceMesh::upload_in`] does; bad
-    /// tetrahedra are left out.
-    pub(crate) fn upload_arrays(gpu: &Gpu, places: &[[f32; 3]], corners: &[[u32; 4]], grid: Option<&Grid>) -> Result<Self> {
+    /// tetrahedra are left out. `crowded` points count as crowded, however many tetrahedra meet there.
+    pub(crate) fn upload_arrays(
+        gpu: &Gpu,
+        places: &[[f32; 3]],
+        corners: &[[u32; 4]],
+        grid: Option<&Grid>,
+        crowded: &[u32],
+    ) -> Result<Self> {
         let number = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra; 32 bits number 2^32")));
         let (points, tets) = (number(places.len())?, number(corners.len())?);
         check_tets(tets)?;
         // Level and ids are those of a tree; each tree over the mesh sets its own.
         let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, ..*grid };
-        let given = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[finest(grid)])).transpose()?;
+        let grid = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[finest(grid)])).transpose()?;
+        let thin = || {
+            let mut thin = vec![0; places.len()];
+            crowded.iter().for_each(|&v| thin[v as usize] = MOST_THIN + 1);
+            gpu.upload("olbvh.mesh.thin", &thin)
+        };
+        let thin = (!crowded.is_empty()).then(thin).transpose()?;
+        let given = Given { grid: grid.as_ref().map(Buffer::all), thin: thin.as_ref().map(Buffer::all) };
         let positions = gpu.upload("olbvh.mesh.positions", places)?;
         let cells = gpu.upload("olbvh.mesh.cells", corners)?;
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
         let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
         let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
         let (_memory, scratch) = Self::scratch(gpu, &input)?;
-        let stages = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given.as_ref().map(Buffer::all))?;
+        let stages = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given)?;
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
@@ -106,7 +120,7 @@ impl DeviceMesh {
     }
 
     /// Runs stage 0, and returns the times of its parts.
-    fn prepare(gpu: &Gpu, stage0: &Stage0<'_>, given: Option<BufferRef>) -> Result<Vec<StageTime>> {
+    fn prepare(gpu: &Gpu, stage0: &Stage0<'_>, given: Given) -> Result<Vec<StageTime>> {
         let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), time)| time.stages);
         if stage0.tets() < LARGE {
             return submit(&|r| stage0.prepare(r, given));
@@ -121,7 +135,7 @@ impl DeviceMesh {
         let (memory, scratch) = Self::scratch(&self.gpu, self.input())?;
         Ok(move || {
             let _held = &memory;
-            Self::prepare(&self.gpu, &Stage0::new(self.input(), self.arrays(), &scratch)?, None)
+            Self::prepare(&self.gpu, &Stage0::new(self.input(), self.arrays(), &scratch)?, Given::default())
         })
     }
 

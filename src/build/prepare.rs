@@ -152,7 +152,7 @@ pub(crate) fn check_points(what: &str, count: u32, stride: u32) -> Result<()> {
 /// [`Error::TooLarge`] for more than [`MAX_TETS`] tetrahedra or 2^31 floats of positions; [`Error::Invalid`] for a
 /// stride below 3.
 pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
-    Stage0::new(input, arrays, scratch)?.prepare(r, None)
+    Stage0::new(input, arrays, scratch)?.prepare(r, Given::default())
 }
 
 /// Records stage 0 for a mesh whose points have moved: [`cmd_prepare_mesh`] without the search for neighbours, which
@@ -167,6 +167,15 @@ pub fn cmd_prepare_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshAr
 /// Those of [`cmd_prepare_mesh`].
 pub fn cmd_move_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArrays, scratch: &MeshScratch) -> Result<()> {
     Stage0::new(input, arrays, scratch)?.shift(r)
+}
+
+/// What is known of a mesh beforehand, since it is a part of another one.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Given {
+    /// A [`Grid`] over bounds that contain the mesh, which is used instead of a new one.
+    pub grid: Option<BufferRef>,
+    /// Thin corners at every vertex that the mesh itself does not have.
+    pub thin: Option<BufferRef>,
 }
 
 /// The parts of stage 0, in order.
@@ -193,39 +202,43 @@ impl<'a> Stage0<'a> {
         self.input.tets
     }
 
-    /// Everything. If `given` is a [`Grid`] over bounds that contain the mesh, that grid is used instead of a new one.
-    pub fn prepare(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
+    /// Everything.
+    pub fn prepare(&self, r: &mut Recorder<'_>, given: Given) -> Result<()> {
         self.begin(r, given)?;
         self.match_faces(r)?;
         self.boundary(r, 1)
     }
 
     /// Everything before the search for neighbours.
-    pub fn begin(&self, r: &mut Recorder<'_>, given: Option<BufferRef>) -> Result<()> {
+    pub fn begin(&self, r: &mut Recorder<'_>, given: Given) -> Result<()> {
         let &MeshArrays { status, .. } = self.arrays;
         r.stage("mesh.clear", |r| {
             r.fill(status, 0);
-            self.clear(r);
+            self.clear(r, given.thin);
             r.fill(self.scratch.branches, 0);
             cmd_fill(r, self.scratch.table, u32::MAX)
         })?;
-        self.measure(r, given)
+        self.measure(r, given.grid)
     }
 
     /// Everything but the search for neighbours.
     pub fn shift(&self, r: &mut Recorder<'_>) -> Result<()> {
         r.stage("mesh.clear", |r| {
             r.fill(self.arrays.status.part(0, offset_of!(MeshStatus, overflow) as u64), 0); // that stays as it was
-            self.clear(r);
+            self.clear(r, None);
             Ok(())
         })?;
         self.measure(r, None)?;
         self.boundary(r, 0)
     }
 
-    fn clear(&self, r: &mut Recorder<'_>) {
-        for array in [self.arrays.bad, self.arrays.boundary, self.scratch.shapes, self.scratch.thin] {
+    fn clear(&self, r: &mut Recorder<'_>, thin: Option<BufferRef>) {
+        for array in [self.arrays.bad, self.arrays.boundary, self.scratch.shapes] {
             r.fill(array, 0);
+        }
+        match thin {
+            Some(given) => r.copy(given, self.scratch.thin.part(0, given.size)),
+            None => r.fill(self.scratch.thin, 0),
         }
     }
 

@@ -14,8 +14,10 @@
 
 use super::tet::{Bounds, Tet, Vec3, dot};
 use crate::grid::{canonical, per_axis, two_to};
-use crate::layout::bit;
+use crate::layout::{Grid, bit};
 use crate::mesh::Mesh;
+use rayon::prelude::*;
+use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
 /// Most thin corners at a vertex that is not crowded.
 pub const MOST_THIN: u32 = 46;
@@ -49,4 +51,22 @@ pub(super) fn thin_corners_at(mesh: &Mesh, normalised: &[Vec3], valid: &[u32]) -
         }
     }
     counts
+}
+
+/// The crowded vertices of a mesh with this grid, ascending. Corners are looked at only where so many tetrahedra meet.
+pub(crate) fn crowded_vertices(mesh: &Mesh, grid: &Grid, valid: &[u32]) -> Vec<u32> {
+    let none = || -> Vec<AtomicU32> { (0..mesh.points.len()).into_par_iter().map(|_| AtomicU32::new(0)).collect() };
+    let tets = || mesh.tets.par_iter().enumerate().filter(|&(t, _)| bit(valid, t as u32)).map(|(_, &ids)| ids);
+    let all = none();
+    tets().for_each(|ids| ids.into_iter().for_each(|v| _ = all[v as usize].fetch_add(1, Relaxed)));
+    let many = |v: u32| all[v as usize].load(Relaxed) > MOST_THIN;
+    let thin = none();
+    tets().filter(|ids| ids.iter().any(|&v| many(v))).for_each(|ids| {
+        let rank = ids.map(|v| ids.iter().filter(|&&other| other < v).count() as u32);
+        let mut at = [[0.0; 3]; 4];
+        ids.iter().zip(rank).for_each(|(&v, rank)| at[rank as usize] = grid.normalise(mesh.points[v as usize]));
+        let corners = thin_corners(&Tet::new(rank, &at));
+        ids.iter().zip(rank).filter(|(_, rank)| corners[*rank as usize]).for_each(|(&v, _)| _ = thin[v as usize].fetch_add(1, Relaxed));
+    });
+    (0..mesh.points.len() as u32).into_par_iter().filter(|&v| thin[v as usize].load(Relaxed) > MOST_THIN).collect()
 }
