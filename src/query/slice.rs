@@ -166,8 +166,7 @@ fn cmd_plan(
     cells: Option<CellRange>,
     memory: &SliceMemory,
 ) -> Result<()> {
-    let VoxelGrid { origin, next_voxel, next_row, next_layer, size: [width, height], .. } = *input.voxels;
-    let [half0, half1, half2] = input.voxels.half_axes();
+    let VoxelGrid { origin, next_voxel, next_row, next_layer, half: [half0, half1, half2], size: [width, height], .. } = *input.voxels;
     let Rows { layer, first, count: rows } = input.rows;
     let (grid, plans, [first_cell, last_cell]) = (searched.mesh.arrays.grid, memory.plan, cells.unwrap_or(CellRange::WHOLE).words());
     let arguments = SlicePlan {

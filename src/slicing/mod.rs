@@ -106,7 +106,7 @@ impl VoxelGrid {
         // the last one, what half axes gain in `over`.
         let farthest = (0..3).map(|c| f64::from(grid.lo[c].abs().max(grid.hi[c].abs()))).fold(0.0, f64::max);
         let more = rounding + DVec3::splat(largest / 1024.0 + farthest / f64::from(1 << 18));
-        let half = (hi - lo) * 0.5 + more + self.half_axes().iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
+        let half = (hi - lo) * 0.5 + more + self.half.iter().map(|&axis| wide(axis).abs()).sum::<DVec3>();
         let from_middle = corner - (lo + hi) * 0.5;
         let normals = [[0, 1], [1, 2], [2, 0]].map(|[i, j]| self.half_normal(i, j));
         DVec3::AXES.into_iter().chain(normals).all(|d| {
@@ -115,23 +115,6 @@ impl VoxelGrid {
             let end = at + along.iter().map(|a| a.max(0.0)).sum::<f64>();
             let reach = half.dot(d.abs());
             begin <= reach && -reach <= end
-        })
-    }
-
-    /// Half axes of the boxes that are tested. Each rounding of a centre is as large as 2^-24 of how far the stack reaches
-    /// from 0, of which there are four, for either of two neighbours. The longest component grows by as much, unless the
-    /// axis is so short that it counts as flat.
-    pub(crate) fn half_axes(&self) -> [[f32; 3]; 3] {
-        let last = [self.size[0], self.size[1], self.layers].map(|n| f64::from(n.saturating_sub(1)));
-        let steps = [self.next_voxel, self.next_row, self.next_layer];
-        let along = |c: usize| steps.iter().zip(last).map(|(step, n)| f64::from(step[c].abs()) * n).sum::<f64>();
-        let reach = (0..3).map(|c| f64::from(self.origin[c].abs()) + along(c)).fold(0.0, f64::max);
-        self.half.map(|mut axis| {
-            let longest = longest(axis);
-            if f64::from(axis[longest].abs()) > reach * f64::from(two_to(-83)) {
-                axis[longest] = (f64::from(axis[longest]) + reach.copysign(f64::from(axis[longest])) / f64::from(1 << 21)) as f32;
-            }
-            axis
         })
     }
 
@@ -178,29 +161,27 @@ impl VoxelGrid {
     pub fn over(&self, grid: &Grid) -> SliceUniforms {
         // 2·2^e, see `plan`. Larger half axes are refused as they are, since scaling them could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
-        let half = self.half_axes();
-        let beyond = half.iter().flatten().any(|x| x.abs() > most);
+        let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
         let normalise = |x: f32| {
             let unit = if x.abs() > most { 0.0 } else { canonical(x * grid.scale) };
             (unit * two_to(82)).round() * two_to(-42)
         };
         // A component of a centre passes through four roundings of values up to twice the largest coordinate of the mesh,
-        // in a stack that is not much larger (for others see `half_axes`). The longest component of each half axis grows by
-        // 2^-20 of that coordinate, more than half of which counts along an oblique axis, so that boxes side by side leave
-        // no gap.
+        // in a stack that is not much larger. The longest component of each half axis grows by 2^-20 of that coordinate,
+        // more than half of which counts along an oblique axis, so that boxes side by side leave no gap.
         let far = (0..3).map(|c| canonical(grid.lo[c].abs().max(grid.hi[c].abs()))).fold(0.0, f32::max);
         let gap = (canonical(far * grid.scale) * two_to(62)).ceil() * two_to(-42);
         let grown = |axis: [f32; 3]| {
-            let longest = longest(axis);
+            let longest = (1..3).fold(0, |best, c| if axis[c].abs() > axis[best].abs() { c } else { best });
             let more = if axis[longest] < 0.0 { -gap } else { gap };
             [0, 1, 2].map(|c| if c == longest { axis[c] + more } else { axis[c] })
         };
-        let normalised = half.map(|axis| axis.map(normalise));
+        let normalised = self.half.map(|axis| axis.map(normalise));
         let sum = |axes: &[[f32; 3]; 3], c: usize| (axes[0][c].abs() + axes[1][c].abs()) + axes[2][c].abs();
         let flat = normalised.iter().any(|axis| axis.iter().all(|&x| x == 0.0));
         let large = beyond || (0..3).any(|c| sum(&normalised, c) > two_to(41));
         let largest = (0..3).map(|c| canonical(grid.hi[c] - grid.lo[c])).fold(0.0, f32::max);
-        let reach = |c: usize| sum(&half, c) * (1.0 + two_to(-10)) + (largest * two_to(-14) + canonical(far * two_to(-18)));
+        let reach = |c: usize| sum(&self.half, c) * (1.0 + two_to(-10)) + (largest * two_to(-14) + canonical(far * two_to(-18)));
         let pad = |v: [f32; 3]| [v[0], v[1], v[2], 0.0];
         SliceUniforms {
             origin: pad(self.origin),
@@ -237,11 +218,6 @@ impl VoxelGrid {
             ))),
         }
     }
-}
-
-/// The longest component of an axis, the first of several.
-fn longest(axis: [f32; 3]) -> usize {
-    (1..3).fold(0, |best, c| if axis[c].abs() > axis[best].abs() { c } else { best })
 }
 
 /// Consecutive rows of a stack.
