@@ -95,7 +95,7 @@ impl DeviceMesh {
             gpu.upload("olbvh.mesh.thin", &thin)
         };
         let thin = (!crowded.is_empty()).then(thin).transpose()?;
-        let given = Given { grid: grid.as_ref().map(Buffer::all), thin: thin.as_ref().map(Buffer::all) };
+        let given = Given { grid: grid.as_ref().map(Buffer::all), thin: thin.as_ref().map(|thin| (thin.all(), crowded.len() as u32)) };
         let positions = gpu.upload("olbvh.mesh.positions", places)?;
         let cells = gpu.upload("olbvh.mesh.cells", corners)?;
         let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };

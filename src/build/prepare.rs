@@ -174,8 +174,8 @@ pub fn cmd_move_mesh(r: &mut Recorder<'_>, input: &MeshInput, arrays: &MeshArray
 pub(super) struct Given {
     /// A [`Grid`] over bounds that contain the mesh, which is used instead of a new one.
     pub grid: Option<BufferRef>,
-    /// Thin corners at every vertex that the mesh itself does not have.
-    pub thin: Option<BufferRef>,
+    /// Thin corners at every vertex that the mesh itself does not have, and at how many vertices they are too many.
+    pub thin: Option<(BufferRef, u32)>,
 }
 
 /// The parts of stage 0, in order.
@@ -213,8 +213,16 @@ impl<'a> Stage0<'a> {
     pub fn begin(&self, r: &mut Recorder<'_>, given: Given) -> Result<()> {
         let &MeshArrays { status, .. } = self.arrays;
         r.stage("mesh.clear", |r| {
-            r.fill(status, 0);
-            self.clear(r, given.thin);
+            if let Some((_, many)) = given.thin {
+                // Kernels look for crowded vertices only if there are any.
+                let (at, size) = (offset_of!(MeshStatus, crowded) as u64, size_of::<MeshStatus>() as u64);
+                r.fill(status.part(0, at), 0);
+                r.fill(status.part(at, 4), many);
+                r.fill(status.part(at + 4, size - at - 4), 0);
+            } else {
+                r.fill(status, 0);
+            }
+            self.clear(r, given.thin.map(|(thin, _)| thin));
             r.fill(self.scratch.branches, 0);
             cmd_fill(r, self.scratch.table, u32::MAX)
         })?;
