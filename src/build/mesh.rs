@@ -181,11 +181,6 @@ impl DeviceMesh {
         &self.gpu
     }
 
-    /// Numbers of points and tetrahedra.
-    pub(crate) fn sizes(&self) -> [usize; 2] {
-        [self.input().points as usize, self.input().tets as usize]
-    }
-
     /// [`DeviceMesh::input`] and [`DeviceMesh::arrays`] together, as recording functions take them.
     pub fn view(&self) -> MeshView {
         self.kept.view

@@ -66,7 +66,7 @@ impl ScenePlan {
         let Self { points, stride, tets, options, .. } = *self;
         let needed = [u64::from(stride) * u64::from(points.saturating_sub(1)) + 3, 4 * u64::from(tets)].map(|n| n.saturating_mul(4));
         if positions.size() < needed[0] || cells.size() < needed[1] {
-            let [these, those] = [positions, cells].map(|part| part.size());
+            let [these, those] = [positions, cells].map(BufferRef::size);
             return Err(Error::Invalid(format!(
                 "{these} bytes of positions and {those} of cells; the plan has {} and {}",
                 needed[0], needed[1]

@@ -72,8 +72,8 @@ impl HeldMesh {
 
     /// The caller's field, brought into the order of the mesh.
     fn field(&self, values: *const f32, on_cells: u32) -> Result<(Vec<f32>, On)> {
-        let (on, [points, tets]) = (on(on_cells), self.device.sizes());
-        let values = array(values, if on == On::Points { points } else { tets }, "values")?;
+        let (on, mesh) = (on(on_cells), self.device.input());
+        let values = array(values, if on == On::Points { mesh.points } else { mesh.tets } as usize, "values")?;
         let ids = self.ids.as_ref().map(|[cells, points]| if on == On::Points { points } else { cells });
         Ok((ids.map_or_else(|| values.to_vec(), |ids| ids.iter().map(|&i| values[i as usize]).collect()), on))
     }

@@ -37,7 +37,7 @@ pub fn pictures(tree: *mut OlbvhTree, values: &[f32], prepare: &dyn Fn(&OlbvhPic
             assert!(colors == expected && held() == needed, "{settings:?} {:?}", held());
         }
     }
-    let (cells, mut colors) = (vec![0f32; mesh.device.sizes()[1]], vec![[0f32; 4]; 37 * 30]);
+    let (cells, mut colors) = (vec![0f32; mesh.device.input().tets as usize], vec![[0f32; 4]; 37 * 30]);
     assert_eq!(olbvh_render(tree, &raw const iso, cells.as_ptr(), 1, colors.as_mut_ptr().cast()), OlbvhStatus::Invalid);
     assert!(message().contains("a field of cells"), "{}", message());
 }
