@@ -29,12 +29,14 @@
 //! ```no_run
 //! use olbvh::{build::{PlacedScene, ScenePlan}, gpu::{BufferRef, Gpu, Recorder}, query::*, Result};
 //!
-//! /// `positions`: three floats per point; `cells`: four indices per tetrahedron. Either buffer is yours.
-//! fn place(gpu: &Gpu, (positions, points): (BufferRef, u32), (cells, tets): (BufferRef, u32)) -> Result<PlacedScene> {
-//!     let plan = ScenePlan::usual(points, tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
+//! /// A mesh in your buffers: three floats per point, and four indices per tetrahedron.
+//! struct Yours { positions: BufferRef, points: u32, cells: BufferRef, tets: u32 }
+//!
+//! /// `buffer` makes a buffer of yours of so many bytes.
+//! fn place(gpu: &Gpu, mesh: &Yours, buffer: impl Fn(u64) -> BufferRef) -> Result<PlacedScene> {
+//!     let plan = ScenePlan::usual(mesh.points, mesh.tets, 7); // level 7, or that of `Tree::build` for the undeformed mesh
 //!     let bytes = plan.bytes(gpu)?;
-//!     let [memory, scratch]: [BufferRef; 2] = todo!("buffers of yours of {} and {} bytes", bytes.memory, bytes.scratch);
-//!     plan.place(gpu, positions, cells, memory, scratch)
+//!     plan.place(gpu, mesh.positions, mesh.cells, buffer(bytes.memory), buffer(bytes.scratch))
 //! }
 //!
 //! /// Records into your command buffer; `r` comes from `Recorder::new(&gpu, commands, None)`, which is unsafe.

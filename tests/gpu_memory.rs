@@ -53,6 +53,14 @@ fn too_large_a_buffer_is_refused() {
     }
 }
 
+/// Also where a pool has buffers that it is compared with.
+#[test]
+fn a_pool_refuses_what_no_buffer_holds() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap().with_pool(1 << 24);
+    drop(gpu.buffer("olbvh.test.kept", 1 << 20).unwrap());
+    assert!(gpu.buffer("olbvh.test.large", u64::MAX).unwrap_err().to_string().contains("olbvh.test.large"));
+}
+
 /// After a build only the tree is left, and the peak is the one planned.
 #[test]
 fn a_build_allocates_what_it_needs() {

@@ -85,7 +85,8 @@ impl<'a> Subject<'a> {
 
     /// Draws the field; `None` if the structure cannot.
     pub(super) fn render(&self, structure: &Structure) -> Result<Option<Rendered>> {
-        let (Some(plan), field) = (&self.plan, (self.field.values.as_slice(), On::Points)) else { return Ok(None) };
+        let Some(plan) = &self.plan else { return Ok(None) };
+        let field = (self.field.values.as_slice(), On::Points);
         match structure {
             Structure::Octree(tree) => query::render(tree, plan, field, None, SILENT).map(Some),
             Structure::Lbvh(lbvh) => lbvh.render(plan, field, None, SILENT).map(Some),
@@ -95,7 +96,8 @@ impl<'a> Subject<'a> {
 
     /// Slices the mesh through its middle; `None` if the structure cannot.
     pub(super) fn slice(&self, structure: &Structure, sink: &mut dyn FnMut(Band) -> Result<()>) -> Result<Option<Sliced>> {
-        let (Some(voxels), field) = (&self.voxels, Some((self.field.values.as_slice(), On::Points))) else { return Ok(None) };
+        let Some(voxels) = &self.voxels else { return Ok(None) };
+        let field = Some((self.field.values.as_slice(), On::Points));
         match structure {
             Structure::Octree(tree) => query::slice(tree, field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some),
             Structure::Lbvh(lbvh) => lbvh.slice(field, voxels, Extrapolate::Nearest, SILENT, sink).map(Some),

@@ -8,8 +8,8 @@ use std::ffi::{CStr, c_char};
 /// Vendor id of Intel.
 pub(super) const INTEL: u32 = 0x8086;
 
-/// Extensions of use. The second must be enabled on a device that does not implement all of Vulkan, such as MoltenVK's.
-const OF_USE: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
+/// The extensions that are enabled where the device has them. The second must be enabled on a device that does not implement all of Vulkan, such as MoltenVK's.
+const WANTED: [&CStr; 2] = [ash::ext::subgroup_size_control::NAME, ash::khr::portability_subset::NAME];
 
 /// Ways in which a device supports ray tracing; only a baseline uses it.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -257,7 +257,7 @@ impl Requirements {
         ray_extensions.extend(ray_tracing.pipelines.then_some(ash::khr::ray_tracing_pipeline::NAME));
         Self {
             missing,
-            extensions: OF_USE.into_iter().filter(|e| has(e)).collect(),
+            extensions: WANTED.into_iter().filter(|e| has(e)).collect(),
             ray_extensions,
             buffer_addresses: addresses.buffer_device_address != 0,
             shader_int64: core.shader_int64 != 0,

@@ -83,7 +83,8 @@ pub struct Scene {
     pub tree: TreeMemory,
     /// Number of entries of the longest leaf. Lists are searched in parts, up to this length, so too small a number
     /// loses points. [`Scene::recorded`] gives the number of tetrahedra, which no list exceeds; that costs up to
-    /// [`MAX_LIST_PARTS`] dispatches, unless a host reads back [`crate::layout::BuildStatus::longest_leaf`].
+    /// [`MAX_LIST_PARTS`] dispatches on a GPU, and one for every [`LIST_PART`] tetrahedra on a processor. A host that reads
+    /// back [`crate::layout::BuildStatus::longest_leaf`] spares them.
     pub longest_leaf: u32,
 }
 

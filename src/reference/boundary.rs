@@ -1,7 +1,7 @@
 //! Topology of a mesh: bad tetrahedra, neighbours across faces, boundary tetrahedra, bounds (SPEC 2.3). Twin of
 //! `glsl/build/0*`.
 
-use super::corners::{MOST_THIN, thin_corners_at};
+use super::corners::crowded_vertices;
 use super::tet::Tet;
 use crate::error::{Error, Result};
 use crate::grid::Grid;
@@ -89,8 +89,8 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
     let (neighbours, branched) = neighbours(mesh, &valid);
     let normalised: Vec<_> = mesh.points.par_iter().map(|&p| grid.normalise(p)).collect();
     let signs: Vec<Signs> = mesh.tets.par_iter().enumerate().map(|(t, &ids)| Signs::new(bit(&valid, t as u32), ids, &normalised)).collect();
-    let thin = thin_corners_at(mesh, &normalised, &valid);
-    let at_crowded = |t: u32| mesh.tets[t as usize].iter().any(|&v| thin[v as usize] > MOST_THIN);
+    let crowded = crowded_vertices(mesh, &grid, &valid);
+    let at_crowded = |t: u32| !crowded.is_empty() && mesh.tets[t as usize].iter().any(|v| crowded.binary_search(v).is_ok());
     let is_boundary = |t: u32| bit(&valid, t) && (on_boundary(mesh, &neighbours, &signs, t) || at_crowded(t));
     let boundary = words(mesh.tets.len(), &is_boundary);
     let count = |pick: fn(&Signs) -> bool| signs.par_iter().filter(|s| pick(s)).count() as u32;
@@ -98,7 +98,7 @@ pub fn topology(mesh: &Mesh) -> Result<Topology> {
         boundary: boundary.iter().map(|w| w.count_ones()).sum(),
         negative: count(|s| s.caller < 0),
         flat: count(|s| s.valid && s.sorted == 0),
-        crowded: thin.iter().filter(|&&count| count > MOST_THIN).count() as u32,
+        crowded: crowded.len() as u32,
         branched,
         ..counts
     };

@@ -40,19 +40,6 @@ pub fn thin_corners(tet: &Tet) -> [bool; 4] {
     [(ab * ac) * ad, (ab * bc) * bd, (ac * bc) * cd, (ad * bd) * cd].map(|room| square <= room * 0.09375)
 }
 
-/// The number of thin corners at every vertex, of valid tetrahedra.
-pub(super) fn thin_corners_at(mesh: &Mesh, normalised: &[Vec3], valid: &[u32]) -> Vec<u32> {
-    let mut counts = vec![0; mesh.points.len()];
-    for (_, &ids) in (0..).zip(&mesh.tets).filter(|&(t, _)| bit(valid, t)) {
-        let tet = Tet::new(ids, normalised);
-        let thin = thin_corners(&tet);
-        for (&v, rank) in ids.iter().zip(tet.rank) {
-            counts[v as usize] += u32::from(thin[rank]);
-        }
-    }
-    counts
-}
-
 /// The crowded vertices of a mesh with this grid, ascending. Corners are looked at only where so many tetrahedra meet.
 pub(crate) fn crowded_vertices(mesh: &Mesh, grid: &Grid, valid: &[u32]) -> Vec<u32> {
     let none = || -> Vec<AtomicU32> { (0..mesh.points.len()).into_par_iter().map(|_| AtomicU32::new(0)).collect() };

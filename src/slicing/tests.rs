@@ -116,3 +116,22 @@ fn too_large_voxels_are_refused_with_the_limit() {
         assert!(error.contains("more than 8 along an axis, which is 2 to 4 times the size of the mesh"), "{error}");
     }
 }
+
+/// Devices may flush denormals.
+#[test]
+fn denormal_steps_count_as_none() {
+    let stack = |x: f32| VoxelGrid { origin: [1e-38, 0.0, 0.0], next_voxel: [x, 0.0, 2.0], ..voxels([4, 1], 1) };
+    assert_eq!(stack(1e-39).centre([3, 0, 0]), [0.0, 0.0, 6.0]);
+    assert_eq!(stack(2e-38).centre([3, 0, 0])[0], 3.0 * 2e-38);
+}
+
+#[test]
+fn normals_have_any_length() {
+    let of =
+        |normal: [f64; 3]| SliceSettings { plane: Plane::Normal(normal), ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]);
+    let expected = of([1.0, 2.0, -2.0]).unwrap();
+    for length in [1e200, 1e-200] {
+        assert_eq!(of([length, 2.0 * length, -2.0 * length]).unwrap(), expected);
+    }
+    assert!(of([0.0; 3]).is_err() && of([f64::NAN, 0.0, 1.0]).is_err() && of([f64::INFINITY, 0.0, 0.0]).is_err());
+}

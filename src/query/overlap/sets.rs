@@ -98,8 +98,9 @@ pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapM
             let parts = directions.each_ref().map(|d| list_parts(r.gpu().report().kind, d.other.longest_leaf));
             for part in 0..parts[0].1.max(parts[1].1) {
                 r.barrier("overlap.used → overlap.places");
-                let with_more = directions.iter().zip(parts).filter(|(_, (_, count))| part < *count);
-                with_more.into_iter().try_for_each(|(d, (length, _))| d.cmd_places(r, part, length))?;
+                for (direction, (length, _)) in directions.iter().zip(parts).filter(|(_, (_, count))| part < *count) {
+                    direction.cmd_places(r, part, length)?;
+                }
             }
             Ok(())
         })?;
