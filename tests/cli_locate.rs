@@ -104,12 +104,15 @@ fn fields_go_from_one_mesh_to_another() {
     let triangle = "# vtk DataFile Version 3.0\nto\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 3 float\n0 0 0 1 0 0 9 1 0\nCELLS 1 4\n\
                     3 0 1 2\nCELL_TYPES 1\n5\n";
     std::fs::write(folder.path().join("hexahedron.vtk"), hexahedron).unwrap();
+    let faces = "31 6 4 8 1 2 3 4 4 5 6 7 4 8 1 5 4 4 1 2 6 5 4 2 3 7 6 4 3 8 4 7";
+    let polyhedron = hexahedron.replace("1 9\n8 8 1 2 3 4 5 6 7", &format!("1 32\n{faces}")).replace("1\n12", "1\n42");
+    std::fs::write(folder.path().join("polyhedron.vtk"), polyhedron).unwrap();
     std::fs::write(folder.path().join("triangle.vtk"), triangle).unwrap();
     let mut beyond = kuhn([2, 2, 2]).unwrap();
     beyond.points.iter_mut().for_each(|p| p[0] = 1.5 * p[0] + 0.25);
     write_mesh(folder.path().join("beyond.vtu"), &beyond).unwrap();
     let locate = |to: &str, out: &str| json(folder.path(), &["locate", "from.vtu", to, "-o", out, "--all-fields", "--device", "cpu"]);
-    for (to, points, found) in [("hexahedron.vtk", 9, 9), ("beyond.vtu", 27, 18), ("kuhn:1,2,3", 24, 24)] {
+    for (to, points, found) in [("hexahedron.vtk", 9, 9), ("polyhedron.vtk", 10, 10), ("beyond.vtu", 27, 18), ("kuhn:1,2,3", 24, 24)] {
         let result = locate(to, "out.vtu");
         assert_eq!((result["points"].as_u64(), result["found"].as_u64()), (Some(points), Some(found)), "{to}");
         let to = load(if to.contains(':') { to.into() } else { folder.path().join(to) }, &LoadOptions::default()).unwrap().mesh;
@@ -127,13 +130,12 @@ fn fields_go_from_one_mesh_to_another() {
         }
     }
     // Cells that cannot be read are missing in the result, which is told where it has cells.
-    let with_prism =
-        hexahedron.replace("CELLS 1 9\n", "CELLS 2 20\n10 0 1 2 3 4 5 6 7 8 0\n").replace("CELL_TYPES 1\n", "CELL_TYPES 2\n15 ");
-    for (content, out, is_told) in [(hexahedron, "out.vtu", false), (&with_prism, "out.vtu", true), (&with_prism, "out.csv", false)] {
-        std::fs::write(folder.path().join("prism.vtk"), content).unwrap();
-        let run = olbvh(folder.path(), &["locate", "from.vtu", "prism.vtk", "-o", out, "--device", "cpu"]);
+    let with_set = hexahedron.replace("CELLS 1 9\n", "CELLS 2 14\n4 0 1 2 3\n").replace("CELL_TYPES 1\n", "CELL_TYPES 2\n41 ");
+    for (content, out, is_told) in [(hexahedron, "out.vtu", false), (&with_set, "out.vtu", true), (&with_set, "out.csv", false)] {
+        std::fs::write(folder.path().join("set.vtk"), content).unwrap();
+        let run = olbvh(folder.path(), &["locate", "from.vtu", "set.vtk", "-o", out, "--device", "cpu"]);
         let told = text(&run.stderr);
-        assert_eq!(told.contains("prism.vtk: 1 pentagonal prism: NOT READ, so the mesh has holes there"), is_told, "{out}: {told}");
+        assert_eq!(told.contains("set.vtk: 1 convex point set: NOT READ, so the mesh has holes there"), is_told, "{out}: {told}");
     }
     // A mesh without volume cells has its points located, too.
     let result = locate("triangle.vtk", "out.vtu");

@@ -5,7 +5,7 @@
 mod formats_small;
 
 use formats_small::shared;
-use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, TimeStep, load};
 use olbvh::mesh::{Mesh, On};
 use std::fs;
 use tempfile::TempDir;
@@ -121,11 +121,31 @@ fn errors_name_the_list_or_the_listed_file() {
     assert!(error.ends_with("4.pvtu: line 3: `5.pvtu`: lists lie more than 4 deep within each other"), "{error}");
     let empty = read(&folder, "case.pvtu", &file("PUnstructuredGrid", "<PPointData/>")).unwrap_err();
     assert_eq!(empty, "case.pvtu: it lists no file with an unstructured grid");
-    let steps = "<DataSet timestep='0' file='0.vtu'/><DataSet timestep='0' file='1.vtu'/><DataSet timestep='0.5' file='2.vtu'/>";
-    let series = |steps: &str| read(&folder, "case.pvd", &file("Collection", steps)).unwrap_err();
-    assert!(series(steps).ends_with("open a copy of the list with the files of one step only, for example timestep=\"0.5\""));
-    let whole = series(&steps.replace("<DataSet timestep='0' file='1.vtu'/>", ""));
-    assert_eq!(whole, "case.pvd: a series of 2 time steps; open one of its files, for example `2.vtu`");
+}
+
+/// Three steps, of which the first and the last have two files; another file belongs to all of them.
+#[test]
+fn a_step_of_a_series_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let sets = [(0, "0"), (1, "0"), (2, "0.5"), (3, "1e1"), (4, "1e1")];
+    let mut list: String = sets.map(|(x, step)| format!("<DataSet timestep='{step}' file='{x}.vtu'/>")).concat();
+    list += "<DataSet file='9.vtu'/>";
+    for x in [0, 1, 2, 3, 4, 9] {
+        let tet = piece(&format!("{x}0 0 0 {x}1 0 0 {x}0 1 0 {x}0 0 1"), x);
+        fs::write(folder.path().join(format!("{x}.vtu")), file("UnstructuredGrid", &tet)).unwrap();
+    }
+    fs::write(folder.path().join("case.pvd"), file("Collection", &list)).unwrap();
+    let read = |step: TimeStep| load(folder.path().join("case.pvd"), &LoadOptions { step, ..LoadOptions::default() });
+    for (step, number, wanted) in
+        [("0", 0, &[0.0, 1.0, 9.0][..]), ("1", 1, &[2.0, 9.0]), ("2", 2, &[3.0, 4.0, 9.0]), ("Last", 2, &[3.0, 4.0, 9.0])]
+    {
+        let Loaded { mesh, report } = read(step.parse().unwrap()).unwrap();
+        assert_eq!(mesh.field("s").unwrap().values, wanted, "{step}");
+        assert!(report.warnings.iter().any(|w| w.starts_with(&format!("time step {number} of 0 to 2 is read; --time-step"))), "{report}");
+    }
+    let error = read(TimeStep::Number(3)).unwrap_err().to_string();
+    assert!(error.ends_with("case.pvd: there is no time step 3; the steps are 0 to 2"), "{error}");
+    assert!(["", "-1", "first", "1.5"].iter().all(|text| text.parse::<TimeStep>().is_err()));
 }
 
 /// The content of a `.vtu` file: points, cells of one type with the nodes of all one after the other, marks of ghosts, and

@@ -1,4 +1,4 @@
-//! Hexahedra, wedges and pyramids are split into tetrahedra that fit together and fill the same space.
+//! Hexahedra, wedges, pyramids and polyhedra are split into tetrahedra that fit together and fill the same space.
 #![cfg(feature = "formats")]
 #![allow(clippy::unwrap_used)] // also in helpers of tests
 #![allow(clippy::format_push_string)] // simple code matters more than speed here
@@ -47,7 +47,10 @@ fn check(mesh: &Mesh, wanted: f64, boundary: usize) {
     assert!(edges.values().all(|&n| n == 2));
 }
 
-/// A grid of hexahedra with shuffled vertex numbers; some cells are cut into two wedges, others into six pyramids.
+/// The faces of a hexahedron.
+const SIDES: [[usize; 4]; 6] = [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]];
+
+/// A grid of hexahedra with shuffled vertex numbers; some are voxels, some polyhedra, and others are cut into six pyramids.
 fn grid(n: usize, seed: u64) -> String {
     let mut state = seed;
     let mut random = move |m: usize| {
@@ -69,7 +72,7 @@ fn grid(n: usize, seed: u64) -> String {
         let (x, y, z) = (cell % n, cell / n % n, cell / n / n);
         let v = |dx, dy, dz| name[id(x + dx, y + dy, z + dz)];
         let hex = [v(0, 0, 0), v(1, 0, 0), v(1, 1, 0), v(0, 1, 0), v(0, 0, 1), v(1, 0, 1), v(1, 1, 1), v(0, 1, 1)];
-        match random(4) {
+        match random(5) {
             0 => {
                 cells.push(vec![hex[0], hex[1], hex[3], hex[2], hex[4], hex[5], hex[7], hex[6]]);
                 types.push(11);
@@ -78,10 +81,15 @@ fn grid(n: usize, seed: u64) -> String {
                 let centre = points.len();
                 let h = hex.map(|v| points[v]);
                 points.push([0, 1, 2].map(|c| h.iter().map(|p| p[c]).sum::<f64>() / 8.0));
-                for face in [[0, 1, 2, 3], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]] {
+                for face in SIDES {
                     cells.push(face.map(|c| hex[c]).into_iter().chain([centre]).collect());
                     types.push(14);
                 }
+            }
+            2 => {
+                let list = |face: [usize; 4]| std::iter::once(4).chain(face.map(|c| hex[c]));
+                cells.push(std::iter::once(6).chain(SIDES.into_iter().flat_map(list)).collect());
+                types.push(42);
             }
             _ => {
                 cells.push(hex.to_vec());
@@ -117,7 +125,7 @@ fn read(text: &str) -> Mesh {
 
 #[test]
 fn random_numberings_conform() {
-    let mut counts = [0; 8];
+    let mut counts = [0; 13];
     for seed in 0..20 {
         let n = 3;
         let mesh = read(&grid(n, seed));
@@ -128,8 +136,9 @@ fn random_numberings_conform() {
             counts[ids.iter().filter(|&&id| id == cell).count()] += 1;
         }
     }
-    assert!(counts[2] > 0 && counts[5] > 0 && counts[6] > 0, "pyramids of 2, hexahedra of 5 and of 6 tetrahedra: {counts:?}");
-    assert_eq!(counts.iter().sum::<usize>(), counts[2] + counts[5] + counts[6]);
+    let of = [2, 5, 6, 12].map(|n| counts[n]);
+    assert!(of.iter().all(|&n| n > 0), "pyramids of 2, hexahedra of 5 and of 6, polyhedra of 12 tetrahedra: {counts:?}");
+    assert_eq!(counts.iter().sum::<usize>(), of.iter().sum::<usize>());
 }
 
 #[test]

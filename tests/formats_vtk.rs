@@ -5,7 +5,7 @@
 mod formats_small;
 
 use formats_small::{POINTS, all, open_bytes, replace, small};
-use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load_bytes, load_points};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, TimeStep, load_bytes, load_points};
 
 /// The cell field `c`, 0 to 5, serves as marks of ghosts here.
 #[test]
@@ -78,7 +78,7 @@ fn bytes_that_are_the_active_scalars() {
 
 /// VTK writes several time steps into one file on demand; what stays the same names several.
 #[test]
-fn of_several_time_steps_the_first_is_read() {
+fn one_of_several_time_steps_is_read() {
     let text = String::from_utf8(small("ascii.vtu")).unwrap();
     let again = |text: &str, name: &str, first: &str| {
         let at = text.find(&format!("Name=\"{name}\"")).unwrap();
@@ -89,11 +89,29 @@ fn of_several_time_steps_the_first_is_read() {
         format!("{}{}{later}{}", &text[..begin], step(first), &text[end..])
     };
     let steps = again(&again(&again(&text, "s", "3"), "Points", "3 4"), "connectivity", "3");
-    let Loaded { mesh, report } = open_bytes("steps.vtu", steps.into_bytes());
+    let at = |step| load_bytes("steps.vtu", steps.clone().into_bytes(), &LoadOptions { step, ..LoadOptions::default() });
+    let Loaded { mesh, report } = at(TimeStep::Number(0)).unwrap();
     let plain = open_bytes("ascii.vtu", text.clone().into_bytes()).mesh;
     assert_eq!((&mesh.points, &mesh.tets), (&plain.points, &plain.tets));
     assert_eq!((mesh.fields.len(), &mesh.field("s").unwrap().values), (2, &plain.field("s").unwrap().values));
-    assert!(report.warnings.len() == 1 && report.warnings[0].starts_with("the file has 3 time steps, of which the first"), "{report}");
+    assert!(report.warnings.len() == 1 && report.warnings[0].starts_with("time step 0 of 0 to 2 is read; "), "{report}");
+    // The second has points only.
+    let error = at(TimeStep::Number(1)).unwrap_err().to_string();
+    assert!(error.contains("no array `connectivity` in <Cells>"), "{error}");
+    let error = at(TimeStep::Number(3)).unwrap_err().to_string();
+    assert!(error.ends_with("there is no time step 3; the steps are 0 to 2"), "{error}");
+    let array = |steps: &str, first: &str| format!("<DataArray TimeStep=\"{steps}\" type=\"Float32\" Name=\"s\">{first} 1 2 3 4 5 6 7<");
+    let old = "<DataArray type=\"Float32\" Name=\"s\" NumberOfComponents=\"1\" format=\"ascii\">0 1 2 3 4 5 6 7<";
+    let three = [array("0", "10"), array("1 2", "11"), array("7", "12")].join("/DataArray>\n");
+    let series = replace("ascii.vtu", old.as_bytes(), three.as_bytes());
+    for (step, number, wanted) in [("0", 0, 10.0), ("1", 1, 11.0), ("2", 2, 11.0), ("3", 3, 12.0), ("last", 3, 12.0)] {
+        let options = LoadOptions { step: step.parse().unwrap(), ..LoadOptions::default() };
+        let Loaded { mesh, report } = load_bytes("series.vtu", series.clone(), &options).unwrap();
+        assert_eq!((mesh.fields.len(), mesh.field("s").unwrap().values[0]), (2, wanted), "{step}");
+        assert!(report.warnings[0].starts_with(&format!("time step {number} of 0 to 3 is read; ")), "{report}");
+    }
+    let plain_step = LoadOptions { step: TimeStep::Number(7), ..LoadOptions::default() };
+    assert!(load_bytes("ascii.vtu", text.clone().into_bytes(), &plain_step).is_ok());
     let points = again(&text, "Points", "3").replace(" TimeStep=\"5\"", "").replace(" TimeStep=\"3\"", "");
     let Loaded { mesh, report } = open_bytes("points.vtu", points.into_bytes());
     assert_eq!((mesh.points, report.warnings), (plain.points, vec!["<Points> has several arrays, of which the first is read".to_owned()]));

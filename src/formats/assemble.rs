@@ -5,13 +5,14 @@ use std::path::PathBuf;
 
 use super::array::{Array, MOST_COMPONENTS, Names, length};
 use super::budget::Budget;
-use super::cells::{CellType, Shape, ghost, split};
+use super::cells::{CellType, MOST_CORNERS, Shape, ghost, split};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, excerpt};
 use super::{LoadOptions, Merge};
 use crate::error::{Error, Result};
 use crate::grid::COORDINATE_LIMIT;
 use crate::mesh::{Field, Mesh, On};
+use polyhedra::Centres;
 
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
 /// [`finish`](Assembly::finish).
@@ -37,6 +38,8 @@ pub(crate) struct Assembly {
     pub warnings: Vec<String>,
     /// Limit for the NaN that fill arrays which do not cover the mesh.
     pub padding: Budget,
+    /// Points that polyhedra add to those of the file.
+    centres: Centres,
     tets: Vec<[u32; 4]>,
     /// File cell of each tetrahedron.
     ids: Vec<u32>,
@@ -67,6 +70,7 @@ impl Assembly {
             arrays: Vec::new(),
             warnings: Vec::new(),
             padding: Budget::new(source.len(), options),
+            centres: Centres::default(),
             tets: Vec::new(),
             ids: Vec::new(),
             n_cells: 0,
@@ -107,6 +111,32 @@ impl Assembly {
         self.ids.reserve(cells);
     }
 
+    /// The number of the next cell of the file.
+    fn next_id(&self) -> Result<u32> {
+        let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
+        id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.path.display())))
+    }
+
+    fn cell_error(&self, id: u32, kind: CellType, message: String) -> Error {
+        self.error_at(id, |cell| format!("cell {cell} ({})", kind.name), message)
+    }
+
+    /// Checks that the nodes of a cell are points of the piece.
+    fn check(&self, id: u32, kind: CellType, nodes: &[i64], piece: &Range<usize>) -> Result<()> {
+        let n_points = piece.len();
+        let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) else { return Ok(()) };
+        let shown = bad.saturating_add(self.first_point);
+        let last = (n_points as i64 - 1).saturating_add(self.first_point);
+        let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
+        Err(self.cell_error(id, kind, format!("names point {shown}, but {range}")))
+    }
+
+    /// The first point at the place of a point. Points at the same place count as one where faces are cut, so that cells
+    /// which share a face cut it in the same way.
+    fn place(&self, point: u32) -> u32 {
+        self.places.get(point as usize).copied().unwrap_or(point)
+    }
+
     /// Adds the next cell of the file. `nodes` are indices of points.
     pub fn push(&mut self, kind: CellType, nodes: &[i64]) -> Result<()> {
         self.push_within(kind, nodes, 0..self.points.len())
@@ -114,27 +144,19 @@ impl Assembly {
 
     /// Adds the next cell of the file. `nodes` are indices of points of a piece, which has the points `piece`.
     pub fn push_within(&mut self, kind: CellType, nodes: &[i64], piece: Range<usize>) -> Result<()> {
-        let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
-        let id = id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.path.display())))?;
-        let fail = |message| Err(self.error_at(id, |cell| format!("cell {cell} ({})", kind.name), message));
+        let id = self.next_id()?;
         let corners = kind.shape.corners();
         if kind.nodes.map_or(nodes.len() < corners, |n| n != nodes.len()) {
             let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
-            return fail(format!("{} points, but this type has {wanted}", nodes.len()));
+            return Err(self.cell_error(id, kind, format!("{} points, but this type has {wanted}", nodes.len())));
         }
-        let n_points = piece.len();
-        if let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) {
-            let shown = bad.saturating_add(self.first_point);
-            let last = (n_points as i64 - 1).saturating_add(self.first_point);
-            let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
-            return fail(format!("names point {shown}, but {range}"));
-        }
+        self.check(id, kind, nodes, &piece)?;
         let point = |i: usize| (piece.start + nodes[i] as usize) as u32;
         self.curved += u64::from(nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other));
         let before = self.tets.len();
         let fate = match kind.shape {
             Shape::Flat => Fate::Boundary,
-            Shape::Other => Fate::Unsupported,
+            Shape::Polyhedron | Shape::Other => Fate::Unsupported,
             Shape::Tetrahedron => {
                 let tet = [0, 1, 2, 3].map(point);
                 let volume = self.volume(tet);
@@ -144,10 +166,8 @@ impl Assembly {
                 if nodes.len() == 4 { Fate::Kept } else { Fate::Straightened }
             }
             shape => {
-                // Points at the same place count as one here, so that cells which share a face cut it in the same way.
-                let place = |i: usize| self.places.get(point(i) as usize).copied().unwrap_or(point(i));
-                let mut places = [0; 8];
-                places[..corners].iter_mut().enumerate().for_each(|(i, at)| *at = place(i));
+                let mut places = [0; MOST_CORNERS];
+                places[..corners].iter_mut().enumerate().for_each(|(i, at)| *at = self.place(point(i)));
                 let tets = &mut self.tets;
                 split(shape, &places[..corners], |tet| tets.push(tet.map(|v| places.iter().position(|p| *p == v).map_or(v, point))));
                 self.orient(before);
@@ -195,9 +215,7 @@ impl Assembly {
 
     /// Six times the signed volume of a tetrahedron.
     fn volume(&self, tet: [u32; 4]) -> f64 {
-        let [a, b, c, d] = tet.map(|v| self.points[v as usize]);
-        let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-        u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+        volume(tet.map(|v| self.points[v as usize]))
     }
 
     /// Checks the whole mesh and converts it to single precision.
@@ -207,13 +225,14 @@ impl Assembly {
             let found = if found.is_empty() { "and no other cells".into() } else { format!("only {}", found.join(", ")) };
             let also = self.warnings.join("; ");
             let also = if also.is_empty() { also } else { format!(" ({also})") };
-            let message = format!("the file has no tetrahedra, hexahedra, wedges or pyramids, {found}{also}");
+            let message = format!("the file has no tetrahedra or cells that can be split into some, {found}{also}");
             return Err(Error::File { path: self.path, place: String::new(), message });
         }
         if self.points.len() >= u32::MAX as usize || self.tets.len() >= (u32::MAX / 4) as usize {
             let message = format!("{}: {} points and {} tetrahedra", self.path.display(), self.points.len(), self.tets.len());
             return Err(Error::TooLarge(message));
         }
+        let added_points = self.append_centres();
         let mut used = self.used()?;
         let merged = self.merge_points(&mut used);
         let (lo, hi) = bounds(&self.points, &used);
@@ -243,6 +262,7 @@ impl Assembly {
             seconds: 0.0,
             points: points.len() as u64,
             unused_points: points.len() as u64 - n_used,
+            added_points,
             cells: self.counts,
             tetrahedra: self.tets.len() as u64,
             negative: self.negative,
@@ -354,6 +374,12 @@ impl Assembly {
     }
 }
 
+/// Six times the signed volume of a tetrahedron.
+fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
+    let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+    u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
+}
+
 fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
     let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     points
@@ -364,5 +390,6 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
 }
 
 mod pieces;
+mod polyhedra;
 #[cfg(test)]
 mod tests;

@@ -11,6 +11,10 @@ pub(crate) enum Shape {
     Voxel,
     Wedge,
     Pyramid,
+    PentagonalPrism,
+    HexagonalPrism,
+    /// A cell that the file describes by its faces.
+    Polyhedron,
     /// A volume that cannot be split.
     Other,
 }
@@ -25,54 +29,80 @@ pub(crate) struct CellType {
 }
 
 impl Shape {
-    /// Number of corners of a volume that can be split.
+    /// Number of corners of a volume that can be split; a polyhedron may have any number.
     pub const fn corners(self) -> usize {
         match self {
             Shape::Tetrahedron => 4,
             Shape::Pyramid => 5,
             Shape::Wedge => 6,
             Shape::Hexahedron | Shape::Voxel => 8,
-            Shape::Flat | Shape::Other => 0,
+            Shape::PentagonalPrism => 10,
+            Shape::HexagonalPrism => 12,
+            Shape::Polyhedron | Shape::Flat | Shape::Other => 0,
         }
     }
 
-    /// The faces as corner numbers, counter-clockwise as seen from outside (in VTK's numbering); a triangle repeats its
-    /// last corner.
-    const fn faces(self) -> &'static [[u8; 4]] {
+    /// The faces as corner numbers, counter-clockwise as seen from outside (in VTK's numbering).
+    const fn faces(self) -> &'static [&'static [u8]] {
         match self {
-            Shape::Pyramid => &[[0, 3, 2, 1], [0, 1, 4, 4], [1, 2, 4, 4], [2, 3, 4, 4], [3, 0, 4, 4]],
-            Shape::Wedge => &[[0, 2, 1, 1], [3, 4, 5, 5], [0, 1, 4, 3], [1, 2, 5, 4], [2, 0, 3, 5]],
-            Shape::Hexahedron => &[[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]],
-            Shape::Voxel => &[[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [1, 3, 7, 5], [3, 2, 6, 7], [2, 0, 4, 6]],
-            Shape::Tetrahedron | Shape::Flat | Shape::Other => &[],
+            Shape::Pyramid => &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
+            Shape::Wedge => &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]],
+            Shape::Hexahedron => &[&[0, 3, 2, 1], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[3, 0, 4, 7]],
+            Shape::Voxel => &[&[0, 2, 3, 1], &[4, 5, 7, 6], &[0, 1, 5, 4], &[1, 3, 7, 5], &[3, 2, 6, 7], &[2, 0, 4, 6]],
+            Shape::PentagonalPrism => {
+                &[&[0, 4, 3, 2, 1], &[5, 6, 7, 8, 9], &[0, 1, 6, 5], &[1, 2, 7, 6], &[2, 3, 8, 7], &[3, 4, 9, 8], &[4, 0, 5, 9]]
+            }
+            Shape::HexagonalPrism => &[
+                &[0, 5, 4, 3, 2, 1],
+                &[6, 7, 8, 9, 10, 11],
+                &[0, 1, 7, 6],
+                &[1, 2, 8, 7],
+                &[2, 3, 9, 8],
+                &[3, 4, 10, 9],
+                &[4, 5, 11, 10],
+                &[5, 0, 6, 11],
+            ],
+            Shape::Tetrahedron | Shape::Polyhedron | Shape::Flat | Shape::Other => &[],
         }
     }
 }
 
-/// Splits a hexahedron, voxel, wedge or pyramid into tetrahedra and passes each to `emit`.
+/// Most corners of a cell that is not a polyhedron.
+pub(crate) const MOST_CORNERS: usize = 12;
+
+/// Cuts a face into triangles along the diagonals through its smallest vertex id, so two cells that share the face cut
+/// it in the same way, whatever their types. Vertices that are repeated give fewer triangles.
+pub(crate) fn cut(face: &[u32], mut emit: impl FnMut([u32; 3])) {
+    let Some(smallest) = (0..face.len()).min_by_key(|&i| face[i]) else { return };
+    let vertex = |i: usize| face[(smallest + i) % face.len()];
+    for i in 2..face.len() {
+        let triangle = [vertex(0), vertex(i - 1), vertex(i)];
+        if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
+            emit(triangle);
+        }
+    }
+}
+
+/// Splits a cell other than a tetrahedron or polyhedron into tetrahedra and passes each to `emit`.
 ///
-/// A quadrilateral face is cut along the diagonal through its smallest vertex id, so two cells that share the face cut
-/// it in the same way, whatever their types. Each tetrahedron is the cone from the cell's smallest vertex over a
-/// triangle of a face that does not contain it. The orientation of the numbering does not matter (files disagree about
-/// wedges). In a hexahedron, if no diagonal ends at the corner opposite to the smallest vertex, the three tetrahedra
-/// around that corner become two: five instead of six in total. Collapsed cells (with repeated vertices) give fewer.
-/// All tetrahedra of a convex cell have the same sign.
+/// Each tetrahedron is the cone from the cell's smallest vertex over a triangle (see [`cut`]) of a face that does not
+/// contain it. The orientation of the numbering does not matter (files disagree about wedges). In a hexahedron, if no
+/// diagonal ends at the corner opposite to the smallest vertex, the three tetrahedra around that corner become two: five
+/// instead of six in total. Collapsed cells (with repeated vertices) give fewer. All tetrahedra of a convex cell have the
+/// same sign.
 pub(crate) fn split(shape: Shape, corners: &[u32], mut emit: impl FnMut([u32; 4])) {
     let Some(&apex) = corners.iter().min() else { return };
-    let mut triangles = [[0; 3]; 12];
+    let mut triangles = [[0; 3]; MOST_CORNERS]; // no cell has more of them opposite to a corner
     let mut n = 0;
     for face in shape.faces() {
-        let mut quad = face.map(|c| corners[c as usize]);
-        if quad.contains(&apex) {
-            continue;
-        }
-        let smallest = (0..4).min_by_key(|&i| quad[i]).unwrap_or(0);
-        quad.rotate_left(smallest);
-        for triangle in [[quad[0], quad[1], quad[2]], [quad[0], quad[2], quad[3]]] {
-            if triangle[0] != triangle[1] && triangle[1] != triangle[2] && triangle[2] != triangle[0] {
+        let mut places = [0; 6];
+        face.iter().zip(&mut places).for_each(|(&c, place)| *place = corners[c as usize]);
+        let face = &places[..face.len()];
+        if !face.contains(&apex) {
+            cut(face, |triangle| {
                 triangles[n] = triangle;
                 n += 1;
-            }
+            });
         }
     }
     let triangles = &triangles[..n];
@@ -119,7 +149,7 @@ const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
 
 /// The cell type with this number in VTK.
 pub(crate) fn vtk(number: i64) -> Option<CellType> {
-    use Shape::{Flat, Hexahedron, Other, Pyramid, Tetrahedron, Voxel, Wedge};
+    use Shape::{Flat, HexagonalPrism, Hexahedron, Other, PentagonalPrism, Polyhedron, Pyramid, Tetrahedron, Voxel, Wedge};
     Some(match number {
         0 => cell("empty cell", Flat, 0),
         1 => cell("vertex", Flat, 1),
@@ -136,8 +166,8 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
         12 => cell("hexahedron", Hexahedron, 8),
         13 => cell("wedge", Wedge, 6),
         14 => cell("pyramid", Pyramid, 5),
-        15 => cell("pentagonal prism", Other, 10),
-        16 => cell("hexagonal prism", Other, 12),
+        15 => cell("pentagonal prism", PentagonalPrism, 10),
+        16 => cell("hexagonal prism", HexagonalPrism, 12),
         21 => cell("quadratic edge", Flat, 3),
         22 => cell("quadratic triangle", Flat, 6),
         23 => cell("quadratic quad", Flat, 8),
@@ -156,7 +186,7 @@ pub(crate) fn vtk(number: i64) -> Option<CellType> {
         36 => cell("quadratic polygon", Flat, 0),
         37 => cell("triquadratic pyramid", Pyramid, 19),
         41 => cell("convex point set", Other, 0),
-        42 => cell("polyhedron", Other, 0),
+        42 => cell("polyhedron", Polyhedron, 0),
         51..=54 | 60..=63 | 68..=70 | 75..=77 => cell("higher-order line or surface", Flat, 0),
         55..=59 => cell("parametric volume", Other, 0),
         64 | 71 | 78 => cell("higher-order tetrahedron", Tetrahedron, 0),

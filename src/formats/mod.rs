@@ -42,6 +42,7 @@ mod vtk_attributes;
 mod vtk_reader;
 mod vtu;
 mod vtu_data;
+mod vtu_faces;
 mod vtu_files;
 mod vtu_outline;
 mod vtu_parser;
@@ -50,7 +51,7 @@ mod write;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::mesh::Mesh;
 use crate::named::named;
 pub use array::without_lengths;
@@ -74,11 +75,66 @@ pub struct LoadOptions {
     /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
     /// more are left out. Default 100.
     pub expansion: u64,
+    /// Which time step of a series is read: of a `.pvd`, or of a `.vtu` with several. What has no time steps is the same
+    /// at all of them.
+    pub step: TimeStep,
 }
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { merge: Merge::default(), expansion: 100 }
+        Self { merge: Merge::default(), expansion: 100, step: TimeStep::Number(0) }
+    }
+}
+
+/// A time step of a series. `FromStr` takes a number or `last`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TimeStep {
+    /// The step with this number, counted from 0 in ascending order.
+    Number(u32),
+    /// The last step.
+    Last,
+}
+
+impl TimeStep {
+    /// The number of this step among those of a file, which become ascending; 0 if there is only one, or none.
+    fn chosen<S: AsRef<str>>(self, source: &Source, steps: &mut [S]) -> Result<usize> {
+        steps.sort_by(|a, b| {
+            let [a, b] = [a, b].map(|time| time.as_ref().trim().parse().unwrap_or(f64::NAN));
+            a.total_cmp(&b)
+        });
+        let last = steps.len().saturating_sub(1);
+        match self {
+            Self::Number(n) if last > 0 && n as usize > last => {
+                Err(source.error(format!("there is no time step {n}; the steps are 0 to {last}")))
+            }
+            Self::Number(n) => Ok((n as usize).min(last)),
+            Self::Last => Ok(last),
+        }
+    }
+
+    /// A warning that there are several steps, of which one is read.
+    fn remark(read: usize, count: usize) -> String {
+        format!("time step {read} of 0 to {} is read; --time-step (LoadOptions::step) chooses another, such as `last`", count - 1)
+    }
+}
+
+impl std::fmt::Display for TimeStep {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Number(n) => n.fmt(f),
+            Self::Last => f.write_str("last"),
+        }
+    }
+}
+
+impl std::str::FromStr for TimeStep {
+    type Err = Error;
+
+    fn from_str(text: &str) -> Result<Self> {
+        if text.eq_ignore_ascii_case("last") {
+            return Ok(Self::Last);
+        }
+        text.parse().map(Self::Number).map_err(|_| Error::Invalid(format!("`{text}` is no time step: a number from 0, or last")))
     }
 }
 

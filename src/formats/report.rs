@@ -49,6 +49,9 @@ pub struct Report {
     pub points: u64,
     /// Points that no tetrahedron uses.
     pub unused_points: u64,
+    /// Points that were added to those of the file, in the middle of polyhedra: means of their corners, with the means of
+    /// the values there.
+    pub added_points: u64,
     /// Cell types in the order in which they first appear.
     pub cells: Vec<CellCount>,
     /// Number of tetrahedra of the mesh.
@@ -95,6 +98,9 @@ impl fmt::Display for Report {
         write!(f, "{} points", self.points)?;
         if self.unused_points > 0 {
             write!(f, " ({} of them in no cell)", self.unused_points)?;
+        }
+        if self.added_points > 0 {
+            write!(f, " ({} of them added in the middle of polyhedra)", self.added_points)?;
         }
         writeln!(f, ", {} tetrahedra", self.tetrahedra)?;
         for c in &self.cells {

@@ -3,7 +3,7 @@
 use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
-use super::cells;
+use super::cells::{self, Shape};
 use super::integers::Integers;
 use super::report::Fate;
 use super::scalar::Scalar;
@@ -82,8 +82,11 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
             assembly.skip("ghost or hidden cell", Fate::Ghost);
             continue;
         }
-        // For a polyhedron the file lists its faces, not its points.
-        assembly.push(kind, if number == 42 { &[] } else { nodes })?;
+        if kind.shape == Shape::Polyhedron {
+            assembly.push_polyhedron(kind, nodes, 0..assembly.n_points())?;
+        } else {
+            assembly.push(kind, nodes)?;
+        }
     }
     for array in &assembly.arrays {
         let (count, what) = if array.on == On::Points { (assembly.n_points(), "POINTS") } else { (types.len(), "CELLS") };

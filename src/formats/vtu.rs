@@ -7,10 +7,11 @@ use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
 use super::budget::Budget;
-use super::cells::{self, CellType};
+use super::cells::{self, CellType, Shape};
 use super::report::Fate;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
+use super::vtu_faces::Faces;
 use super::vtu_files::{Files, Grid, Origin, grids};
 use super::vtu_parser::Piece;
 use crate::error::Result;
@@ -131,6 +132,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
     let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
     let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
     let points = first..first + piece.points as usize;
+    let mut faces = Faces::of(piece, source, codec)?;
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
@@ -155,7 +157,13 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
         };
         if ghost {
             assembly.skip("ghost or hidden cell", Fate::Ghost);
-        } else if let Some((_, kind)) = kind {
+            continue;
+        }
+        let Some((_, kind)) = kind else { continue };
+        if kind.shape == Shape::Polyhedron {
+            let list = faces.list(cell, source, assembly)?;
+            assembly.push_polyhedron(kind, list, points.clone())?;
+        } else {
             assembly.push_within(kind, nodes, points.clone())?;
         }
     }

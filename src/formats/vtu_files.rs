@@ -3,12 +3,12 @@
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
-use super::LoadOptions;
 use super::budget::Budget;
 use super::source::ending;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
 use super::vtu_parser::{Document, List, Piece, Skeleton, parse};
+use super::{LoadOptions, TimeStep};
 use crate::error::Result;
 
 /// Most files that a list and the lists in it may name.
@@ -67,7 +67,7 @@ pub(crate) struct Files<'a> {
 /// Finds the grids of a file.
 pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Files<'a>> {
     let bytes = source.len();
-    let list = match parse(source)? {
+    let list = match parse(source, options.step)? {
         Document::Grid(mut skeleton) => {
             let (format, warnings) = (std::mem::take(&mut skeleton.format), std::mem::take(&mut skeleton.warnings));
             return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, 0, bytes, options)], bytes, warnings });
@@ -118,21 +118,20 @@ impl Found<'_, '_> {
 
     /// Adds the grids of a list that lies in `deep - 1` others.
     fn add(&mut self, source: &Source, list: &List, deep: usize) -> Result<()> {
-        let steps: BTreeSet<_> = list.files.iter().filter_map(|file| file.step.as_deref()).collect();
-        if let Some(last) = list.files.last().filter(|_| steps.len() > 1) {
-            let remedy = if list.files.len() == steps.len() {
-                format!("open one of its files, for example `{}`", excerpt(last.path.as_bytes()))
-            } else {
-                let step = excerpt(last.step.as_deref().unwrap_or("").as_bytes());
-                format!(
-                    "each may have several files: open a copy of the list with the files of one step only, for example timestep=\"{step}\""
-                )
-            };
-            return Err(source.error(format!("a series of {} time steps; {remedy}", steps.len())));
-        }
+        let mut steps: Vec<&str> = Vec::new();
+        let mut known = HashSet::new();
+        steps.extend(list.files.iter().filter_map(|file| file.step.as_deref()).filter(|step| known.insert(*step)));
+        let step = if steps.len() > 1 {
+            let chosen = self.options.step.chosen(source, &mut steps)?;
+            self.warnings.insert(TimeStep::remark(chosen, steps.len()));
+            Some(steps[chosen])
+        } else {
+            None
+        };
         let folder = source.path.parent().unwrap_or(Path::new(""));
         let mut block = None;
-        for listed in &list.files {
+        // What has no time belongs to all steps.
+        for listed in list.files.iter().filter(|file| step.is_none() || file.step.is_none() || file.step.as_deref() == step) {
             if block.replace(listed.block) != Some(listed.block) {
                 self.blocks += 1;
             }
@@ -157,7 +156,7 @@ impl Found<'_, '_> {
                 Err(error) => return fail(format!("the listed file cannot be read ({error})")),
             };
             self.bytes += opened.len();
-            match parse(&opened)? {
+            match parse(&opened, self.options.step)? {
                 Document::Grid(mut skeleton) => {
                     self.warnings.extend(std::mem::take(&mut skeleton.warnings));
                     let grid = Grid::new(Origin::Listed(path), skeleton, self.blocks, opened.len(), self.options);

@@ -1,12 +1,13 @@
 //! Parser for the structure of VTK XML files: unstructured grids, without the values of their arrays, and files that list
 //! other files.
 
-use std::collections::BTreeSet;
+use std::collections::HashSet;
 use std::ops::Range;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
+use super::TimeStep;
 use super::scalar::Scalar;
 use super::source::{Source, excerpt, passage};
 use super::tokens::Tokens;
@@ -26,6 +27,8 @@ pub(crate) struct Skeleton {
     pub pieces: Vec<Piece>,
     pub format: String,
     pub warnings: Vec<String>,
+    /// The time steps of the file, by the names that it gives them.
+    pub steps: Vec<String>,
 }
 
 /// One `Piece` of the grid.
@@ -69,41 +72,56 @@ enum Root {
 /// Types of files that list others in elements `DataSet`.
 const LISTS: [&str; 4] = ["vtkMultiBlockDataSet", "vtkPartitionedDataSet", "vtkPartitionedDataSetCollection", "Collection"];
 
-/// Parses a file.
-pub(crate) fn parse(source: &Source) -> Result<Document> {
+/// Parses a file, of several time steps this one.
+pub(crate) fn parse(source: &Source, step: TimeStep) -> Result<Document> {
     let outline = Outline::read(source)?;
-    let reader = Reader::from_str(&outline.text);
-    Parser {
-        source,
-        outline: &outline,
-        reader,
-        stack: Vec::new(),
-        root: None,
-        pieces: Vec::new(),
-        block: 0,
-        steps: Steps::default(),
-        left_out: false,
-        second_points: false,
-        is_surface: false,
+    let parsed = |wanted: Option<String>| {
+        Parser {
+            source,
+            outline: &outline,
+            reader: Reader::from_str(&outline.text),
+            stack: Vec::new(),
+            root: None,
+            pieces: Vec::new(),
+            block: 0,
+            steps: Steps { wanted, ..Steps::default() },
+            left_out: false,
+            second_points: false,
+            is_surface: false,
+        }
+        .run()
+    };
+    let mut document = parsed(None)?;
+    let Document::Grid(Skeleton { steps, .. }) = &mut document else { return Ok(document) };
+    if steps.len() < 2 {
+        return Ok(document);
     }
-    .run()
+    let chosen = step.chosen(source, steps)?;
+    let remark = TimeStep::remark(chosen, steps.len());
+    let mut document = parsed(Some(steps.swap_remove(chosen)))?;
+    if let Document::Grid(Skeleton { warnings, .. }) = &mut document {
+        warnings.push(remark);
+    }
+    Ok(document)
 }
 
 /// The time steps of a file. VTK writes several into one file on demand: arrays of each follow each other, and those
 /// that stay the same name several.
 #[derive(Default)]
 struct Steps {
-    first: Option<String>,
-    all: BTreeSet<String>,
+    /// The one that is read; `None`: the first that the file names.
+    wanted: Option<String>,
+    all: Vec<String>,
+    seen: HashSet<String>,
 }
 
 impl Steps {
-    /// Whether an array of these steps, numbers separated by spaces, belongs to the first that the file names.
-    fn is_first(&mut self, of: &str) -> bool {
+    /// Whether an array of these steps, numbers separated by spaces, belongs to the one that is read.
+    fn are_wanted(&mut self, of: &str) -> bool {
         let steps = || of.split_ascii_whitespace();
-        self.all.extend(steps().map(str::to_owned));
-        let first = self.first.get_or_insert_with(|| steps().next().unwrap_or("").to_owned());
-        steps().any(|step| step == first)
+        self.all.extend(steps().filter(|&step| self.seen.insert(step.to_owned())).map(str::to_owned));
+        let wanted = self.wanted.get_or_insert_with(|| steps().next().unwrap_or("").to_owned());
+        steps().any(|step| step == wanted)
     }
 }
 
@@ -184,17 +202,13 @@ impl Parser<'_, '_> {
             codec.appended = self.appended(&attributes, end)?;
         }
         let mut warnings = Vec::new();
-        if self.steps.all.len() > 1 {
-            let n = self.steps.all.len();
-            warnings.push(format!("the file has {n} time steps, of which the first is read; save the step you need in a file of its own"));
-        }
         if self.is_surface {
             warnings.push("a surface, of which only the points can be read".into());
         }
         if self.second_points {
             warnings.push("<Points> has several arrays, of which the first is read".into());
         }
-        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format, warnings }))
+        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format, warnings, steps: self.steps.all }))
     }
 
     /// Locates the appended data, whose element starts before byte `end` of the file; `None` if it is empty.
@@ -295,7 +309,7 @@ impl Parser<'_, '_> {
             ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
                 let group = group.to_owned();
                 let attributes = self.attributes(element, at)?;
-                self.left_out = get(&attributes, "TimeStep").is_some_and(|steps| !self.steps.is_first(steps));
+                self.left_out = get(&attributes, "TimeStep").is_some_and(|steps| !self.steps.are_wanted(steps));
                 if group == "Points" && !self.left_out && self.pieces.last().is_some_and(|piece| piece.positions.is_some()) {
                     (self.left_out, self.second_points) = (true, true);
                 }

@@ -321,3 +321,84 @@ fn tetgen(first: u32) -> (Vec<u8>, Vec<u8>) {
         TETS.iter().enumerate().map(|(i, t)| format!("{} {} {i}\n", i as u32 + first, join(t.map(|v| v + first)))).collect();
     (format!("# points\n8 3 1 0\n{points}").into_bytes(), format!("6 4 1\n{cells}").into_bytes())
 }
+
+/// Points, cells and faces of the files of [`polyhedra`].
+pub const CORNERS: [[f64; 3]; 11] = [
+    [0., 0., 0.],
+    [1., 0., 0.],
+    [1., 1., 0.],
+    [0., 1., 0.],
+    [0., 0., 1.],
+    [1., 0., 1.],
+    [1., 1., 1.],
+    [0., 1., 1.],
+    [0.5, 0.5, 2.],
+    [2., 0.5, 1.5],
+    [0.5, 2., 1.5],
+];
+
+/// The faces of a cube, of a pyramid on it, and of a tetrahedron beside the pyramid. Their windings differ.
+const FACES: [&[&[u32]]; 3] = [
+    &[&[0, 1, 2, 3], &[4, 5, 6, 7], &[0, 1, 5, 4], &[1, 2, 6, 5], &[2, 3, 7, 6], &[4, 7, 3, 0]],
+    &[&[6, 5, 4, 7], &[4, 5, 8], &[5, 6, 8], &[6, 7, 8], &[7, 4, 8]],
+    &[&[6, 7, 8], &[6, 7, 10], &[7, 8, 10], &[8, 6, 10]],
+];
+
+/// Polyhedra in the three forms of VTK: a cube, a pyramid on it, beside that a cell of type tetrahedron, and a tetrahedron
+/// given as polyhedron. The point field `s` holds the numbers of points, the cell field `c` those of cells.
+pub fn polyhedra() -> [(&'static str, Vec<u8>); 3] {
+    let stream = |faces: &[&[u32]]| -> Vec<u32> {
+        let lists = faces.iter().flat_map(|face| std::iter::once(face.len() as u32).chain(face.iter().copied()));
+        std::iter::once(faces.len() as u32).chain(lists).collect()
+    };
+    let [cube, pyramid, last] = FACES.map(stream);
+    let tet = vec![5, 6, 8, 9];
+    let lists = [&cube, &pyramid, &tet, &last];
+    let legacy = format!(
+        "# vtk DataFile Version 3.0\n\nASCII\nDATASET UNSTRUCTURED_GRID\nPOINTS 11 double\n{}\nCELLS 4 {}\n{}\nCELL_TYPES 4\n42 42 10 42\n\
+         POINT_DATA 11\nSCALARS s float\nLOOKUP_TABLE default\n{}\nCELL_DATA 4\nSCALARS c int\nLOOKUP_TABLE default\n0 1 2 3\n",
+        join(CORNERS.as_flattened()),
+        lists.iter().map(|list| list.len() + 1).sum::<usize>(),
+        lists.map(|list| format!("{} {}\n", list.len(), join(list))).concat(),
+        join(0..11),
+    );
+    let corners = [&[0, 1, 2, 3, 4, 5, 6, 7][..], &[4, 5, 6, 7, 8], &tet, &[6, 7, 8, 10]];
+    let ends = |lengths: &[usize]| {
+        join(lengths.iter().scan(0, |end, n| {
+            *end += n;
+            Some(*end)
+        }))
+    };
+    let array =
+        |kind: &str, name: &str, text: String| format!("<DataArray type='{kind}' Name='{name}' format='ascii'>{text}</DataArray>\n");
+    let xml = |more: String| {
+        format!(
+            "<VTKFile type='UnstructuredGrid'><UnstructuredGrid><Piece NumberOfPoints='11' NumberOfCells='4'>\n<PointData>{}</PointData>\
+             <CellData>{}</CellData><Points><DataArray type='Float64' NumberOfComponents='3'>{}</DataArray></Points>\n<Cells>{}{}{}{more}\
+             </Cells></Piece></UnstructuredGrid></VTKFile>",
+            array("Float32", "s", join(0..11)),
+            array("Int32", "c", join(0..4)),
+            join(CORNERS.as_flattened()),
+            array("Int64", "connectivity", join(corners.concat())),
+            array("Int64", "offsets", ends(&corners.map(<[u32]>::len))),
+            array("UInt8", "types", "42 42 10 42".into()),
+        )
+        .into_bytes()
+    };
+    let lengths = [cube.len(), pyramid.len(), last.len()];
+    let list_ends = format!("{} {} -1 {}", lengths[0], lengths[0] + lengths[1], lengths.iter().sum::<usize>());
+    let listed = xml(array("Int64", "faces", join([&cube[..], &pyramid, &last].concat())) + &array("Int64", "faceoffsets", list_ends));
+    // The square and a triangle are shared; the faces are in no order.
+    let faces: Vec<&[u32]> =
+        FACES.concat().into_iter().rev().filter(|face| ![&[6, 5, 4, 7][..], &[6, 7, 8]].contains(face)).chain([&[6, 7, 8][..]]).collect();
+    let number = |face: &[u32]| {
+        let same = |other: &[u32]| face.len() == other.len() && face.iter().all(|v| other.contains(v));
+        faces.iter().position(|other| same(other)).unwrap()
+    };
+    let numbers: Vec<usize> = FACES.concat().into_iter().map(number).collect();
+    let numbered = xml(array("Int64", "face_connectivity", join(faces.concat()))
+        + &array("Int64", "face_offsets", ends(&faces.iter().map(|face| face.len()).collect::<Vec<_>>()))
+        + &array("Int64", "polyhedron_to_faces", join(numbers))
+        + &array("Int64", "polyhedron_offsets", "6 11 11 15".into()));
+    [("polyhedra.vtk", legacy.into_bytes()), ("listed.vtu", listed), ("numbered.vtu", numbered)]
+}

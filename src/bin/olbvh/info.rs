@@ -83,6 +83,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, solid: &Solid, s: &Su
         "source_cells": mesh.source_cells,
         "cell_types": loaded.report.cells,
         "points": mesh.points.len(),
+        "added_points": loaded.report.added_points,
         "bad_cells": s.counts.bad,
         "boundary_cells": s.counts.boundary,
         "negative_cells": s.counts.negative,
@@ -133,7 +134,11 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, solid: &Solid, s: &Su
     let Loaded { mesh, report } = loaded;
     page.section(&format!("Mesh {}", args.mesh.display()));
     page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
-    page.row("points", grouped(mesh.points.len() as u64));
+    let added = match report.added_points {
+        0 => String::new(),
+        n => format!(", {} of them added in the middle of polyhedra", grouped(n)),
+    };
+    page.row("points", grouped(mesh.points.len() as u64) + &added);
     page.row("tetrahedra", grouped(mesh.tets.len() as u64));
     for cells in report.cells.iter().filter(|cells| cells.fate != Fate::Kept) {
         page.row(&cells.name, format_args!("{}, {cells}", grouped(cells.count)));

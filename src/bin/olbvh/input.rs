@@ -5,7 +5,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::output::Progress;
 use crate::text::counted;
 use olbvh::error::Error;
-use olbvh::formats::{LoadOptions, Loaded, Merge, load, printable};
+use olbvh::formats::{LoadOptions, Loaded, Merge, TimeStep, load, printable};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::render::TransferFunction;
@@ -62,6 +62,10 @@ pub struct ReadArgs {
     /// points that become one, the first counts that has a value.
     #[arg(long, default_value_t = Merge::default(), value_parser = named::<Merge>, value_name = "nothing|pieces|all")]
     merge: Merge,
+    /// Time step to read, counted from 0, or `last`: of a .pvd, or of a .vtu with several. What has no time steps is the
+    /// same at all of them.
+    #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last")]
+    time_step: TimeStep,
 }
 
 /// Arguments that deform a mesh.
@@ -156,7 +160,7 @@ impl TreeArgs {
 impl ReadArgs {
     /// Reads a mesh and prints the warnings of its reader.
     pub fn mesh(&self, path: &Path, common: &Common) -> Outcome<Loaded> {
-        let options = LoadOptions { merge: self.merge, ..LoadOptions::default() };
+        let options = LoadOptions { merge: self.merge, step: self.time_step, ..LoadOptions::default() };
         let progress = Progress::new(common, "reading");
         let loaded = load(path, &options).map_err(|error| refused(path, error))?;
         drop(progress);

@@ -37,7 +37,7 @@ Points are in the coordinates of the mesh file. Each has one owner: the cell wit
 along the curve). Where cells of the mesh overlap each other, another of the cells that contain the point may be named, which depends on \
 the options; --all then finds all of them only with --lists all. Ids count the cells of the file from 0; 4294967295 means that there is no owner. The \
 barycentric coordinates b0 to b3 belong to the vertices of the tetrahedron in file order. For a cell that was split into tetrahedra (hexahedron, voxel, \
-wedge or pyramid), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
+wedge, pyramid, prism or polyhedron), they belong to the tetrahedron of the split that contains the point; the result does not name its vertices. \
 A .npy result is an array of records (owner, bary, value); an .npz has one array for each of them; a .csv has a line per point (x, y, z, owner, b0 to \
 b3, value); .vtu and .json are other formats. If the points are those of a mesh, a .vtu has that mesh (split into tetrahedra, if it has volume cells) with the \
 results at its points, and with --all-fields vectors are vectors again. With --all-fields or more than one --field, each field has its own name instead of `value`. Values are \
@@ -123,9 +123,14 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         args.field.iter().map(|name| input::field_named(mesh, name)).collect::<Outcome<_>>()?
     };
     let points = if args.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&args.points) };
-    let points = points.map_err(Failure::input)?;
+    let mut points = points.map_err(Failure::input)?;
     if points.is_empty() {
         common.remark(format_args!("{}: no points in it", args.points.display()));
+    }
+    let of = if output.format == OutputFormat::Vtu && !args.all { probed(&args.points, points.len(), common) } else { None };
+    if let Some(Mesh { points: all, origin, .. }) = &of {
+        // Those in the middle of polyhedra are not in the file.
+        points.extend(all[points.len()..].iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + origin[c])));
     }
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
@@ -147,7 +152,6 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
         seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
-        let of = if output.format == OutputFormat::Vtu { probed(&args.points, points.len(), common) } else { None };
         write_located(
             output.path(),
             &Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values },
@@ -189,7 +193,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 /// The mesh whose points were located, if it has volume cells.
 fn probed(path: &Path, points: usize, common: &Common) -> Option<Mesh> {
     let options = LoadOptions { merge: Merge::Nothing, ..LoadOptions::default() };
-    let Loaded { mesh, report } = load(path, &options).ok().filter(|loaded| loaded.mesh.points.len() == points)?;
+    let Loaded { mesh, report } = load(path, &options).ok()?;
+    if mesh.points.len() as u64 != points as u64 + report.added_points {
+        return None;
+    }
     for cells in report.cells.iter().filter(|cells| cells.fate == Fate::Unsupported) {
         common.remark(format_args!("{}: {}: {cells}", path.display(), counted(cells.count, &cells.name)));
     }
