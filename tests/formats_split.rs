@@ -8,7 +8,7 @@ mod formats_small;
 use std::collections::HashMap;
 
 use formats_small::shared;
-use olbvh::formats::{LoadOptions, load, load_bytes};
+use olbvh::formats::{Curved, Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::Mesh;
 
 fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
@@ -179,6 +179,43 @@ fn pieces_fit_at_the_seam() {
     let mesh = load_bytes("two.vtu", file.into_bytes(), &LoadOptions::default()).unwrap().mesh;
     assert_eq!(mesh.points.len(), 12);
     check(&mesh, 2.0, 20);
+}
+
+/// Two tetrahedra of ten nodes that share a curved face, the second with its middles in another order. The value at each
+/// node is its number.
+#[test]
+fn curved_tetrahedra_use_all_their_nodes() {
+    let corners = [[0., 0., 0.], [2., 0., 0.], [0., 2., 0.], [0., 0., 2.], [2., 2., 2.]];
+    let edges = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3], [1, 4], [2, 4], [3, 4]];
+    let mut points = corners.to_vec();
+    points.extend(edges.map(|[i, j]: [usize; 2]| [0, 1, 2].map(|c| 0.5 * (corners[i][c] + corners[j][c]))));
+    points[6][2] += 0.25; // the edge that both have
+    let cells = [vec![0, 1, 2, 3, 5, 6, 7, 8, 9, 10], vec![1, 2, 3, 4, 11, 9, 12, 13, 10, 6]];
+    let values = (0..14).map(|i| i.to_string()).collect::<Vec<_>>().join(" ");
+    let text = file(&points, &cells, &[24, 24]) + &format!("POINT_DATA 14\nSCALARS s float\nLOOKUP_TABLE default\n{values}\n");
+    let read = |curved| load_bytes("curved.vtk", text.clone().into_bytes(), &LoadOptions { curved, ..LoadOptions::default() }).unwrap();
+    let Loaded { mesh, report } = read(Curved::Split);
+    assert!(mesh.tets.len() == 16 && report.warnings.is_empty() && report.count(Fate::Split) == 2 && report.tangled == 0, "{report}");
+    assert!(mesh.tets.iter().all(|&t| volume(&mesh, t) > 0.0));
+    // The volumes of the corners' tetrahedra, without what the bend cuts off at two outer faces: a third of its height
+    // times that of a face, seen from below, which moves.
+    check(&mesh, 8.0 / 6.0 + 16.0 / 6.0 - 2.0 * (0.25 * 1.5 / 3.0), 24);
+    for v in 0..14 {
+        assert_eq!((mesh.fields[0].values[v], mesh.tets.as_flattened().contains(&(v as u32))), (v as f32, true));
+    }
+    let Loaded { mesh, report } = read(Curved::Corners);
+    assert_eq!((mesh.tets.len(), report.count(Fate::Straightened)), (2, 2));
+    assert!(report.warnings.len() == 1 && report.warnings[0].contains("--curved split"), "{report}");
+    // A node that lies far from its edge: the corners count.
+    let far = text.replacen("1 1 0.25", "1 1 9", 1);
+    let options = LoadOptions { curved: Curved::Split, ..LoadOptions::default() };
+    assert_eq!(load_bytes("far.vtk", far.into_bytes(), &options).unwrap().report.count(Fate::Straightened), 2);
+    let Some(folder) = shared("formats") else { return };
+    let whole = load(folder.join("bracket_tet10_7k.vtu"), &options).unwrap();
+    let straight = load(folder.join("bracket_tet10_7k.vtu"), &LoadOptions::default()).unwrap();
+    assert_eq!((whole.mesh.tets.len(), whole.report.tangled), (8 * straight.mesh.tets.len(), 0));
+    let sum = |mesh: &Mesh| mesh.tets.iter().map(|&t| volume(mesh, t)).sum::<f64>();
+    check(&whole.mesh, sum(&whole.mesh), 4 * faces(&straight.mesh).values().filter(|&&n| n == 1).count());
 }
 
 /// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted

@@ -5,10 +5,10 @@ use std::path::PathBuf;
 
 use super::array::{Array, MOST_COMPONENTS, Names, length};
 use super::budget::Budget;
-use super::cells::{CellType, MOST_CORNERS, Shape, ghost, split};
+use super::cells::{CellType, MOST_CORNERS, Shape, ghost, split, split_quadratic};
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, excerpt};
-use super::{LoadOptions, Merge};
+use super::{Curved, LoadOptions, Merge};
 use crate::error::{Error, Result};
 use crate::grid::COORDINATE_LIMIT;
 use crate::mesh::{Field, Mesh, On};
@@ -30,6 +30,7 @@ pub(crate) struct Assembly {
     /// The first point, of those that may become one, at the place of each point; empty: no two points coincide.
     places: Vec<u32>,
     merge: Merge,
+    curved: Curved,
     /// Number of the first point in the format, for messages.
     pub first_point: i64,
     /// Numbers of the points in the file, for messages; empty: they follow each other.
@@ -48,8 +49,10 @@ pub(crate) struct Assembly {
     negative: u64,
     flat: u64,
     tangled: u64,
-    /// Cells with nodes besides their corners.
-    curved: u64,
+    /// Cells with nodes besides their corners, of which only these are used.
+    straightened: u64,
+    /// Whether some of these are tetrahedra of ten nodes.
+    has_quadratic: bool,
     /// Number of corners of all cells together.
     n_corners: u64,
 }
@@ -65,6 +68,7 @@ impl Assembly {
             pieces: Vec::new(),
             places: Vec::new(),
             merge: options.merge,
+            curved: options.curved,
             first_point: 0,
             point_tags: Vec::new(),
             arrays: Vec::new(),
@@ -78,7 +82,8 @@ impl Assembly {
             negative: 0,
             flat: 0,
             tangled: 0,
-            curved: 0,
+            straightened: 0,
+            has_quadratic: false,
             n_corners: 0,
         }
     }
@@ -152,18 +157,35 @@ impl Assembly {
         }
         self.check(id, kind, nodes, &piece)?;
         let point = |i: usize| (piece.start + nodes[i] as usize) as u32;
-        self.curved += u64::from(nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other));
+        let has_middles = kind.shape == Shape::Tetrahedron && nodes.len() == 10;
+        self.has_quadratic |= has_middles;
+        let eight = if has_middles && self.curved == Curved::Split {
+            split_quadratic([0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| self.points[point(i) as usize]))
+        } else {
+            None
+        };
+        let is_curved = nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other);
+        self.straightened += u64::from(is_curved && eight.is_none());
         let before = self.tets.len();
         let fate = match kind.shape {
             Shape::Flat => Fate::Boundary,
             Shape::Polyhedron | Shape::Other => Fate::Unsupported,
             Shape::Tetrahedron => {
-                let tet = [0, 1, 2, 3].map(point);
-                let volume = self.volume(tet);
-                self.negative += u64::from(volume < 0.0);
-                self.flat += u64::from(volume == 0.0);
-                self.tets.push(tet);
-                if nodes.len() == 4 { Fate::Kept } else { Fate::Straightened }
+                if let Some(eight) = eight {
+                    self.tets.extend(eight.map(|tet| tet.map(point)));
+                    self.orient(before);
+                } else {
+                    let tet = [0, 1, 2, 3].map(point);
+                    let volume = self.volume(tet);
+                    self.negative += u64::from(volume < 0.0);
+                    self.flat += u64::from(volume == 0.0);
+                    self.tets.push(tet);
+                }
+                match nodes.len() {
+                    4 => Fate::Kept,
+                    _ if eight.is_some() => Fate::Split,
+                    _ => Fate::Straightened,
+                }
             }
             shape => {
                 let mut places = [0; MOST_CORNERS];
@@ -175,7 +197,7 @@ impl Assembly {
             }
         };
         let pieces = self.tets.len() - before;
-        self.n_corners += corners as u64;
+        self.n_corners += if eight.is_some() { 10 } else { corners as u64 };
         self.ids.resize(self.tets.len(), id);
         self.count(kind.name, fate, pieces as u64);
         Ok(())
@@ -245,10 +267,15 @@ impl Assembly {
         }
         self.remove_replaced(&merged, &mut points, &mut used);
         let fields = self.fields(&used);
-        if self.curved > 0 {
-            let curved = self.curved;
+        if self.straightened > 0 {
+            let n = self.straightened;
+            let remedy = if self.has_quadratic && self.curved == Curved::Corners {
+                "; --curved split (Curved::Split) uses all ten nodes of tetrahedra"
+            } else {
+                ""
+            };
             self.warnings.push(format!(
-                "{curved} cells of higher order are taken by their corners: their edges are straight, and fields are linear in them"
+                "{n} cells of higher order are taken by their corners: their edges are straight, and fields are linear in them{remedy}"
             ));
         }
         let missing = self.counts.iter().filter(|c| c.fate == Fate::Unsupported).map(|c| format!("{} {}", c.count, c.name));

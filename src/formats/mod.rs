@@ -78,11 +78,26 @@ pub struct LoadOptions {
     /// Which time step of a series is read: of a `.pvd`, or of a `.vtu` with several. What has no time steps is the same
     /// at all of them.
     pub step: TimeStep,
+    /// What becomes of curved cells.
+    pub curved: Curved,
 }
+
+/// What becomes of curved cells, that is cells with nodes besides their corners.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Curved {
+    /// Only their corners are used: edges are straight, and fields are linear in a cell.
+    #[default]
+    Corners,
+    /// A tetrahedron of ten nodes is split into eight tetrahedra, which use them all and the values there. Other curved
+    /// cells are taken by their corners, so that a mesh of both has gaps between these.
+    Split,
+}
+
+named!(Curved, "treatment of curved cells", [Corners = "corners", Split = "split"]);
 
 impl Default for LoadOptions {
     fn default() -> Self {
-        Self { merge: Merge::default(), expansion: 100, step: TimeStep::Number(0) }
+        Self { merge: Merge::default(), expansion: 100, step: TimeStep::Number(0), curved: Curved::default() }
     }
 }
 

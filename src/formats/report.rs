@@ -12,7 +12,7 @@ pub enum Fate {
     Kept,
     /// Curved tetrahedra, of which only the corners were used.
     Straightened,
-    /// Cells that were split into tetrahedra (curved cells by their corners only).
+    /// Cells that were split into tetrahedra (curved cells by their corners only, but for tetrahedra of ten nodes).
     Split,
     /// Points, lines and surfaces, which have no volume.
     Boundary,

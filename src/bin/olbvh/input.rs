@@ -5,7 +5,7 @@ use crate::common::{Common, Failure, Outcome};
 use crate::output::Progress;
 use crate::text::counted;
 use olbvh::error::Error;
-use olbvh::formats::{LoadOptions, Loaded, Merge, TimeStep, load, printable};
+use olbvh::formats::{Curved, LoadOptions, Loaded, Merge, TimeStep, load, printable};
 use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::render::TransferFunction;
@@ -66,6 +66,11 @@ pub struct ReadArgs {
     /// same at all of them.
     #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last")]
     time_step: TimeStep,
+    /// What becomes of curved cells. corners: edges are straight, and fields are linear in a cell. split: a tetrahedron of
+    /// ten nodes becomes eight tetrahedra, which use them all and the values there; other curved cells are taken by their
+    /// corners.
+    #[arg(long, default_value_t = Curved::default(), value_parser = named::<Curved>, value_name = "corners|split")]
+    curved: Curved,
 }
 
 /// Arguments that deform a mesh.
@@ -160,7 +165,7 @@ impl TreeArgs {
 impl ReadArgs {
     /// Reads a mesh and prints the warnings of its reader.
     pub fn mesh(&self, path: &Path, common: &Common) -> Outcome<Loaded> {
-        let options = LoadOptions { merge: self.merge, step: self.time_step, ..LoadOptions::default() };
+        let options = LoadOptions { merge: self.merge, step: self.time_step, curved: self.curved, ..LoadOptions::default() };
         let progress = Progress::new(common, "reading");
         let loaded = load(path, &options).map_err(|error| refused(path, error))?;
         drop(progress);
