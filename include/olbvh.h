@@ -1332,6 +1332,17 @@ enum olbvh_status olbvh_cmd_render(struct olbvh_recording *recording,
                                    const struct olbvh_picture *picture);
 
 /*
+ Records what a depth buffer has where the rays of a picture became opaque: at an opaque iso-surface, or where the volume
+ reached the opacity at which rays end. `depths` has a float per pixel, upper row first; other pixels keep their values,
+ so that it may be the `depth` of the picture itself. Copied to a depth attachment, it hides what is drawn behind. To be
+ recorded after the last round of `olbvh_cmd_render` and an `olbvh_cmd_barrier`.
+ */
+enum olbvh_status olbvh_cmd_depths(struct olbvh_recording *recording,
+                                   const struct olbvh_scene *scene,
+                                   const struct olbvh_picture *picture,
+                                   struct olbvh_buffer depths);
+
+/*
  Reports how much memory a slice needs, and where in its `memory` (size 0 if it does not exist yet) the results are.
  */
 enum olbvh_status olbvh_slicing_parts(const struct olbvh_slicing *slicing,

@@ -58,7 +58,8 @@
 //!   the transfer to compute shaders), and record [`query::cmd_render`] with it ([`query::RenderInput::depth`]) and with the
 //!   view of your matrix ([`render::Plan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over
 //!   your picture: `color.rgb + (1 − color.a)·yours`, where yours are sRGB values as well: after tone mapping, and through a
-//!   view whose format is `UNORM`, not `SRGB`.
+//!   view whose format is `UNORM`, not `SRGB`. If you draw more behind it, [`query::cmd_depths`] writes to that buffer how
+//!   far what became opaque is away, such as an iso-surface.
 //! - **Frames in flight**: whatever is written in every frame needs its own memory per frame in flight, or a barrier
 //!   between frames. So do descriptor pools on devices without buffer addresses. Data that does not change (cells,
 //!   fields) can be shared.

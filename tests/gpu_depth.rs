@@ -8,9 +8,9 @@ use glam::dcamera::rh::proj::vulkan::{orthographic, perspective, perspective_inf
 use glam::dcamera::rh::view::look_at_mat4;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Arena, Gpu, GpuOptions};
-use olbvh::mesh::{On, kuhn_jittered};
+use olbvh::mesh::{Field, On, kuhn_jittered};
 use olbvh::options::BuildOptions;
-use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene, cmd_render};
+use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene, cmd_depths, cmd_render};
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Drawing, render};
@@ -84,13 +84,58 @@ fn what_lies_behind_is_not_drawn() {
             submit(&gpu, "olbvh.test.picture", |r| cmd_render(r, &on_device, &input, &memory, Rounds::begin(8))).unwrap();
             let hidden: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 16 * u64::from(SIZE[0] * SIZE[1]))).unwrap();
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|color| color.map(f32::to_bits)).collect::<Vec<_>>();
-            assert!(bits(&hidden) == bits(&render(&scene().before(&depths), SILENT).colors));
+            let expected = render(&scene().before(&depths), SILENT);
+            assert!(bits(&hidden) == bits(&expected.colors));
+            // The same depths, with those of what is opaque in the picture.
+            let after = gpu.upload("olbvh.test.depths", &depths).unwrap();
+            submit(&gpu, "olbvh.test.depths", |r| cmd_depths(r, &input, &memory, after.all())).unwrap();
+            let after: Vec<f32> = gpu.download(&after, after.all()).unwrap();
+            let both = depths.iter().zip(&expected.depths).map(|(&before, own)| own.unwrap_or(before).to_bits());
+            assert!(after.iter().map(|d| d.to_bits()).eq(both));
+            let opaque = expected.depths.iter().flatten().count();
+            assert!(opaque == hidden.iter().filter(|color| color[3] >= plan.termination).count() && (opaque > 50) == input.iso, "{opaque}");
             let whole = render(&scene(), SILENT).colors;
             let differs = |i: &usize| whole[*i] != hidden[*i];
             let columns = |behind: bool| (0..whole.len()).filter(move |i| (i % 44 % 8 < 6) == behind);
             let (behind, before) = (columns(true).filter(differs).count(), columns(false).filter(differs).count());
             let shown = whole.iter().filter(|color| color[3] > 0.0).count();
             assert!(behind * 4 > shown && shown > 100 && before == 0, "{behind} and {before} of {shown} pixels differ");
+        }
+    }
+}
+
+/// The depths at which rays become opaque: at the plane of an iso-surface, and within a dense volume.
+#[test]
+fn depths_are_those_of_what_is_opaque() {
+    let mesh = kuhn_jittered([6, 5, 4], 0.3, 5).unwrap();
+    let topology = topology(&mesh).unwrap();
+    let arrays = build(&mesh, &topology, &BuildOptions::default()).unwrap();
+    let field = Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
+    for view in views() {
+        let inverse = view.to_clip.inverse();
+        for (iso, opacity_scale) in [(vec![2.5], 1.0), (vec![], 1e6)] {
+            let settings = RenderSettings { size: SIZE, iso: iso.clone(), opacity_scale, ..RenderSettings::default() };
+            let plan = Plan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
+            let drawing = Drawing::new(&mesh, &topology, &arrays, &field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
+            let picture = render(&drawing, SILENT);
+            let places = picture.depths.iter().zip(0..).filter_map(|(depth, i)| {
+                let [x, y] = [i % SIZE[0], i / SIZE[0]].map(|v| f64::from(v) + 0.5);
+                let ndc = DVec3::new(x / f64::from(SIZE[0]) * 2.0 - 1.0, y / f64::from(SIZE[1]) * 2.0 - 1.0, f64::from((*depth)?));
+                let p = inverse * ndc.extend(1.0);
+                Some(p.truncate() / p.w)
+            });
+            let places: Vec<DVec3> = places.collect();
+            assert!(places.len() > 100);
+            // The dense volume is opaque a few samples behind its surface at most.
+            let far = |p: &DVec3| {
+                if iso.is_empty() {
+                    (p.min(DVec3::new(6.0, 5.0, 4.0) - p)).min_element().abs() - 2.5 * f64::from(plan.step)
+                } else {
+                    (p.x - 2.5).abs()
+                }
+            };
+            let worst = places.iter().map(far).fold(0.0, f64::max);
+            assert!(worst < 1e-3, "{worst}");
         }
     }
 }

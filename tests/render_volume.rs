@@ -33,7 +33,7 @@ struct Drawn {
 
 impl Drawn {
     fn of(scene: &Drawing<'_>) -> Self {
-        let Picture { colors, stats } = render(scene, SILENT);
+        let Picture { colors, stats, .. } = render(scene, SILENT);
         Self { pixels: scene.plan().pixels(&colors, 1), stats }
     }
 }

@@ -128,8 +128,8 @@ vec3 beside_cut(float at, vec3 n) {
     return part > 0.0 ? bent : n;
 }
 
-// Adds a colour to the ray, at a place with normal n.
-void add(vec4 color, vec3 n) {
+// Adds a colour to the ray, at a place `at` steps from its origin with normal n.
+void add(float at, vec4 color, vec3 n) {
     if (SHADING != 0u) {
         vec3 lit = shade(n);
         precise vec3 c = color.xyz * lit.x + lit.y;
@@ -140,7 +140,9 @@ void add(vec4 color, vec3 n) {
     precise float share = (1.0 - sum.w) * color.w;
     precise vec4 more = sum + share * vec4(color.xyz, 1.0);
     sum = more;
-    if (sum.w >= view.termination) state.end = state.next;
+    if (sum.w < view.termination) return;
+    state.end = state.next;
+    state.last_at = at;
 }
 
 // A place of the ray: its distance from the origin in steps, the field's value there, and the number of iso-values that
@@ -225,7 +227,7 @@ void add_surfaces(Place from, Place to) {
         precise float steps = from.at + (to.at - from.at) * part;
         if (steps < unclipped.x || steps > unclipped.y) continue;
         vec4 color = lookup(iso);
-        if (color.w > 0.0) add(color, normal_at(barycentric_at(steps)));
+        if (color.w > 0.0) add(steps, color, normal_at(barycentric_at(steps)));
     }
 }
 
@@ -278,7 +280,7 @@ void take(Sides sides) {
     if (color.w <= 0.0) return;
     state.last = 0u;
     if (SKIP != 0u) state.check = max(state.check, state.next + 1u);
-    add(color, SHADING != 0u ? normal_of_sample(k, sides, last != NONE) : vec3(0.0));
+    add(float(k) + 0.5, color, SHADING != 0u ? normal_of_sample(k, sides, last != NONE) : vec3(0.0));
 }
 
 void main() {

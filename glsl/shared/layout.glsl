@@ -74,7 +74,7 @@ struct RayState {
     uint tet;       // Then the best candidate owner so far, else the tetrahedron of the last sample; or `NONE`.
     float smallest; // Smallest barycentric coordinate of the best candidate.
     uint last;      // `NONE` if the last sample shows nothing. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
-    float last_at;  // Distance of that place from the ray's origin in steps.
+    float last_at;  // Distance of that place from the ray's origin in steps; of a ray that has become opaque, of the place where it did.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
 };
 

@@ -23,7 +23,7 @@ pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub(crate) use slice::{Slicing, slice_in};
 pub use visible::{cmd_visible, visible_bytes};
 pub(crate) use volume::{Canvas, Rays, render_in};
-pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_render, render};
+pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_depths, cmd_render, render};
 
 use crate::build::{MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};

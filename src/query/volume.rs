@@ -6,6 +6,7 @@
 //! plan        prepares view and transfer function for the kernels, from bounds that only the device knows
 //! intervals   finds the first and the last sample of each ray
 //! march       takes samples, front to back                                                    a round
+//! depths      writes where rays became opaque, if the caller wants to know
 //! ```
 
 mod picture;
@@ -19,8 +20,8 @@ use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::grid::CellRange;
 use crate::kernels::{
-    LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeIntervals, VolumeIntervalsSpec, VolumeMarch, VolumeMarchSpec,
-    VolumePlan, VolumePlanSpec,
+    LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeDepths, VolumeDepthsSpec, VolumeIntervals, VolumeIntervalsSpec,
+    VolumeMarch, VolumeMarchSpec, VolumePlan, VolumePlanSpec,
 };
 use crate::layout::{DrawUniforms, RayState, RenderStatus, ViewUniforms};
 use crate::mesh::On;
@@ -160,6 +161,16 @@ impl RenderMemory {
             visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
         })
     }
+
+    /// Number of rays of a picture of this size, which must fit.
+    fn rays_of(&self, size: [u32; 2]) -> Result<u32> {
+        let [width, height] = size;
+        let rays = rays(size)?;
+        if 16 * u64::from(width) * u64::from(height) > self.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > self.rays.size {
+            return Err(Error::Invalid(format!("a picture of {width}×{height} pixels in memory of fewer")));
+        }
+        Ok(rays)
+    }
 }
 
 /// Number of rays of a picture, in whole blocks.
@@ -222,10 +233,7 @@ fn cmd_render_in(
     rounds: Rounds,
 ) -> Result<()> {
     let [width, height] = input.size;
-    let rays = rays(input.size)?;
-    if 16 * u64::from(width) * u64::from(height) > memory.colors.size || size_of::<RayState>() as u64 * u64::from(rays) > memory.rays.size {
-        return Err(Error::Invalid(format!("a picture of {width}×{height} pixels in memory of fewer")));
-    }
+    let rays = memory.rays_of(input.size)?;
     input.check(&searched.mesh.input)?;
     let visible = visible(searched, input, memory)?;
     let unfinished = memory.status.part(offset_of!(RenderStatus, unfinished) as u64, 4);
@@ -354,4 +362,22 @@ fn cmd_march(
             depths: depths,
         }, { shading, on_cells, iso, depth, budget })
     })
+}
+
+/// Records what a depth buffer has where the rays of a picture became opaque: at an opaque iso-surface, or where a volume
+/// reached the opacity at which rays end ([`crate::render::RenderSettings::termination`]). Other pixels of `depths` keep
+/// their values, so it may be [`RenderInput::depth`] itself, a 32-bit float per pixel; copied to a depth attachment, it
+/// hides what a renderer draws behind. `input` and `memory` are those of [`cmd_render`], after its last round.
+///
+/// Entry: the memory is read by compute shaders, `depths` is written by them. There is no barrier before or after, so the
+/// caller records one after [`cmd_render`], from compute shaders to compute shaders, and one to whatever reads `depths`.
+///
+/// # Errors
+/// [`Error::Invalid`] if `depths` or the memory has room for fewer pixels; [`Error::TooLarge`] as [`RenderMemory::carve`].
+pub fn cmd_depths(r: &mut Recorder<'_>, input: &RenderInput, memory: &RenderMemory, depths: BufferRef) -> Result<()> {
+    let rays = memory.rays_of(input.size)?;
+    depths.check(4 * u64::from(input.size[0]) * u64::from(input.size[1]), "a depth buffer")?;
+    let arguments = VolumeDepths { frames: memory.frame, states: memory.rays, colors: memory.colors, depths };
+    let workgroup = r.gpu().target().each;
+    r.dispatch(&arguments, VolumeDepthsSpec { workgroup, ..Default::default() }, Groups::Count(rays.div_ceil(workgroup)))
 }

@@ -32,6 +32,8 @@ use std::time::{Duration, Instant};
 pub struct Picture {
     /// Premultiplied colour and opacity per ray, row 0 on top.
     pub colors: Vec<[f32; 4]>,
+    /// Per ray what a depth buffer has where it became opaque; `None` if it did not.
+    pub depths: Vec<Option<f32>>,
     /// Numbers of samples, and times.
     pub stats: RenderStats,
 }
@@ -122,6 +124,9 @@ impl<'a> Drawing<'a> {
     }
 }
 
+/// The colours and depths of a row.
+type Row<'a> = (&'a mut [[f32; 4]], &'a mut [Option<f32>]);
+
 /// Draws the scene. `report` receives the number of rows done and the number of rows.
 pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
     let plan = scene.plan();
@@ -130,14 +135,16 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Pictur
     let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();
-    let row = |(y, colors): (usize, &mut [[f32; 4]])| {
+    let row = |(y, (colors, depths)): (usize, Row<'_>)| {
         let y = y as u32;
         let begin = Instant::now();
         let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y), scene.limit(x, y))).collect();
         let middle = Instant::now();
         let mut marcher = Marcher::new(scene);
-        for (x, (span, color)) in (0..).zip(spans.into_iter().zip(colors)) {
-            *color = marcher.march(plan.rays.ray(x, y), scene.limit(x, y), span);
+        for (x, ((span, color), depth)) in (0..).zip(spans.into_iter().zip(colors).zip(depths)) {
+            let opaque_at;
+            (*color, opaque_at) = marcher.march(plan.rays.ray(x, y), scene.limit(x, y), span);
+            *depth = opaque_at.and_then(|steps| plan.rays.depth_at(x, y, steps, plan.step));
         }
         interval_ns.fetch_add((middle - begin).as_nanos() as u64, Ordering::Relaxed);
         march_ns.fetch_add(middle.elapsed().as_nanos() as u64, Ordering::Relaxed);
@@ -146,8 +153,9 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Pictur
         found.fetch_add(marcher.found_samples, Ordering::Relaxed);
         report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height));
     };
-    let mut colors = vec![[0.0; 4]; width as usize * height as usize];
-    colors.par_chunks_exact_mut(width as usize).enumerate().for_each(row);
+    let (width, pixels) = (width as usize, width as usize * height as usize);
+    let (mut colors, mut depths) = (vec![[0.0; 4]; pixels], vec![None; pixels]);
+    colors.par_chunks_exact_mut(width).zip(depths.par_chunks_exact_mut(width)).enumerate().for_each(row);
     // Both stages run side by side on all threads, so the elapsed time is divided in proportion to the time that the
     // threads spent in each.
     let share = |part: &AtomicU64| {
@@ -158,5 +166,9 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Pictur
     let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
     let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
     let ranges_ms = scene.ranges_ms;
-    Picture { colors, stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 } }
+    Picture {
+        colors,
+        depths,
+        stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 },
+    }
 }

@@ -60,6 +60,15 @@ impl RayGrid {
         if steps < MAX_SAMPLES as f32 { steps.max(-1.0) } else { MAX_SAMPLES as f32 }
     }
 
+    /// The value of a depth buffer at a place of the ray of pixel (x, y), `steps` steps of length `step` from its origin.
+    /// Reverses [`RayGrid::steps_to`]. `None`: no value stands for that place.
+    pub fn depth_at(&self, x: u32, y: u32, steps: f32, step: f32) -> Option<f32> {
+        let [p, q, r, s] = self.depth;
+        let way = (steps * step) * inverse_sqrt(square(self.way(x, y)));
+        let below = q - way * s;
+        (below.abs() > LEAST && below.abs() < MOST).then(|| (way * r - p) * reciprocal(below))
+    }
+
     /// The direction of the ray of pixel (x, y), of any length.
     fn way(&self, x: u32, y: u32) -> [f32; 3] {
         let (x, y) = (x as f32, y as f32);

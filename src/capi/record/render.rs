@@ -9,7 +9,7 @@ use crate::error::Result;
 use crate::gpu::Arena;
 use crate::layout::ViewUniforms;
 use crate::mesh::Bounds;
-use crate::query::{RenderInput, RenderMemory, Scene, Visibility, cmd_render};
+use crate::query::{RenderInput, RenderMemory, Scene, Visibility, cmd_depths, cmd_render};
 use crate::render::{Plan, ProjectedView};
 use glam::DMat4;
 use std::mem::offset_of;
@@ -85,6 +85,23 @@ impl OlbvhPicture {
     fn carve(&self, scene: &Scene) -> impl Fn(&mut Arena) -> Result<RenderMemory> {
         let (size, skipping) = ([self.width, self.height], (self.ranges.size > 0).then_some(scene.tree.capacity));
         move |arena| RenderMemory::carve(arena, size, skipping.as_ref())
+    }
+
+    fn input(&self) -> Result<RenderInput> {
+        let view = self.view.part();
+        view.check(offset_of!(OlbvhView, drawn_count) as u64, "a view")?;
+        let values = view.part(offset_of!(OlbvhView, drawn) as u64, (512 * size_of::<[f32; 2]>()) as u64);
+        Ok(RenderInput {
+            size: [self.width, self.height],
+            view: view.part(0, offset_of!(OlbvhView, table) as u64),
+            iso: self.iso != 0,
+            table: view.part(offset_of!(OlbvhView, table) as u64, (offset_of!(OlbvhView, drawn) - offset_of!(OlbvhView, table)) as u64),
+            field: self.field.read(),
+            normals: self.normals.given(),
+            depth: self.depth.given(),
+            visibility: self.ranges.given().map(|ranges| Visibility { ranges, values, count: self.drawn_count.min(512) }),
+            row: 0,
+        })
     }
 }
 
@@ -174,21 +191,25 @@ pub extern "C" fn olbvh_picture_parts(scene: *const OlbvhScene, picture: *const 
 pub extern "C" fn olbvh_cmd_render(recording: *mut OlbvhRecording, scene: *const OlbvhScene, picture: *const OlbvhPicture) -> OlbvhStatus {
     recorded(recording, |r| {
         let (scene, picture) = (&scene_on(r, scene, "scene")?.scene, handle(picture, "picture")?);
-        let view = picture.view.part();
-        view.check(offset_of!(OlbvhView, drawn_count) as u64, "a view")?;
-        let values = view.part(offset_of!(OlbvhView, drawn) as u64, (512 * size_of::<[f32; 2]>()) as u64);
-        let input = RenderInput {
-            size: [picture.width, picture.height],
-            view: view.part(0, offset_of!(OlbvhView, table) as u64),
-            iso: picture.iso != 0,
-            table: view.part(offset_of!(OlbvhView, table) as u64, (offset_of!(OlbvhView, drawn) - offset_of!(OlbvhView, table)) as u64),
-            field: picture.field.read(),
-            normals: picture.normals.given(),
-            depth: picture.depth.given(),
-            visibility: picture.ranges.given().map(|ranges| Visibility { ranges, values, count: picture.drawn_count.min(512) }),
-            row: 0,
-        };
         let memory = picture.memory.place(picture.carve(scene))?;
-        cmd_render(r, scene, &input, &memory, picture.rounds.into())
+        cmd_render(r, scene, &picture.input()?, &memory, picture.rounds.into())
+    })
+}
+
+/// Records what a depth buffer has where the rays of a picture became opaque: at an opaque iso-surface, or where the volume
+/// reached the opacity at which rays end. `depths` has a float per pixel, upper row first; other pixels keep their values,
+/// so that it may be the `depth` of the picture itself. Copied to a depth attachment, it hides what is drawn behind. To be
+/// recorded after the last round of `olbvh_cmd_render` and an `olbvh_cmd_barrier`.
+#[unsafe(no_mangle)]
+pub extern "C" fn olbvh_cmd_depths(
+    recording: *mut OlbvhRecording,
+    scene: *const OlbvhScene,
+    picture: *const OlbvhPicture,
+    depths: OlbvhBuffer,
+) -> OlbvhStatus {
+    recorded(recording, |r| {
+        let (scene, picture) = (&scene_on(r, scene, "scene")?.scene, handle(picture, "picture")?);
+        let memory = picture.memory.place(picture.carve(scene))?;
+        cmd_depths(r, &picture.input()?, &memory, depths.part())
     })
 }

@@ -168,6 +168,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     let (values, normals) = (device.upload("olbvh.test.field", &values(&meshes[0])), device.upload("olbvh.test.normals", &normals));
     let (values, normals) = (values.unwrap(), normals.unwrap());
     let depth = device.upload("olbvh.test.depth", &[1e9f32; 37 * 30]).unwrap(); // behind everything
+    let depths = device.upload("olbvh.test.depths", &[-1f32; 37 * 30]).unwrap();
     let field = OlbvhField { values: values.all().into(), on_cells: 0 };
     let buffer = |bytes: u64| device.buffer("olbvh.test.memory", bytes).unwrap();
     let ranges = buffer(made(|out| olbvh_range_bytes(a.scene, out)));
@@ -241,6 +242,8 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
         ok(olbvh_cmd_build(recording, b.scene));
         ok(olbvh_cmd_ranges(recording, a.scene, &raw const field, ranges.all().into()));
         ok(olbvh_cmd_render(recording, a.scene, &raw const picture));
+        ok(olbvh_cmd_barrier(recording));
+        ok(olbvh_cmd_depths(recording, a.scene, &raw const picture, depths.all().into()));
         ok(olbvh_cmd_slice(recording, a.scene, &raw const slicing));
         ok(olbvh_cmd_locate(recording, a.scene, &raw const location));
         ok(olbvh_cmd_barrier(recording));
@@ -268,6 +271,8 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert_eq!(CALLS.get(), before, "calls made while recording");
 
     assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
+    let opaque = expected.colors.iter().map(|color| color[3] >= plan.termination);
+    assert!(read::<f32>(device, depths.all().into(), 37 * 30).into_iter().map(|depth| depth > 0.0).eq(opaque));
     let [samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 7)[..] else { unreachable!() };
     assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
     assert_eq!(read::<u32>(device, slicing_parts.answers, 17 * 13 * 6), expected.answers);

@@ -30,6 +30,10 @@ struct Gathered<'a> {
     direction: [f32; 3],
     light: Option<(Lighting, [f32; 3])>,
     normals: &'a [[f32; 3]],
+    /// How many steps from its origin the ray became opaque.
+    opaque_at: Option<f32>,
+    /// Opacity at which that is.
+    termination: f32,
     /// The stretch that neither clip nor depth leaves out, and the clip at which it begins.
     kept: ([f32; 2], Option<usize>),
 }
@@ -47,8 +51,8 @@ impl Gathered<'_> {
         per_axis(|c| weighed(b, stand.ids.map(|i| self.normals[i as usize][c])))
     }
 
-    /// Adds a colour at a place with normal `n`.
-    fn add(&mut self, [red, green, blue, mut a]: [f32; 4], n: [f32; 3]) {
+    /// Adds a colour at a place `at` steps from the ray's origin with normal `n`.
+    fn add(&mut self, at: f32, [red, green, blue, mut a]: [f32; 4], n: [f32; 3]) {
         let mut color = [red, green, blue];
         if let Some((light, half)) = &self.light {
             let shade = light.shade(n, self.direction, *half);
@@ -60,6 +64,9 @@ impl Gathered<'_> {
             *sum += w * color;
         }
         self.sum[3] += w;
+        if self.sum[3] >= self.termination {
+            self.opaque_at = Some(at);
+        }
     }
 }
 
@@ -69,14 +76,21 @@ impl<'a> Marcher<'a> {
         Self { scene, plan: scene.plan(), cell: None, samples: 0, skipped_samples: 0, found_samples: 0 }
     }
 
-    /// Premultiplied colour and opacity that a ray gathers over its samples `[begin, end)`. It ends `limit` steps from
-    /// its origin.
-    pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), limit: f32, [begin, end]: [u32; 2]) -> [f32; 4] {
+    /// Premultiplied colour and opacity that a ray gathers over its samples `[begin, end)`, and how many steps from its
+    /// origin it became opaque, if it did. It ends `limit` steps from its origin.
+    pub fn march(&mut self, ray: ([f32; 3], [f32; 3]), limit: f32, [begin, end]: [u32; 2]) -> ([f32; 4], Option<f32>) {
         let direction = ray.1;
         let plan = self.plan;
         let light = plan.lighting.filter(|_| !self.scene.prepared.normals.is_empty()).map(|light| (light, light.half(direction)));
-        let mut gathered =
-            Gathered { sum: [0.0; 4], direction, light, normals: &self.scene.prepared.normals, kept: plan.kept_stretch(ray, limit) };
+        let mut gathered = Gathered {
+            sum: [0.0; 4],
+            direction,
+            light,
+            normals: &self.scene.prepared.normals,
+            opaque_at: None,
+            termination: plan.termination,
+            kept: plan.kept_stretch(ray, limit),
+        };
         // The last sample, if that showed something; for iso-surfaces, where the ray leaves its tetrahedron.
         let mut last: Option<Place> = None;
         // Each ray starts without a hint, so that no pixel depends on another one.
@@ -84,7 +98,7 @@ impl<'a> Marcher<'a> {
         let skips = self.scene.visible.as_deref().map(|visible| Skips { tree: self.scene.tree, visible, plan });
         let inverse = inverse_of(direction);
         let (mut next, mut check) = (begin, 0);
-        while next < end && gathered.sum[3] < plan.termination {
+        while next < end && gathered.opaque_at.is_none() {
             let mut ahead = 1;
             if let Some(skips) = skips.as_ref().filter(|_| next >= check) {
                 let (behind, hidden) = skips.stretch(ray, inverse, next, end);
@@ -127,10 +141,10 @@ impl<'a> Marcher<'a> {
                 check = check.max(next + 1);
                 let normal =
                     if gathered.light.is_some() { self.lit_at(&gathered, ray, k, (&stand, &sides), before.is_some()) } else { [0.0; 3] };
-                gathered.add(color, normal);
+                gathered.add(k as f32 + 0.5, color, normal);
             }
         }
-        gathered.sum
+        (gathered.sum, gathered.opaque_at)
     }
 
     /// The stretch of the ray around sample k, which has this value, in the tetrahedron of the sample, but no farther
@@ -185,7 +199,7 @@ impl<'a> Marcher<'a> {
         let n = plan.iso.len();
         let in_order = (0..n).map(|i| plan.iso[if from.value < to.value { i } else { n - 1 - i }]);
         for iso in in_order.filter(|&iso| (from.value < iso) != (to.value < iso)) {
-            if gathered.sum[3] >= plan.termination {
+            if gathered.opaque_at.is_some() {
                 break;
             }
             let rise = (to.value - from.value).clamp(-1e37, 1e37);
@@ -198,7 +212,7 @@ impl<'a> Marcher<'a> {
             if color[3] > 0.0 {
                 let normal =
                     if gathered.light.is_some() { gathered.normal_at(stand, self.barycentric_at(ray, stand, steps)) } else { [0.0; 3] };
-                gathered.add(color, normal);
+                gathered.add(steps, color, normal);
             }
         }
     }

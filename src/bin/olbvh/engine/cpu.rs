@@ -106,7 +106,7 @@ impl Engine for Cpu {
     fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
-            let volume::Picture { colors, stats } = volume::render(&scene, report);
+            let volume::Picture { colors, stats, .. } = volume::render(&scene, report);
             Ok(Picture { rendered: Rendered { colors, stats }, plan: scene.plan().clone(), range: scene.range() })
         })
     }
