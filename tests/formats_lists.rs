@@ -85,12 +85,12 @@ fn files_without_volumes_are_left_out() {
     let content = file("vtkMultiBlockDataSet", sets);
     let report = read(&folder, "case.vtm", &content).unwrap().report;
     assert_eq!(report.warnings, ["listed files without volume cells are left out: 2 .vtp"]);
-    let with_volumes = file("vtkMultiBlockDataSet", &format!("{sets}<DataSet file='air.vti'/><DataSet file='box.pvts'/>"));
+    let with_volumes = file("vtkMultiBlockDataSet", &format!("{sets}<DataSet file='air.htg'/><DataSet file='box.vth'/>"));
     let warnings = read(&folder, "case.vtm", &with_volumes).unwrap().report.warnings;
     assert_eq!(warnings.len(), 2);
-    assert!(warnings[1].starts_with("listed files are left out: 1 .pvts, 1 .vti; structured grids cannot be read, so the mesh has holes"));
-    let none = read(&folder, "case.vtm", &content.replace("c/grid.vtu", "grid.vti")).unwrap_err();
-    assert_eq!(none, "case.vtm: it lists no file with an unstructured grid, only 1 .vti, 2 .vtp");
+    assert!(warnings[1].starts_with("listed files are left out: 1 .htg, 1 .vth; they cannot be read, so the mesh has holes"));
+    let none = read(&folder, "case.vtm", &content.replace("c/grid.vtu", "grid.vth")).unwrap_err();
+    assert_eq!(none, "case.vtm: it lists no file with volume cells, only 1 .vth, 2 .vtp");
 }
 
 #[test]
@@ -120,7 +120,7 @@ fn errors_name_the_list_or_the_listed_file() {
     let error = load(folder.path().join("1.pvtu"), &LoadOptions::default()).unwrap_err().to_string();
     assert!(error.ends_with("4.pvtu: line 3: `5.pvtu`: lists lie more than 4 deep within each other"), "{error}");
     let empty = read(&folder, "case.pvtu", &file("PUnstructuredGrid", "<PPointData/>")).unwrap_err();
-    assert_eq!(empty, "case.pvtu: it lists no file with an unstructured grid");
+    assert_eq!(empty, "case.pvtu: it lists no file with volume cells");
 }
 
 /// Three steps, of which the first and the last have two files; another file belongs to all of them.

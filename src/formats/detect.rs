@@ -17,7 +17,8 @@ pub(crate) enum Format {
 }
 
 /// File name extensions of the formats that can be read.
-pub(crate) const READABLE: &str = ".vtu, .pvtu, .vtm, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
+pub(crate) const READABLE: &str =
+    ".vtu, .pvtu, .vts, .vtr, .vti, .vtm, .pvd, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 /// For what meshio cannot read.
 const SAVE_AS: &str = "save it as .vtu, for example with ParaView (File, Save Data)";
@@ -46,7 +47,7 @@ fn told(source: &Source) -> Result<Option<Format>> {
 fn named(source: &Source) -> Option<Format> {
     let is_binary = [[1, 0, 0, 0], [0, 0, 0, 1]].iter().any(|one| source.start().starts_with(one));
     match ending(&source.path).as_str() {
-        "vtu" | "pvtu" | "vtm" | "vtpd" | "vtpc" | "pvd" => Some(Format::VtkXml),
+        "vtu" | "pvtu" | "vts" | "pvts" | "vtr" | "pvtr" | "vti" | "pvti" | "vtm" | "vtpd" | "vtpc" | "pvd" => Some(Format::VtkXml),
         "vtk" => Some(Format::VtkLegacy),
         "msh" => Some(Format::Gmsh),
         "mesh" | "meshb" => Some(if is_binary { Format::MeditBinary } else { Format::Medit }),

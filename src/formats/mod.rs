@@ -23,6 +23,7 @@ mod gmsh_elements;
 mod gmsh_reader;
 mod integers;
 mod isaac;
+mod lattice;
 mod medit;
 mod meditb;
 mod npy;
@@ -31,6 +32,7 @@ mod procedural;
 mod report;
 mod scalar;
 mod source;
+mod steps;
 mod stored;
 mod surfaces;
 mod tags;
@@ -51,7 +53,7 @@ mod write;
 use std::path::Path;
 use std::time::Instant;
 
-use crate::error::{Error, Result};
+use crate::error::Result;
 use crate::mesh::Mesh;
 use crate::named::named;
 pub use array::without_lengths;
@@ -61,6 +63,7 @@ pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
 use source::Source;
 pub use source::printable;
+pub use steps::TimeStep;
 pub use write::{
     Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, is_part,
     write_json, write_located, write_mesh, write_npy, write_png, xml_attribute,
@@ -98,58 +101,6 @@ named!(Curved, "treatment of curved cells", [Corners = "corners", Split = "split
 impl Default for LoadOptions {
     fn default() -> Self {
         Self { merge: Merge::default(), expansion: 100, step: TimeStep::Number(0), curved: Curved::default() }
-    }
-}
-
-/// A time step of a series. `FromStr` takes a number or `last`.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum TimeStep {
-    /// The step with this number, counted from 0 in ascending order.
-    Number(u32),
-    /// The last step.
-    Last,
-}
-
-impl TimeStep {
-    /// The number of this step among those of a file, which become ascending; 0 if there is only one, or none.
-    fn chosen<S: AsRef<str>>(self, source: &Source, steps: &mut [S]) -> Result<usize> {
-        steps.sort_by(|a, b| {
-            let [a, b] = [a, b].map(|time| time.as_ref().trim().parse().unwrap_or(f64::NAN));
-            a.total_cmp(&b)
-        });
-        let last = steps.len().saturating_sub(1);
-        match self {
-            Self::Number(n) if last > 0 && n as usize > last => {
-                Err(source.error(format!("there is no time step {n}; the steps are 0 to {last}")))
-            }
-            Self::Number(n) => Ok((n as usize).min(last)),
-            Self::Last => Ok(last),
-        }
-    }
-
-    /// A warning that there are several steps, of which one is read.
-    fn remark(read: usize, count: usize) -> String {
-        format!("time step {read} of 0 to {} is read; --time-step (LoadOptions::step) chooses another, such as `last`", count - 1)
-    }
-}
-
-impl std::fmt::Display for TimeStep {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        match self {
-            Self::Number(n) => n.fmt(f),
-            Self::Last => f.write_str("last"),
-        }
-    }
-}
-
-impl std::str::FromStr for TimeStep {
-    type Err = Error;
-
-    fn from_str(text: &str) -> Result<Self> {
-        if text.eq_ignore_ascii_case("last") {
-            return Ok(Self::Last);
-        }
-        text.parse().map(Self::Number).map_err(|_| Error::Invalid(format!("`{text}` is no time step: a number from 0, or last")))
     }
 }
 

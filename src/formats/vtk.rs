@@ -3,12 +3,14 @@
 use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
+use super::budget::Budget;
 use super::cells::{self, Shape};
 use super::integers::Integers;
+use super::lattice::{Frame, GridKind, Lattice, sums};
 use super::report::Fate;
 use super::scalar::Scalar;
 use super::source::{Source, excerpt};
-use super::tokens::Tokens;
+use super::tokens::{Tokens, parse_float};
 use super::vtk_attributes::Section;
 use super::vtk_reader::Reader;
 use crate::error::Result;
@@ -37,9 +39,10 @@ impl Cells<'_> {
 
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut reader = Reader { source, tokens: Tokens::new(source, None), binary: false };
-    let format = reader.header()?;
+    let (format, dataset) = reader.header()?;
     let mut assembly = Assembly::new(source, options, format);
     let (mut points, mut cells, mut types) = (None, None, None);
+    let mut grid = StructuredGrid::default();
     let mut section: Option<Section> = None;
     while let Some((token, at)) = reader.tokens.next_token()? {
         let keyword = token.to_ascii_uppercase();
@@ -52,6 +55,7 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
                 section = Some((on, reader.size("the number of values")?));
             }
             b"METADATA" => reader.metadata()?,
+            _ if reader.structured(&keyword, &mut grid)? => {}
             _ => {
                 let arrays = reader.attribute(&keyword, at, section)?;
                 let Some((on, _)) = section else { continue };
@@ -62,15 +66,28 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
         }
     }
     let missing = |what: &str| source.error_line(source.len(), format!("the file ends, and there was no {what}"));
-    assembly.set_points(points.ok_or_else(|| missing("POINTS"))?);
+    let lattice = if dataset == GridKind::Cells { None } else { Some(grid.lattice.ok_or_else(|| missing("DIMENSIONS"))?) };
+    let points = match (&lattice, dataset) {
+        (Some(lattice), GridKind::Rectilinear | GridKind::Image(_)) => grid.points(lattice, source, &mut assembly.padding)?,
+        _ => points.ok_or_else(|| missing("POINTS"))?,
+    };
+    assembly.set_points(points);
+    let marks = |a: &Array| cells::ghost(&a.name).filter(|_| a.on == On::Cells && a.components == 1);
+    let ghosts = assembly.arrays.iter().find_map(|a| Some((a, marks(a)?)));
+    let ghosts: Vec<bool> = ghosts.map_or_else(Vec::new, |(a, marks)| a.values.iter().map(|&v| marks(v as i64)).collect());
+    if let Some(lattice) = lattice {
+        let points = assembly.n_points();
+        if lattice.points() != points as u64 {
+            return Err(source.error(format!("POINTS has {points} entries, but the dimensions make {}", lattice.points())));
+        }
+        lattice.push(&mut assembly, 0..points, |cell| Ok(ghosts.get(cell) == Some(&true)))?;
+        return checked(source, assembly);
+    }
     let mut cells: Cells<'_> = cells.ok_or_else(|| missing("CELLS"))?;
     let mut types: Integers<'_> = types.ok_or_else(|| missing("CELL_TYPES"))?;
     if types.len() != cells.count {
         return Err(source.error(format!("CELL_TYPES has {} entries, CELLS has {}", types.len(), cells.count)));
     }
-    let marks = |a: &Array| cells::ghost(&a.name).filter(|_| a.on == On::Cells && a.components == 1);
-    let ghosts = assembly.arrays.iter().find_map(|a| Some((a, marks(a)?)));
-    let ghosts: Vec<bool> = ghosts.map_or_else(Vec::new, |(a, marks)| a.values.iter().map(|&v| marks(v as i64)).collect());
     assembly.reserve(types.len());
     let mut end = 0;
     for cell in 0..cells.count {
@@ -88,8 +105,13 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
             assembly.push(kind, nodes)?;
         }
     }
+    checked(source, assembly)
+}
+
+/// Checks that arrays have as many values as there are points or cells.
+fn checked(source: &Source, assembly: Assembly) -> Result<Assembly> {
     for array in &assembly.arrays {
-        let (count, what) = if array.on == On::Points { (assembly.n_points(), "POINTS") } else { (types.len(), "CELLS") };
+        let (count, what) = if array.on == On::Points { (assembly.n_points(), "POINTS") } else { (assembly.cells(), "CELLS") };
         if array.values.len() != count * array.components {
             let found = array.values.len() / array.components.max(1);
             let message = format!("{found} tuples, but {what} has {count}");
@@ -99,8 +121,80 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     Ok(assembly)
 }
 
+/// What a file says of a grid without lists of cells.
+#[derive(Default)]
+struct StructuredGrid {
+    lattice: Option<Lattice>,
+    origin: Option<[f64; 3]>,
+    spacing: Option<[f64; 3]>,
+    /// The coordinates along the axes.
+    axes: [Vec<f64>; 3],
+}
+
+impl StructuredGrid {
+    /// The points, which follow from coordinates along the axes or from their distances.
+    fn points(&self, lattice: &Lattice, source: &Source, budget: &mut Budget) -> Result<Vec<[f64; 3]>> {
+        let mut points = Vec::new();
+        lattice.spend(budget).map_err(|message| source.error(message))?;
+        if let Some([dx, dy, dz]) = self.spacing {
+            let steps = [[dx, 0.0, 0.0], [0.0, dy, 0.0], [0.0, 0.0, dz]];
+            lattice.in_frame(&Frame { origin: self.origin.unwrap_or_default(), steps }, &mut points);
+            return Ok(points);
+        }
+        let counts = self.axes.each_ref().map(|axis| axis.len() as u64);
+        if counts != lattice.size() {
+            let [[x, y, z], [nx, ny, nz]] = [counts, lattice.size()];
+            return Err(source.error(format!("{x}, {y} and {z} coordinates, but the dimensions are {nx}, {ny} and {nz}")));
+        }
+        let along = |c: usize| self.axes[c].iter().map(|&x| [0, 1, 2].map(|i| if i == c { x } else { 0.0 })).collect();
+        sums(&[along(0), along(1), along(2)], &mut points);
+        Ok(points)
+    }
+}
+
 impl<'a> Reader<'a> {
-    fn header(&mut self) -> Result<String> {
+    /// Reads a section of a grid without lists of cells; false if this is none.
+    fn structured(&mut self, keyword: &[u8], grid: &mut StructuredGrid) -> Result<bool> {
+        let axis = match keyword {
+            b"DIMENSIONS" => {
+                let at = self.tokens.at;
+                let size = [self.size("a dimension")?, self.size("a dimension")?, self.size("a dimension")?];
+                let lattice = Lattice::of(size.map(|n| n as u64));
+                grid.lattice = Some(lattice.ok_or_else(|| self.source.error_line(at, "dimensions of 2^32 points or more"))?);
+                return Ok(true);
+            }
+            b"ORIGIN" => {
+                grid.origin = Some(self.triple()?);
+                return Ok(true);
+            }
+            b"SPACING" | b"ASPECT_RATIO" => {
+                grid.spacing = Some(self.triple()?);
+                return Ok(true);
+            }
+            b"X_COORDINATES" => 0,
+            b"Y_COORDINATES" => 1,
+            b"Z_COORDINATES" => 2,
+            _ => return Ok(false),
+        };
+        let n = self.tokens.count("the number of coordinates")?;
+        let scalar = self.scalar()?;
+        grid.axes[axis] = self.values(scalar, n, "a coordinate")?;
+        Ok(true)
+    }
+
+    /// Three numbers, which are text in any file.
+    fn triple(&mut self) -> Result<[f64; 3]> {
+        let mut triple = [0.0; 3];
+        for number in &mut triple {
+            let (word, at) = self.tokens.word("a number")?;
+            let found = parse_float(word);
+            *number = found.ok_or_else(|| self.source.error_line(at, format!("`{}` where a number should be", excerpt(word))))?;
+        }
+        Ok(triple)
+    }
+
+    /// The format, and the kind of the grid.
+    fn header(&mut self) -> Result<(String, GridKind)> {
         let (first, _) = self.tokens.line()?.unwrap_or_default();
         let first = first.trim_ascii();
         let Some(version) = first.strip_prefix(b"# vtk DataFile Version") else {
@@ -122,10 +216,14 @@ impl<'a> Reader<'a> {
             return Err(self.source.error_line(at, format!("`{}` where DATASET should be", excerpt(word))));
         }
         let (dataset, at) = self.tokens.word("the type of the dataset")?;
-        if !dataset.eq_ignore_ascii_case(b"UNSTRUCTURED_GRID") {
-            return Err(self.source.error_line(at, format!("a {} dataset, not an UNSTRUCTURED_GRID", excerpt(dataset))));
-        }
-        Ok(format!("VTK legacy unstructured grid {version}, {}", if self.binary { "binary" } else { "text" }))
+        let (what, kind) = match dataset.to_ascii_uppercase().as_slice() {
+            b"UNSTRUCTURED_GRID" => ("unstructured grid", GridKind::Cells),
+            b"STRUCTURED_GRID" => ("structured grid", GridKind::Structured),
+            b"RECTILINEAR_GRID" => ("rectilinear grid", GridKind::Rectilinear),
+            b"STRUCTURED_POINTS" => ("image", GridKind::Image(Frame::default())),
+            _ => return Err(self.source.error_line(at, format!("a {} dataset, not an UNSTRUCTURED_GRID", excerpt(dataset)))),
+        };
+        Ok((format!("VTK legacy {what} {version}, {}", if self.binary { "binary" } else { "text" }), kind))
     }
 
     fn points(&mut self) -> Result<Vec<[f64; 3]>> {

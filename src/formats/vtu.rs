@@ -8,9 +8,10 @@ use super::array::Array;
 use super::assemble::Assembly;
 use super::budget::Budget;
 use super::cells::{self, CellType, Shape};
+use super::lattice::{GridKind, sums};
 use super::report::Fate;
 use super::source::{Source, excerpt};
-use super::vtu_data::Codec;
+use super::vtu_data::{Codec, StoredArray};
 use super::vtu_faces::Faces;
 use super::vtu_files::{Files, Grid, Origin, grids};
 use super::vtu_parser::Piece;
@@ -23,12 +24,12 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut assembly = Assembly::new(source, options, format);
     (assembly.bytes, assembly.padding, assembly.warnings) = (bytes as u64, Budget::new(bytes, options), warnings);
     let (mut points, mut starts) = (Vec::new(), Vec::new());
-    for Grid { origin, codec, pieces, block } in &mut grids {
+    for Grid { origin, codec, kind, pieces, block } in &mut grids {
         let mut opened = None;
         let source = origin.open(&mut opened)?;
         for (i, piece) in pieces.iter().enumerate() {
             starts.push([points.len(), *block]);
-            read_points(source, codec, &mut points, piece, i)?;
+            read_points(source, codec, *kind, &mut points, piece, i)?;
         }
     }
     assembly.set_pieces(points, starts.clone());
@@ -56,11 +57,32 @@ type Key<'p> = (On, &'p str, u64);
 /// the n-th of the other pieces.
 type Places<'p> = HashMap<(Key<'p>, usize), usize>;
 
-fn read_points(source: &Source, codec: &mut Codec, points: &mut Vec<[f64; 3]>, piece: &Piece, index: usize) -> Result<()> {
+fn read_points(source: &Source, codec: &mut Codec, kind: GridKind, points: &mut Vec<[f64; 3]>, piece: &Piece, index: usize) -> Result<()> {
     if piece.points == 0 {
         return Ok(());
     }
     let fail = |message: &str| source.error_line(piece.at, format!("piece {index}: {message}"));
+    match (kind, &piece.lattice) {
+        (GridKind::Rectilinear, Some(lattice)) => {
+            let [x, y, z] = piece.topology.as_slice() else { return Err(fail("<Coordinates> must have three arrays")) };
+            if [x, y, z].iter().any(|array| array.components != 1) {
+                return Err(fail("coordinates must have 1 component"));
+            }
+            lattice.spend(&mut codec.budget).map_err(|message| fail(&message))?;
+            let mut along = |c: usize, array: &StoredArray| -> Result<Vec<[f64; 3]>> {
+                let values: Vec<f64> = codec.floats(source, array, lattice.size()[c])?;
+                Ok(values.into_iter().map(|x| [0, 1, 2].map(|i| if i == c { x } else { 0.0 })).collect())
+            };
+            sums(&[along(0, x)?, along(1, y)?, along(2, z)?], points);
+            return Ok(());
+        }
+        (GridKind::Image(frame), Some(lattice)) => {
+            lattice.spend(&mut codec.budget).map_err(|message| fail(&message))?;
+            lattice.in_frame(&frame, points);
+            return Ok(());
+        }
+        _ => {}
+    }
     let positions = piece.positions.as_ref().ok_or_else(|| fail("no <Points>"))?;
     if positions.components != 3 {
         return Err(fail("the points must have 3 components"));
@@ -117,6 +139,16 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
     if piece.cells == 0 {
         return Ok(());
     }
+    let points = first..first + piece.points as usize;
+    let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
+    let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
+    let mut is_ghost = |cell: usize| match &mut ghosts {
+        Some((values, marks)) => values.at(cell).map(&*marks),
+        None => Ok(false),
+    };
+    if let Some(lattice) = &piece.lattice {
+        return lattice.push(assembly, points, is_ghost);
+    }
     let find = |name: &str| {
         let found = piece.topology.iter().find(|a| a.name == name);
         found.ok_or_else(|| source.error_line(piece.at, format!("piece {index}: no array `{name}` in <Cells>")))
@@ -129,9 +161,6 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
         let message = format!("the last cell of piece {index} ends at {last}, but `connectivity` has {all} values");
         return Err(source.error_in("array `offsets`", message));
     }
-    let ghosts = piece.cell_data.iter().find_map(|a| Some((a, cells::ghost(&a.name).filter(|_| a.components == 1)?)));
-    let mut ghosts = ghosts.map(|(a, marks)| Ok((codec.integers(source, a, Some(piece.cells))?, marks))).transpose()?;
-    let points = first..first + piece.points as usize;
     let mut faces = Faces::of(piece, source, codec)?;
     assembly.reserve(types.len());
     let mut start = 0;
@@ -151,11 +180,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
-        let ghost = match &mut ghosts {
-            Some((values, marks)) => marks(values.at(cell)?),
-            None => false,
-        };
-        if ghost {
+        if is_ghost(cell)? {
             assembly.skip("ghost or hidden cell", Fate::Ghost);
             continue;
         }

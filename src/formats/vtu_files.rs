@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
 
 use super::budget::Budget;
+use super::lattice::GridKind;
 use super::source::ending;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
@@ -17,8 +18,8 @@ const MOST_FILES: usize = 1 << 16;
 const MOST_DEEP: usize = 4;
 /// Endings of files of VTK with surfaces and tables.
 const NO_VOLUMES: [&str; 3] = ["vtp", "pvtp", "vtt"];
-/// Endings of files of VTK with volumes of another kind than unstructured grids.
-const STRUCTURED: [&str; 8] = ["vti", "vtr", "vts", "vth", "htg", "pvti", "pvtr", "pvts"];
+/// Endings of files of VTK with volumes of another kind.
+const OTHERS: [&str; 2] = ["vth", "htg"];
 
 /// Where a grid is.
 pub(crate) enum Origin<'a> {
@@ -42,6 +43,7 @@ impl Origin<'_> {
 pub(crate) struct Grid<'a> {
     pub origin: Origin<'a>,
     pub codec: Codec,
+    pub kind: GridKind,
     pub pieces: Vec<Piece>,
     /// Number of the block of a list; the grids of a block are pieces of one mesh.
     pub block: usize,
@@ -49,9 +51,9 @@ pub(crate) struct Grid<'a> {
 
 impl<'a> Grid<'a> {
     fn new(origin: Origin<'a>, skeleton: Skeleton, block: usize, bytes: usize, options: &LoadOptions) -> Self {
-        let Skeleton { mut codec, pieces, .. } = skeleton;
+        let Skeleton { mut codec, kind, pieces, .. } = skeleton;
         codec.budget = Budget::new(bytes, options);
-        Self { origin, codec, pieces, block }
+        Self { origin, codec, kind, pieces, block }
     }
 }
 
@@ -80,17 +82,17 @@ pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Fil
     if found.grids.is_empty() {
         let others = found.others(|_| true);
         let others = if others.is_empty() { others } else { format!(", only {others}") };
-        return Err(source.error(format!("it lists no file with an unstructured grid{others}")));
+        return Err(source.error(format!("it lists no file with volume cells{others}")));
     }
     let format = format!("{}, {} listed files", list.format, found.grids.len());
     let mut warnings: Vec<String> = found.warnings.iter().cloned().collect();
-    let (surfaces, structured) = (found.others(|kind| NO_VOLUMES.contains(&kind)), found.others(|kind| STRUCTURED.contains(&kind)));
+    let (surfaces, unread) = (found.others(|kind| NO_VOLUMES.contains(&kind)), found.others(|kind| OTHERS.contains(&kind)));
     if !surfaces.is_empty() {
         warnings.push(format!("listed files without volume cells are left out: {surfaces}"));
     }
-    if !structured.is_empty() {
-        let why = "structured grids cannot be read, so the mesh has holes there; save them as unstructured grids (.vtu)";
-        warnings.push(format!("listed files are left out: {structured}; {why}"));
+    if !unread.is_empty() {
+        let why = "they cannot be read, so the mesh has holes there; save them as unstructured grids (.vtu)";
+        warnings.push(format!("listed files are left out: {unread}; {why}"));
     }
     Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
 }
@@ -138,7 +140,7 @@ impl Found<'_, '_> {
             let fail = |message: String| Err(source.error_line(listed.at, format!("`{}`: {message}", excerpt(listed.path.as_bytes()))));
             let path = folder.join(&listed.path);
             let kind = ending(&path);
-            if NO_VOLUMES.contains(&kind.as_str()) || STRUCTURED.contains(&kind.as_str()) {
+            if NO_VOLUMES.contains(&kind.as_str()) || OTHERS.contains(&kind.as_str()) {
                 *self.others.entry(kind).or_default() += 1;
                 continue;
             }

@@ -1,29 +1,31 @@
 //! Parser for the structure of VTK XML files: unstructured grids, without the values of their arrays, and files that list
 //! other files.
 
-use std::collections::HashSet;
 use std::ops::Range;
 
 use quick_xml::Reader;
 use quick_xml::events::{BytesStart, Event};
 
-use super::TimeStep;
+use super::lattice::{Frame, GridKind, Lattice};
 use super::scalar::Scalar;
 use super::source::{Source, excerpt, passage};
-use super::tokens::Tokens;
+use super::steps::{Steps, TimeStep};
+use super::tokens::{Tokens, parse_float};
 use super::vtu_data::{Appended, Codec, Place, StoredArray};
 use super::vtu_outline::Outline;
 use crate::error::{Error, Result};
 
 /// What a file contains.
+#[allow(clippy::large_enum_variant, reason = "there is one per file")]
 pub(crate) enum Document {
     Grid(Skeleton),
     List(List),
 }
 
-/// The content of the XML elements of an unstructured grid, without the values of arrays.
+/// The content of the XML elements of a grid, without the values of arrays.
 pub(crate) struct Skeleton {
     pub codec: Codec,
+    pub kind: GridKind,
     pub pieces: Vec<Piece>,
     pub format: String,
     pub warnings: Vec<String>,
@@ -41,7 +43,10 @@ pub(crate) struct Piece {
     pub point_data: Vec<StoredArray>,
     pub cell_data: Vec<StoredArray>,
     pub positions: Option<StoredArray>,
+    /// Arrays that describe cells; those of the coordinates along the axes.
     pub topology: Vec<StoredArray>,
+    /// The points of a piece of a structured grid.
+    pub lattice: Option<Lattice>,
 }
 
 /// A file that lists other files.
@@ -84,10 +89,10 @@ pub(crate) fn parse(source: &Source, step: TimeStep) -> Result<Document> {
             root: None,
             pieces: Vec::new(),
             block: 0,
-            steps: Steps { wanted, ..Steps::default() },
+            steps: Steps::of(wanted),
             left_out: false,
             second_points: false,
-            is_surface: false,
+            kind: GridKind::Cells,
         }
         .run()
     };
@@ -105,26 +110,6 @@ pub(crate) fn parse(source: &Source, step: TimeStep) -> Result<Document> {
     Ok(document)
 }
 
-/// The time steps of a file. VTK writes several into one file on demand: arrays of each follow each other, and those
-/// that stay the same name several.
-#[derive(Default)]
-struct Steps {
-    /// The one that is read; `None`: the first that the file names.
-    wanted: Option<String>,
-    all: Vec<String>,
-    seen: HashSet<String>,
-}
-
-impl Steps {
-    /// Whether an array of these steps, numbers separated by spaces, belongs to the one that is read.
-    fn are_wanted(&mut self, of: &str) -> bool {
-        let steps = || of.split_ascii_whitespace();
-        self.all.extend(steps().filter(|&step| self.seen.insert(step.to_owned())).map(str::to_owned));
-        let wanted = self.wanted.get_or_insert_with(|| steps().next().unwrap_or("").to_owned());
-        steps().any(|step| step == wanted)
-    }
-}
-
 struct Parser<'a, 't> {
     source: &'a Source,
     outline: &'t Outline,
@@ -139,8 +124,7 @@ struct Parser<'a, 't> {
     left_out: bool,
     /// Whether a piece has more than one array of points.
     second_points: bool,
-    /// Whether the file has a surface, of which only the points are read.
-    is_surface: bool,
+    kind: GridKind,
 }
 
 impl Parser<'_, '_> {
@@ -202,13 +186,13 @@ impl Parser<'_, '_> {
             codec.appended = self.appended(&attributes, end)?;
         }
         let mut warnings = Vec::new();
-        if self.is_surface {
+        if self.kind == GridKind::Surface {
             warnings.push("a surface, of which only the points can be read".into());
         }
         if self.second_points {
             warnings.push("<Points> has several arrays, of which the first is read".into());
         }
-        Ok(Document::Grid(Skeleton { codec, pieces: self.pieces, format, warnings, steps: self.steps.all }))
+        Ok(Document::Grid(Skeleton { codec, kind: self.kind, pieces: self.pieces, format, warnings, steps: self.steps.all }))
     }
 
     /// Locates the appended data, whose element starts before byte `end` of the file; `None` if it is empty.
@@ -258,15 +242,22 @@ impl Parser<'_, '_> {
     fn root(&self, attributes: &[(String, String)], at: usize) -> Result<Root> {
         let kind = get(attributes, "type").unwrap_or("");
         let version = excerpt(get(attributes, "version").unwrap_or("without a version").as_bytes());
-        if kind == "PUnstructuredGrid" || LISTS.contains(&kind) {
+        let is_parallel = kind.strip_prefix('P').and_then(GridKind::of).is_some_and(|kind| kind != GridKind::Surface);
+        if is_parallel || LISTS.contains(&kind) {
             let list = List { format: format!("VTK XML {kind} {version}"), files: Vec::new() };
-            return Ok(Root::List(list, matches!(kind, "PUnstructuredGrid" | "vtkPartitionedDataSet")));
+            return Ok(Root::List(list, is_parallel || kind == "vtkPartitionedDataSet"));
         }
-        if !["UnstructuredGrid", "PolyData"].contains(&kind) {
+        if GridKind::of(kind).is_none() {
             return Err(self.source.error_line(at, format!("a VTK XML file of type `{}`, not UnstructuredGrid", excerpt(kind.as_bytes()))));
         }
         let codec = Codec::new(|name| get(attributes, name)).map_err(|message| self.source.error_line(at, message))?;
-        let grid = if kind == "PolyData" { "surface" } else { "unstructured grid" };
+        let grid = match GridKind::of(kind) {
+            Some(GridKind::Surface) => "surface",
+            Some(GridKind::Structured) => "structured grid",
+            Some(GridKind::Rectilinear) => "rectilinear grid",
+            Some(GridKind::Image(_)) => "image",
+            _ => "unstructured grid",
+        };
         let format = format!("VTK XML {grid} {version}{}", codec.describe());
         Ok(Root::Grid(codec, format))
     }
@@ -277,7 +268,7 @@ impl Parser<'_, '_> {
             ("VTKFile", None) => {
                 let attributes = self.attributes(element, at)?;
                 self.root = Some(self.root(&attributes, at)?);
-                self.is_surface = get(&attributes, "type") == Some("PolyData");
+                self.kind = get(&attributes, "type").and_then(GridKind::of).unwrap_or(GridKind::Cells);
             }
             (name, None) => {
                 let message = format!("an XML or HTML document <{}>, not a VTK file", excerpt(name.as_bytes()));
@@ -294,6 +285,25 @@ impl Parser<'_, '_> {
                     list.files.extend(path.map(|path| Listed { path: path.into(), step, block: self.block, at }));
                 }
             }
+            ("ImageData", Some("VTKFile")) => {
+                let attributes = self.attributes(element, at)?;
+                if matches!(self.kind, GridKind::Image(_)) {
+                    self.kind = GridKind::Image(self.frame(&attributes, at)?);
+                }
+            }
+            ("Piece", _) if self.kind.has_lattice() => {
+                let attributes = self.attributes(element, at)?;
+                let text = get(&attributes, "Extent").unwrap_or("");
+                let wrong = || format!("Extent=\"{}\" is not the extent of fewer than 2^32 points", excerpt(text.as_bytes()));
+                let lattice = Lattice::parse(text).ok_or_else(|| self.source.error_line(at, wrong()))?;
+                self.pieces.push(Piece {
+                    at,
+                    points: lattice.points(),
+                    cells: lattice.cells(),
+                    lattice: Some(lattice),
+                    ..Piece::default()
+                });
+            }
             ("Piece", _) => {
                 let attributes = self.attributes(element, at)?;
                 let number = |name: &str| {
@@ -301,12 +311,12 @@ impl Parser<'_, '_> {
                     let wrong = || self.source.error_line(at, format!("{name}=\"{}\" is not a count", excerpt(text.as_bytes())));
                     text.trim().parse::<u64>().map_err(|_| wrong())
                 };
-                let cells = if self.is_surface { 0 } else { number("NumberOfCells")? };
+                let cells = if self.kind == GridKind::Surface { 0 } else { number("NumberOfCells")? };
                 let piece = Piece { at, points: number("NumberOfPoints")?, cells, ..Piece::default() };
                 self.pieces.push(piece);
             }
-            ("DataArray", Some("CellData")) if self.is_surface => self.left_out = true,
-            ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells"))) => {
+            ("DataArray", Some("CellData")) if self.kind == GridKind::Surface => self.left_out = true,
+            ("DataArray", Some(group @ ("PointData" | "CellData" | "Points" | "Cells" | "Coordinates"))) => {
                 let group = group.to_owned();
                 let attributes = self.attributes(element, at)?;
                 self.left_out = get(&attributes, "TimeStep").is_some_and(|steps| !self.steps.are_wanted(steps));
@@ -329,6 +339,22 @@ impl Parser<'_, '_> {
             _ => {}
         }
         Ok(())
+    }
+
+    /// The frame of an image.
+    fn frame(&self, attributes: &[(String, String)], at: usize) -> Result<Frame> {
+        let numbers = |name: &str, count: usize| {
+            let Some(text) = get(attributes, name) else { return Ok(None) };
+            let numbers = text.split_ascii_whitespace().map(|number| parse_float(number.as_bytes())).collect::<Option<Vec<f64>>>();
+            let found = numbers.filter(|numbers| numbers.len() == count).map(Some);
+            found.ok_or_else(|| self.source.error_line(at, format!("{name}=\"{}\" is not {count} numbers", excerpt(text.as_bytes()))))
+        };
+        let unit = Frame::default();
+        let (origin, spacing, direction) = (numbers("Origin", 3)?, numbers("Spacing", 3)?, numbers("Direction", 9)?);
+        let column = |c: usize| direction.as_ref().map_or(unit.steps[c], |d| [d[c], d[3 + c], d[6 + c]]);
+        let spacing = spacing.unwrap_or_else(|| vec![1.0; 3]);
+        let steps = [0, 1, 2].map(|c| column(c).map(|x| x * spacing[c]));
+        Ok(Frame { origin: origin.map_or(unit.origin, |o| [o[0], o[1], o[2]]), steps })
     }
 
     fn array(&self, attributes: &[(String, String)], at: usize) -> Result<StoredArray> {
@@ -370,7 +396,7 @@ impl Parser<'_, '_> {
             "PointData" => piece.point_data.last_mut(),
             "CellData" => piece.cell_data.last_mut(),
             "Points" => piece.positions.as_mut(),
-            "Cells" => piece.topology.last_mut(),
+            "Cells" | "Coordinates" => piece.topology.last_mut(),
             _ => None,
         };
         if let Some(StoredArray { place: Place::Ascii(parts) | Place::Inline(parts), .. }) = array {
