@@ -6,7 +6,7 @@ mod formats_small;
 
 use std::path::Path;
 
-use formats_small::{all, polyhedra, shared};
+use formats_small::{all, polyhedra, shared, structured};
 use olbvh::formats::{LoadOptions, load, load_bytes, load_points, write_mesh};
 
 fn check(path: &Path, bytes: Vec<u8>) {
@@ -48,7 +48,7 @@ fn small_files_of_every_format() {
     for (name, bytes) in all() {
         std::fs::write(folder.path().join(name), bytes).unwrap();
     }
-    for (name, bytes) in all().into_iter().chain(polyhedra()) {
+    for (name, bytes) in all().into_iter().chain(polyhedra()).chain(structured::files()) {
         damage(&folder.path().join(name), &bytes, 1);
     }
 }

@@ -5,6 +5,7 @@
 
 #[path = "../not_run/mod.rs"]
 pub mod not_run;
+pub mod structured;
 
 use not_run::not_run;
 use olbvh::formats::{LoadOptions, Loaded, load_bytes};
@@ -25,7 +26,7 @@ pub fn shared(folder: &str) -> Option<PathBuf> {
     None
 }
 
-fn join<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
+pub fn join<T: ToString>(values: impl IntoIterator<Item = T>) -> String {
     values.into_iter().map(|v| v.to_string()).collect::<Vec<_>>().join(" ")
 }
 
