@@ -1,11 +1,10 @@
 //! Conversion of the points, cells and arrays of a file to a [`Mesh`] and its [`Report`], shared by all formats.
 
-use std::ops::Range;
 use std::path::PathBuf;
 
 use super::array::{Array, MOST_COMPONENTS, Names, length};
 use super::budget::Budget;
-use super::cells::{CellType, MOST_CORNERS, Shape, ghost, split, split_quadratic};
+use super::cells::ghost;
 use super::report::{CellCount, Fate, Report};
 use super::source::{Source, excerpt};
 use super::{Curved, LoadOptions, Merge};
@@ -116,109 +115,6 @@ impl Assembly {
         self.ids.reserve(cells);
     }
 
-    /// The number of the next cell of the file.
-    fn next_id(&self) -> Result<u32> {
-        let id = u32::try_from(self.n_cells).ok().filter(|&id| id < u32::MAX);
-        id.ok_or_else(|| Error::TooLarge(format!("{}: more than 2^32 cells", self.path.display())))
-    }
-
-    fn cell_error(&self, id: u32, kind: CellType, message: String) -> Error {
-        self.error_at(id, |cell| format!("cell {cell} ({})", kind.name), message)
-    }
-
-    /// Checks that the nodes of a cell are points of the piece.
-    fn check(&self, id: u32, kind: CellType, nodes: &[i64], piece: &Range<usize>) -> Result<()> {
-        let n_points = piece.len();
-        let Some(bad) = nodes.iter().find(|&&v| usize::try_from(v).map_or(true, |v| v >= n_points)) else { return Ok(()) };
-        let shown = bad.saturating_add(self.first_point);
-        let last = (n_points as i64 - 1).saturating_add(self.first_point);
-        let range = if n_points == 0 { "there are none".to_owned() } else { format!("points are {} to {last}", self.first_point) };
-        Err(self.cell_error(id, kind, format!("names point {shown}, but {range}")))
-    }
-
-    /// The first point at the place of a point. Points at the same place count as one where faces are cut, so that cells
-    /// which share a face cut it in the same way.
-    fn place(&self, point: u32) -> u32 {
-        self.places.get(point as usize).copied().unwrap_or(point)
-    }
-
-    /// Adds the next cell of the file. `nodes` are indices of points.
-    pub fn push(&mut self, kind: CellType, nodes: &[i64]) -> Result<()> {
-        self.push_within(kind, nodes, 0..self.points.len())
-    }
-
-    /// Adds the next cell of the file. `nodes` are indices of points of a piece, which has the points `piece`.
-    pub fn push_within(&mut self, kind: CellType, nodes: &[i64], piece: Range<usize>) -> Result<()> {
-        let id = self.next_id()?;
-        let corners = kind.shape.corners();
-        if kind.nodes.map_or(nodes.len() < corners, |n| n != nodes.len()) {
-            let wanted = kind.nodes.map_or_else(|| format!("at least {corners}"), |n| n.to_string());
-            return Err(self.cell_error(id, kind, format!("{} points, but this type has {wanted}", nodes.len())));
-        }
-        self.check(id, kind, nodes, &piece)?;
-        let point = |i: usize| (piece.start + nodes[i] as usize) as u32;
-        let has_middles = kind.shape == Shape::Tetrahedron && nodes.len() == 10;
-        self.has_quadratic |= has_middles;
-        let eight = if has_middles && self.curved == Curved::Split {
-            split_quadratic([0, 1, 2, 3, 4, 5, 6, 7, 8, 9].map(|i| self.points[point(i) as usize]))
-        } else {
-            None
-        };
-        let is_curved = nodes.len() > corners && !matches!(kind.shape, Shape::Flat | Shape::Other);
-        self.straightened += u64::from(is_curved && eight.is_none());
-        let before = self.tets.len();
-        let fate = match kind.shape {
-            Shape::Flat => Fate::Boundary,
-            Shape::Polyhedron | Shape::Other => Fate::Unsupported,
-            Shape::Tetrahedron => {
-                if let Some(eight) = eight {
-                    self.tets.extend(eight.map(|tet| tet.map(point)));
-                    self.orient(before);
-                } else {
-                    let tet = [0, 1, 2, 3].map(point);
-                    let volume = self.volume(tet);
-                    self.negative += u64::from(volume < 0.0);
-                    self.flat += u64::from(volume == 0.0);
-                    self.tets.push(tet);
-                }
-                match nodes.len() {
-                    4 => Fate::Kept,
-                    _ if eight.is_some() => Fate::Split,
-                    _ => Fate::Straightened,
-                }
-            }
-            shape => {
-                let mut places = [0; MOST_CORNERS];
-                places[..corners].iter_mut().enumerate().for_each(|(i, at)| *at = self.place(point(i)));
-                let tets = &mut self.tets;
-                split(shape, &places[..corners], |tet| tets.push(tet.map(|v| places.iter().position(|p| *p == v).map_or(v, point))));
-                self.orient(before);
-                Fate::Split
-            }
-        };
-        let pieces = self.tets.len() - before;
-        self.n_corners += if eight.is_some() { 10 } else { corners as u64 };
-        self.ids.resize(self.tets.len(), id);
-        self.count(kind.name, fate, pieces as u64);
-        Ok(())
-    }
-
-    /// Orients the pieces of a cell, from tetrahedron `start` on, so that their total volume is positive, and counts
-    /// flat and tangled ones.
-    fn orient(&mut self, start: usize) {
-        let volumes = || self.tets[start..].iter().map(|&tet| self.volume(tet));
-        let turn = volumes().sum::<f64>() < 0.0;
-        let flat = volumes().filter(|&v| v == 0.0).count();
-        let tangled = volumes().any(|v| if turn { v > 0.0 } else { v < 0.0 });
-        self.flat += flat as u64;
-        self.tangled += u64::from(tangled);
-        if turn {
-            for tet in &mut self.tets[start..] {
-                tet.swap(2, 3);
-            }
-        }
-    }
-
     /// Counts the next cell of the file without reading its nodes.
     pub fn skip(&mut self, name: &str, fate: Fate) {
         self.count(name, fate, 0);
@@ -233,11 +129,6 @@ impl Assembly {
         });
         self.counts[i].count += 1;
         self.counts[i].tetrahedra += tetrahedra;
-    }
-
-    /// Six times the signed volume of a tetrahedron.
-    fn volume(&self, tet: [u32; 4]) -> f64 {
-        volume(tet.map(|v| self.points[v as usize]))
     }
 
     /// Checks the whole mesh and converts it to single precision.
@@ -401,12 +292,6 @@ impl Assembly {
     }
 }
 
-/// Six times the signed volume of a tetrahedron.
-fn volume([a, b, c, d]: [[f64; 3]; 4]) -> f64 {
-    let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-    u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])
-}
-
 fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
     let start = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
     points
@@ -416,6 +301,7 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
         .fold(start, |(lo, hi), (p, _)| ([0, 1, 2].map(|c| lo[c].min(p[c])), [0, 1, 2].map(|c| hi[c].max(p[c]))))
 }
 
+mod cells;
 mod pieces;
 mod polyhedra;
 #[cfg(test)]

@@ -4,7 +4,8 @@ use std::ops::Range;
 
 use super::super::cells::{CellType, cut};
 use super::super::report::Fate;
-use super::{Assembly, volume};
+use super::Assembly;
+use super::cells::volume;
 use crate::error::{Error, Result};
 use crate::mesh::On;
 
