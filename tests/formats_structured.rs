@@ -102,11 +102,16 @@ fn what_is_wrong_is_named() {
         ("a.vti", file("a.vti").replace("Spacing='0.5 1 2'", "Spacing='0.5 1'"), "Spacing=\"0.5 1\" is not 3 numbers"),
         ("a.vtr", file("a.vtr").replace("3 5<", "3 5 7<"), "array `z` (line 1): it has 3 values instead of 2"),
         ("image.vtk", file("image.vtk").replace("SPACING 0.5", "SPACING a"), "`a` where a number should be"),
-        ("image.vtk", file("image.vtk").replace("SPACING 0.5 1 2", ""), "0, 0 and 0 coordinates, but the dimensions are 4, 3 and 2"),
+        ("image.vtk", file("image.vtk").replace("SPACING 0.5 1 2", ""), "there was no SPACING"),
         (
             "structured.vtk",
             file("structured.vtk").replace("DIMENSIONS 4", "DIMENSIONS 5"),
             "POINTS has 24 entries, but the dimensions make 30",
+        ),
+        (
+            "rectilinear.vtk",
+            file("rectilinear.vtk").replace("2 double\n3 5", "1 double\n3"),
+            "4, 3 and 1 coordinates, but the dimensions are 4, 3 and 2",
         ),
         ("structured.vtk", file("structured.vtk").replace("DIMENSIONS 4 3 2", ""), "there was no DIMENSIONS"),
         (

@@ -68,7 +68,14 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let missing = |what: &str| source.error_line(source.len(), format!("the file ends, and there was no {what}"));
     let lattice = if dataset == GridKind::Cells { None } else { Some(grid.lattice.ok_or_else(|| missing("DIMENSIONS"))?) };
     let points = match (&lattice, dataset) {
-        (Some(lattice), GridKind::Rectilinear | GridKind::Image(_)) => grid.points(lattice, source, &mut assembly.padding)?,
+        (Some(lattice), GridKind::Rectilinear) => grid.sums(lattice, source, &mut assembly.padding)?,
+        (Some(lattice), GridKind::Image(_)) => {
+            let frame = grid.frame().ok_or_else(|| missing("SPACING"))?;
+            lattice.spend(&mut assembly.padding).map_err(|message| source.error(message))?;
+            let mut points = Vec::new();
+            lattice.in_frame(&frame, &mut points);
+            points
+        }
         _ => points.ok_or_else(|| missing("POINTS"))?,
     };
     assembly.set_points(points);
@@ -132,15 +139,16 @@ struct StructuredGrid {
 }
 
 impl StructuredGrid {
-    /// The points, which follow from coordinates along the axes or from their distances.
-    fn points(&self, lattice: &Lattice, source: &Source, budget: &mut Budget) -> Result<Vec<[f64; 3]>> {
+    /// Where the points are; `None`: the file does not say how far apart.
+    fn frame(&self) -> Option<Frame> {
+        let [dx, dy, dz] = self.spacing?;
+        Some(Frame { origin: self.origin.unwrap_or_default(), steps: [[dx, 0.0, 0.0], [0.0, dy, 0.0], [0.0, 0.0, dz]] })
+    }
+
+    /// The points that the coordinates along the axes make.
+    fn sums(&self, lattice: &Lattice, source: &Source, budget: &mut Budget) -> Result<Vec<[f64; 3]>> {
         let mut points = Vec::new();
         lattice.spend(budget).map_err(|message| source.error(message))?;
-        if let Some([dx, dy, dz]) = self.spacing {
-            let steps = [[dx, 0.0, 0.0], [0.0, dy, 0.0], [0.0, 0.0, dz]];
-            lattice.in_frame(&Frame { origin: self.origin.unwrap_or_default(), steps }, &mut points);
-            return Ok(points);
-        }
         let counts = self.axes.each_ref().map(|axis| axis.len() as u64);
         if counts != lattice.size() {
             let [[x, y, z], [nx, ny, nz]] = [counts, lattice.size()];
@@ -221,7 +229,7 @@ impl<'a> Reader<'a> {
             b"STRUCTURED_GRID" => ("structured grid", GridKind::Structured),
             b"RECTILINEAR_GRID" => ("rectilinear grid", GridKind::Rectilinear),
             b"STRUCTURED_POINTS" => ("image", GridKind::Image(Frame::default())),
-            _ => return Err(self.source.error_line(at, format!("a {} dataset, not an UNSTRUCTURED_GRID", excerpt(dataset)))),
+            _ => return Err(self.source.error_line(at, format!("a {} dataset, which has no volume cells", excerpt(dataset)))),
         };
         Ok((format!("VTK legacy {what} {version}, {}", if self.binary { "binary" } else { "text" }), kind))
     }

@@ -1,5 +1,5 @@
-//! Reader for VTK XML unstructured grids (`.vtu`), versions 0.1 to 2.x, and for files that list such grids.
-//! `vtu_parser` reads the structure, `vtu_data` the arrays, `vtu_files` opens what is listed.
+//! Reader for VTK XML grids (`.vtu`, `.vts`, `.vtr`, `.vti`), versions 0.1 to 2.x, and for files that list such grids.
+//! `vtu_parser` reads the structure, `vtu_data` the arrays, `vtu_faces` polyhedra; `vtu_files` opens what is listed.
 
 use std::collections::HashMap;
 

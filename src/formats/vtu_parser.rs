@@ -248,7 +248,13 @@ impl Parser<'_, '_> {
             return Ok(Root::List(list, is_parallel || kind == "vtkPartitionedDataSet"));
         }
         if GridKind::of(kind).is_none() {
-            return Err(self.source.error_line(at, format!("a VTK XML file of type `{}`, not UnstructuredGrid", excerpt(kind.as_bytes()))));
+            return Err(self.source.error_line(
+                at,
+                format!(
+                    "a VTK XML file of type `{}`, which cannot be read; save it as an unstructured grid (.vtu)",
+                    excerpt(kind.as_bytes())
+                ),
+            ));
         }
         let codec = Codec::new(|name| get(attributes, name)).map_err(|message| self.source.error_line(at, message))?;
         let grid = match GridKind::of(kind) {
