@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::{CORNERS, open_bytes, polyhedra, shared};
+use formats_small::{CORNERS, open_bytes, polyhedra, replace, shared};
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes, load_points};
 use olbvh::mesh::Mesh;
 
@@ -59,6 +59,27 @@ fn all_forms_give_the_same_mesh() {
         std::fs::write(&path, bytes).unwrap();
         assert_eq!(load_points(&path).unwrap(), CORNERS, "{name}");
     }
+}
+
+/// What is left out is not read as a part of the next polyhedron.
+#[test]
+fn ghosts_are_left_out() {
+    for (name, bytes) in polyhedra() {
+        let text = String::from_utf8(bytes).unwrap();
+        let xml = text.replace("<CellData>", "<CellData><DataArray type='UInt8' Name='vtkGhostType'>1 0 0 1</DataArray>");
+        let marks = xml.replace("CELL_DATA 4\n", "CELL_DATA 4\nSCALARS vtkGhostType int\nLOOKUP_TABLE default\n1 0 0 1\n");
+        let Loaded { mesh, report } = open_bytes(name, marks.into_bytes());
+        assert_eq!((report.count(Fate::Ghost), mesh.tets.len(), report.added_points), (2, 7, 1), "{name}");
+        assert!(volumes(&mesh)[1] > 0.3, "{name}");
+    }
+}
+
+/// Some writers store empty arrays of faces where there are no polyhedra.
+#[test]
+fn empty_arrays_of_faces_do_no_harm() {
+    let empty = ["faces", "faceoffsets"].map(|name| format!("<DataArray type='Int64' Name='{name}' format='ascii'></DataArray></Cells>"));
+    let bytes = replace("ascii.vtu", b"</Cells>", empty.concat().replacen("</Cells>", "", 1).as_bytes());
+    assert_eq!(open_bytes("empty.vtu", bytes).mesh.tets.len(), 6);
 }
 
 /// Two pieces that meet in a square, whose corners have other numbers in the second, as polyhedron and hexahedron.

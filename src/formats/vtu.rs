@@ -161,7 +161,7 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
         let message = format!("the last cell of piece {index} ends at {last}, but `connectivity` has {all} values");
         return Err(source.error_in("array `offsets`", message));
     }
-    let mut faces = Faces::of(piece, source, codec)?;
+    let mut faces = None; // read when needed: pieces without polyhedra may have empty arrays of faces
     assembly.reserve(types.len());
     let mut start = 0;
     let mut kind: Option<(i64, CellType)> = None;
@@ -180,13 +180,20 @@ fn read_cells(source: &Source, codec: &mut Codec, assembly: &mut Assembly, piece
                 found.ok_or_else(|| source.error_in(format_args!("cell {cell}"), format!("unknown VTK cell type {number}")))?,
             ));
         }
+        let Some((_, kind)) = kind else { continue };
+        // That of a ghost is passed over.
+        let list = if kind.shape == Shape::Polyhedron {
+            let faces = match &mut faces {
+                Some(faces) => faces,
+                none => none.insert(Faces::of(piece, source, codec)?),
+            };
+            Some(faces.list(cell, source, assembly)?)
+        } else {
+            None
+        };
         if is_ghost(cell)? {
             assembly.skip("ghost or hidden cell", Fate::Ghost);
-            continue;
-        }
-        let Some((_, kind)) = kind else { continue };
-        if kind.shape == Shape::Polyhedron {
-            let list = faces.list(cell, source, assembly)?;
+        } else if let Some(list) = list {
             assembly.push_polyhedron(kind, list, points.clone())?;
         } else {
             assembly.push_within(kind, nodes, points.clone())?;

@@ -56,8 +56,8 @@ impl<'a> Faces<'a> {
         }
     }
 
-    /// The list of the faces of a polyhedron, as [`Assembly::push_polyhedron`] takes it. Cells are asked for in
-    /// ascending order.
+    /// The list of the faces of a polyhedron, as [`Assembly::push_polyhedron`] takes it. All polyhedra must be asked
+    /// for, in ascending order.
     pub fn list(&mut self, cell: usize, source: &Source, assembly: &mut Assembly) -> Result<&[i64]> {
         let fail = |message: String| source.error_in(format_args!("cell {cell}"), message);
         let range = |begin: i64, end: i64, most: usize, what: &str| {
