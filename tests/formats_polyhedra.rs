@@ -52,7 +52,7 @@ fn all_forms_give_the_same_mesh() {
         assert_eq!(mesh.field("s").unwrap().values[9..], [9.0, 10.0, 3.5, 6.0], "{name}");
         assert_eq!(mesh.field("c").unwrap().values[17..], [1.0, 2.0, 3.0], "{name}");
         assert!(
-            report.warnings.is_empty() && report.to_string().contains("13 points (2 of them added in the middle of polyhedra)"),
+            report.warnings.is_empty() && report.to_string().contains("13 points (2 of them added in the middle of cells)"),
             "{report}"
         );
         let path = folder.path().join(name);

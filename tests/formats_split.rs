@@ -218,6 +218,63 @@ fn curved_tetrahedra_use_all_their_nodes() {
     check(&whole.mesh, sum(&whole.mesh), 4 * faces(&straight.mesh).values().filter(|&&n| n == 1).count());
 }
 
+/// A hexahedron with a wedge and a pyramid at its faces, and a tetrahedron at the pyramid, all quadratic, with the nodes of
+/// their edges in any order. The field is x² + yz.
+#[test]
+fn quadratic_cells_fit_each_other() {
+    let corners = [
+        [0., 0., 0.],
+        [1., 0., 0.],
+        [1., 1., 0.],
+        [0., 1., 0.],
+        [0., 0., 1.],
+        [1., 0., 1.],
+        [1., 1., 1.],
+        [0., 1., 1.],
+        [2., 0.5, 0.],
+        [2., 0.5, 1.],
+        [0.5, 0.5, 2.],
+        [2., 0.5, 2.],
+    ];
+    let quad = |a, b, c, d| vec![[a, b], [b, c], [c, d], [d, a]];
+    let cells: [(u8, Vec<usize>, Vec<[usize; 2]>); 4] = [
+        (25, (0..8).collect(), [quad(4, 5, 6, 7), vec![[0, 4], [1, 5], [2, 6], [3, 7]], quad(0, 1, 2, 3)].concat()),
+        (26, vec![1, 2, 8, 5, 6, 9], vec![[1, 5], [1, 2], [2, 8], [8, 1], [2, 6], [8, 9], [5, 6], [6, 9], [9, 5]]),
+        (27, vec![4, 5, 6, 7, 10], [vec![[7, 10], [4, 10], [5, 10], [6, 10]], quad(4, 5, 6, 7)].concat()),
+        (24, vec![5, 6, 10, 11], vec![[10, 11], [5, 6], [6, 10], [10, 5], [5, 11], [6, 11]]),
+    ];
+    for bend in [0.0, 0.04] {
+        let mut points = corners.to_vec();
+        let mut middles = HashMap::new();
+        let mut middle = |&[i, j]: &[usize; 2]| {
+            *middles.entry([i.min(j), i.max(j)]).or_insert_with(|| {
+                let bent = [bend, -0.5 * bend, 0.7 * bend];
+                points.push([0, 1, 2].map(|c| 0.5 * (corners[i][c] + corners[j][c]) + bent[(c + i + j) % 3]));
+                points.len() - 1
+            })
+        };
+        let nodes: Vec<Vec<usize>> =
+            cells.iter().map(|(_, corners, edges)| corners.iter().copied().chain(edges.iter().map(&mut middle)).collect()).collect();
+        let f = |[x, y, z]: [f64; 3]| x * x + y * z;
+        let values = points.iter().map(|&p| f(p).to_string()).collect::<Vec<_>>().join(" ");
+        let data = format!("POINT_DATA {}\nSCALARS f double\nLOOKUP_TABLE default\n{values}\n", points.len());
+        let text = file(&points, &nodes, &cells.each_ref().map(|cell| cell.0)) + &data;
+        let options = LoadOptions { curved: Curved::Split, ..LoadOptions::default() };
+        let Loaded { mesh, report } = load_bytes("quadratic.vtk", text.into_bytes(), &options).unwrap();
+        assert_eq!((report.count(Fate::Split), report.added_points, report.tangled, report.warnings.len()), (4, 3, 0, 0), "{report}");
+        assert_eq!(mesh.tets.len(), 6 * 6 + (2 * 4 + 3 * 6) + (6 + 4 * 4) + 8);
+        assert!(mesh.tets.iter().all(|&t| volume(&mesh, t) > 0.0));
+        let total: f64 = mesh.tets.iter().map(|&t| volume(&mesh, t)).sum();
+        check(&mesh, if bend == 0.0 { 1.0 + 0.5 + 1.0 / 3.0 + 0.25 } else { total }, 4 * 6 + (2 * 4 + 2 * 6) + 3 * 4 + 3 * 4);
+        let added = mesh.points.iter().zip(&mesh.fields[0].values).skip(points.len());
+        for (place, (&p, &value)) in [[0.5; 3], [4.0 / 3.0, 0.5, 0.5], [0.5, 0.5, 1.25]].into_iter().zip(added) {
+            assert!((0..3).all(|c| (f64::from(p[c]) - place[c]).abs() < 1e-6 + 3.0 * bend), "{p:?}");
+            // The values of a quadratic field are exact, but in the pyramid.
+            assert!(bend > 0.0 || place[2] > 1.0 || (f64::from(value) - f(place)).abs() < 1e-6, "{value}");
+        }
+    }
+}
+
 /// The volume of a box of 2.5 × 1 × 1 whose own tetrahedra are folded at 16 faces, so that a little of it is counted
 /// twice.
 const MIXED: f64 = 2.501_392_23;
@@ -239,6 +296,11 @@ fn shared_meshes_conform() {
         let boundary = faces(&mesh).values().filter(|&&n| n == 1).count();
         check(&mesh, wanted, boundary);
     }
+    // With all their nodes, the cells still fit, and each face of the boundary has more triangles.
+    let options = LoadOptions { curved: Curved::Split, ..LoadOptions::default() };
+    let Loaded { mesh, report } = load(folder.join("mixed_quadratic.vtu"), &options).unwrap();
+    assert!(report.count(Fate::Straightened) == 0 && report.warnings.is_empty(), "{report}");
+    check(&mesh, MIXED, faces(&mesh).values().filter(|&&n| n == 1).count());
     for name in ["hex_wavy_8k.vtu", "wedge_boundarylayer_32k.vtu"] {
         let mesh = load(folder.join(name), &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}")).mesh;
         let faces = faces(&mesh);

@@ -50,7 +50,7 @@ pub(crate) struct Assembly {
     tangled: u64,
     /// Cells with nodes besides their corners, of which only these are used.
     straightened: u64,
-    /// Whether some of these are tetrahedra of ten nodes.
+    /// Whether some of these are quadratic.
     has_quadratic: bool,
     /// Number of corners of all cells together.
     n_corners: u64,
@@ -161,7 +161,7 @@ impl Assembly {
         if self.straightened > 0 {
             let n = self.straightened;
             let remedy = if self.has_quadratic && self.curved == Curved::Corners {
-                "; --curved split (Curved::Split) uses all ten nodes of tetrahedra"
+                "; --curved split (Curved::Split) uses all nodes of quadratic ones"
             } else {
                 ""
             };

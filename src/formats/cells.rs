@@ -43,7 +43,7 @@ impl Shape {
     }
 
     /// The faces as corner numbers, counter-clockwise as seen from outside (in VTK's numbering).
-    const fn faces(self) -> &'static [&'static [u8]] {
+    pub const fn faces(self) -> &'static [&'static [u8]] {
         match self {
             Shape::Pyramid => &[&[0, 3, 2, 1], &[0, 1, 4], &[1, 2, 4], &[2, 3, 4], &[3, 0, 4]],
             Shape::Wedge => &[&[0, 2, 1], &[3, 4, 5], &[0, 1, 4, 3], &[1, 2, 5, 4], &[2, 0, 3, 5]],
@@ -121,29 +121,6 @@ pub(crate) fn split(shape: Shape, corners: &[u32], mut emit: impl FnMut([u32; 4]
     for t in triangles.iter().filter(|t| cap.is_none_or(|(far, _)| !t.contains(&far))) {
         emit([apex, t[0], t[1], t[2]]);
     }
-}
-
-/// Splits a tetrahedron with nodes in the middle of its edges, at these places, into eight, each given by the numbers of
-/// its nodes; the corners come first. Formats disagree about the order of the others, so that each edge has the node that
-/// is nearest to its middle. Every face becomes four triangles, and the octahedron in the middle four tetrahedra around its
-/// shortest diagonal. `None`: two edges would have the same node.
-pub(crate) fn split_quadratic(places: [[f64; 3]; 10]) -> Option<[[usize; 4]; 8]> {
-    let square = |p: [f64; 3], q: [f64; 3]| (0..3).map(|c| (p[c] - q[c]) * (p[c] - q[c])).sum::<f64>();
-    let nearest = |[i, j]: [usize; 2]| {
-        let middle = [0, 1, 2].map(|c| f64::midpoint(places[i][c], places[j][c]));
-        (4..10).min_by(|&m, &n| square(places[m], middle).total_cmp(&square(places[n], middle))).unwrap_or(4)
-    };
-    let [ab, bc, ac, ad, bd, cd] = [[0, 1], [1, 2], [0, 2], [0, 3], [1, 3], [2, 3]].map(nearest);
-    if [ab, bc, ac, ad, bd, cd].iter().fold(0, |met, node| met | 1 << node) != 0b11_1111_0000 {
-        return None;
-    }
-    let inner = [(ab, cd, [ac, ad, bd, bc]), (bc, ad, [ab, bd, cd, ac]), (ac, bd, [ab, bc, cd, ad])];
-    let lengths = inner.map(|(from, to, _)| square(places[from], places[to]));
-    let shortest = (0..3).min_by(|&i, &j| lengths[i].total_cmp(&lengths[j])).unwrap_or(0);
-    let (from, to, [p, q, r, s]) = inner[shortest];
-    let around = [[from, to, p, q], [from, to, q, r], [from, to, r, s], [from, to, s, p]];
-    let [at_a, at_b, at_c, at_d] = [[0, ab, ac, ad], [ab, 1, bc, bd], [ac, bc, 2, cd], [ad, bd, cd, 3]];
-    Some([at_a, at_b, at_c, at_d, around[0], around[1], around[2], around[3]])
 }
 
 /// The other two vertices of a triangle that contains `vertex`, in cyclic order.

@@ -16,6 +16,7 @@ mod array;
 mod assemble;
 mod budget;
 mod cells;
+mod curved;
 mod detect;
 mod gmsh;
 mod gmsh_data;
@@ -91,8 +92,9 @@ pub enum Curved {
     /// Only their corners are used: edges are straight, and fields are linear in a cell.
     #[default]
     Corners,
-    /// A tetrahedron of ten nodes is split into eight tetrahedra, which use them all and the values there. Other curved
-    /// cells are taken by their corners, so that a mesh of both has gaps between these.
+    /// Quadratic cells, which have a node in the middle of each edge, are split into tetrahedra that use all nodes and the
+    /// values there: one of ten nodes into eight, others around their middle, where a point is added if there is no node.
+    /// Cells of still higher order are taken by their corners.
     Split,
 }
 

@@ -12,7 +12,7 @@ pub enum Fate {
     Kept,
     /// Curved tetrahedra, of which only the corners were used.
     Straightened,
-    /// Cells that were split into tetrahedra (curved cells by their corners only, but for tetrahedra of ten nodes).
+    /// Cells that were split into tetrahedra (curved cells by their corners only, unless [`crate::formats::Curved::Split`] is asked for).
     Split,
     /// Points, lines and surfaces, which have no volume.
     Boundary,
@@ -49,8 +49,8 @@ pub struct Report {
     pub points: u64,
     /// Points that no tetrahedron uses.
     pub unused_points: u64,
-    /// Points that were added to those of the file, in the middle of polyhedra: means of their corners, with the means of
-    /// the values there.
+    /// Points that were added to those of the file, in the middle of polyhedra and quadratic cells, with values that follow
+    /// from those around them.
     pub added_points: u64,
     /// Cell types in the order in which they first appear.
     pub cells: Vec<CellCount>,
@@ -100,7 +100,7 @@ impl fmt::Display for Report {
             write!(f, " ({} of them in no cell)", self.unused_points)?;
         }
         if self.added_points > 0 {
-            write!(f, " ({} of them added in the middle of polyhedra)", self.added_points)?;
+            write!(f, " ({} of them added in the middle of cells)", self.added_points)?;
         }
         writeln!(f, ", {} tetrahedra", self.tetrahedra)?;
         for c in &self.cells {

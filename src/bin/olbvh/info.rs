@@ -136,7 +136,7 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, solid: &Solid, s: &Su
     page.row("format", format_args!("{}, read in {}", report.format, milliseconds(report.seconds * 1e3)));
     let added = match report.added_points {
         0 => String::new(),
-        n => format!(", {} of them added in the middle of polyhedra", grouped(n)),
+        n => format!(", {} of them added in the middle of cells", grouped(n)),
     };
     page.row("points", grouped(mesh.points.len() as u64) + &added);
     page.row("tetrahedra", grouped(mesh.tets.len() as u64));

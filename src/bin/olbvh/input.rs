@@ -66,9 +66,9 @@ pub struct ReadArgs {
     /// same at all of them.
     #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last")]
     time_step: TimeStep,
-    /// What becomes of curved cells. corners: edges are straight, and fields are linear in a cell. split: a tetrahedron of
-    /// ten nodes becomes eight tetrahedra, which use them all and the values there; other curved cells are taken by their
-    /// corners.
+    /// What becomes of curved cells. corners: edges are straight, and fields are linear in a cell. split: quadratic cells,
+    /// which have a node in the middle of each edge, become 8 to 48 tetrahedra that use all nodes and the values there; cells
+    /// of still higher order are taken by their corners.
     #[arg(long, default_value_t = Curved::default(), value_parser = named::<Curved>, value_name = "corners|split")]
     curved: Curved,
 }

@@ -129,7 +129,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let of = if output.format == OutputFormat::Vtu && !args.all { probed(&args.points, points.len(), common) } else { None };
     if let Some(Mesh { points: all, origin, .. }) = &of {
-        // Those in the middle of polyhedra are not in the file.
+        // Those in the middle of cells are not in the file.
         points.extend(all[points.len()..].iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + origin[c])));
     }
     // The difference is taken in double precision, which is what the mesh's origin is for.

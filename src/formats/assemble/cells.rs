@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::super::Curved;
-use super::super::cells::{CellType, MOST_CORNERS, Shape, split, split_quadratic};
+use super::super::cells::{CellType, MOST_CORNERS, Shape, split};
+use super::super::curved::{is_quadratic, split_tetrahedron};
 use super::super::report::Fate;
 use super::Assembly;
 use crate::error::{Error, Result};
@@ -63,16 +64,12 @@ impl Assembly {
                 self.push_tetrahedron([point(0), point(1), point(2), point(3)]);
                 (if nodes.len() == 4 { Fate::Kept } else { Fate::Straightened }, 4)
             }
-            shape => {
-                let mut places = [0; MOST_CORNERS];
-                places[..n_corners].iter_mut().enumerate().for_each(|(i, at)| *at = self.place(point(i)));
-                let tets = &mut self.tets;
-                split(shape, &places[..n_corners], |tet| tets.push(tet.map(|v| places.iter().position(|p| *p == v).map_or(v, point))));
-                self.orient(before);
-                (Fate::Split, n_corners)
-            }
+            shape => (Fate::Split, self.push_split(shape, nodes.len(), point)?),
         };
-        self.straightened += u64::from(0 < used && used < nodes.len());
+        if 0 < used && used < nodes.len() {
+            self.straightened += 1;
+            self.has_quadratic |= is_quadratic(kind.shape, nodes.len());
+        }
         self.n_corners += used as u64;
         self.ids.resize(self.tets.len(), id);
         self.count(kind.name, fate, (self.tets.len() - before) as u64);
@@ -87,11 +84,25 @@ impl Assembly {
         self.tets.push(tet);
     }
 
+    /// Splits a cell, by all of its nodes or by its corners. Returns how many nodes are used.
+    fn push_split(&mut self, shape: Shape, nodes: usize, point: impl Fn(usize) -> u32) -> Result<usize> {
+        let whole = self.curved == Curved::Split && is_quadratic(shape, nodes);
+        if whole && self.push_curved(shape, &(0..nodes).map(&point).collect::<Vec<_>>())? {
+            return Ok(nodes);
+        }
+        let (before, corners) = (self.tets.len(), shape.corners());
+        let mut places = [0; MOST_CORNERS];
+        places[..corners].iter_mut().enumerate().for_each(|(i, at)| *at = self.place(point(i)));
+        let tets = &mut self.tets;
+        split(shape, &places[..corners], |tet| tets.push(tet.map(|v| places.iter().position(|p| *p == v).map_or(v, &point))));
+        self.orient(before);
+        Ok(corners)
+    }
+
     /// Adds a tetrahedron of ten nodes, whole or by its corners. Returns what became of it, and how many nodes are used.
     fn push_quadratic(&mut self, nodes: [u32; 10]) -> (Fate, usize) {
-        self.has_quadratic = true;
         let whole = self.curved == Curved::Split;
-        let Some(eight) = whole.then(|| split_quadratic(nodes.map(|v| self.points[v as usize]))).flatten() else {
+        let Some(eight) = whole.then(|| split_tetrahedron(nodes.map(|v| self.points[v as usize]))).flatten() else {
             self.push_tetrahedron([nodes[0], nodes[1], nodes[2], nodes[3]]);
             return (Fate::Straightened, 4);
         };

@@ -1,22 +1,51 @@
-//! Polyhedra: cells that a file describes by their faces.
+//! Cells that are split around a point in their middle: polyhedra, which a file describes by their faces, and quadratic cells.
 
 use std::ops::Range;
 
-use super::super::cells::{CellType, cut};
+use super::super::cells::{CellType, Shape, cut};
+use super::super::curved::Surface;
 use super::super::report::Fate;
 use super::Assembly;
 use super::cells::volume;
 use crate::error::{Error, Result};
 use crate::mesh::On;
 
-/// Points that are added in the middle of polyhedra.
+/// Points that are added in the middle of cells.
 #[derive(Default)]
 pub(super) struct Centres {
     points: Vec<[f64; 3]>,
-    /// The corners of all of these polyhedra.
-    corners: Vec<u32>,
-    /// Where those of each polyhedron end.
+    /// The points of all of these cells that count there, and their weights.
+    corners: Vec<(u32, f64)>,
+    /// Where those of each cell end.
     ends: Vec<usize>,
+}
+
+/// The triangles of the surface of a cell.
+#[derive(Default)]
+struct Star {
+    /// The number of each corner's place, see [`Assembly::place`], and of the point; sorted, each place once.
+    corners: Vec<(u32, u32)>,
+    /// Triangles between places.
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Star {
+    /// Adds a face with these points.
+    fn add(&mut self, points: impl Iterator<Item = u32> + Clone, place: impl Fn(u32) -> u32) {
+        let places: Vec<u32> = points.clone().map(place).collect();
+        cut(&places, |triangle| self.triangles.push(triangle));
+        self.corners.extend(places.into_iter().zip(points));
+    }
+
+    /// To be called once all faces are added.
+    fn sort(&mut self) {
+        self.corners.sort_unstable();
+        self.corners.dedup_by_key(|corner| corner.0);
+    }
+
+    fn point(&self, place: u32) -> u32 {
+        self.corners[self.corners.partition_point(|corner| corner.0 < place)].1
+    }
 }
 
 impl Assembly {
@@ -30,40 +59,26 @@ impl Assembly {
         let id = self.next_id()?;
         let fail = |message: String| self.cell_error(id, kind, message);
         let (&count, mut rest) = faces.split_first().ok_or_else(|| fail("its list of faces is empty".into()))?;
-        // The number of each corner's place, see `Assembly::place`, and of the point.
-        let (mut corners, mut triangles) = (Vec::new(), Vec::new());
+        let mut star = Star::default();
         for face in 0..count {
             let length = rest.first().and_then(|&n| usize::try_from(n).ok()).filter(|&n| n < rest.len());
             let length = length.ok_or_else(|| fail(format!("its list of {count} faces ends in face {face}")))?;
             let (nodes, others) = rest[1..].split_at(length);
             rest = others;
             self.check(id, kind, nodes, &piece)?;
-            let points = nodes.iter().map(|&node| (piece.start + node as usize) as u32);
-            let places: Vec<u32> = points.clone().map(|point| self.place(point)).collect();
-            cut(&places, |triangle| triangles.push(triangle));
-            corners.extend(places.into_iter().zip(points));
+            star.add(nodes.iter().map(|&node| (piece.start + node as usize) as u32), |point| self.place(point));
         }
         if !rest.is_empty() {
             return Err(fail(format!("its list goes on for {} numbers after its {count} faces", rest.len())));
         }
-        corners.sort_unstable();
-        corners.dedup_by_key(|corner| corner.0);
-        let point = |place: u32| corners[corners.partition_point(|corner| corner.0 < place)].1;
-        let (before, n) = (self.tets.len(), corners.len());
-        if let (&[a, b, c, d], 4) = (corners.as_slice(), triangles.len()) {
+        star.sort();
+        let (before, n) = (self.tets.len(), star.corners.len());
+        if let (&[a, b, c, d], 4) = (star.corners.as_slice(), star.triangles.len()) {
             self.tets.push([a.1, b.1, c.1, d.1]);
-        } else if triangles.len() >= 4 {
-            let middle = self.add_middle(corners.iter().map(|corner| corner.1))?;
-            self.tets.extend(triangles.iter().map(|&[a, b, c]| [point(a), point(b), middle, point(c)]));
-            self.n_corners += 1;
-        }
-        for tet in &mut self.tets[before..] {
-            let at = |v: u32| self.points.get(v as usize).unwrap_or_else(|| &self.centres.points[v as usize - self.points.len()]);
-            let volume = volume(tet.map(|v| *at(v)));
-            self.flat += u64::from(volume == 0.0);
-            if volume < 0.0 {
-                tet.swap(0, 1);
-            }
+            self.turn(before);
+        } else if star.triangles.len() >= 4 {
+            let middle = self.add_middle(star.corners.iter().map(|corner| (corner.1, 1.0 / n as f64)))?;
+            self.push_star(&star, middle);
         }
         self.n_corners += n as u64;
         self.ids.resize(self.tets.len(), id);
@@ -71,20 +86,61 @@ impl Assembly {
         Ok(())
     }
 
-    /// The number of a new point: the mean of some others.
-    fn add_middle(&mut self, corners: impl ExactSizeIterator<Item = u32>) -> Result<u32> {
+    /// Adds a quadratic cell as the tetrahedra between the triangles of its surface and its middle; false: its nodes are not
+    /// where they should be.
+    pub(super) fn push_curved(&mut self, shape: Shape, nodes: &[u32]) -> Result<bool> {
+        let places: Vec<[f64; 3]> = nodes.iter().map(|&v| self.points[v as usize]).collect();
+        let Some(surface) = Surface::of(shape, &places) else { return Ok(false) };
+        let mut star = Star::default();
+        for face in &surface.faces {
+            star.add(face.iter().map(|&i| nodes[i]), |point| self.place(point));
+        }
+        star.sort();
+        let middle = match surface.middle {
+            Some(i) => nodes[i],
+            None => self.add_middle(surface.weights.iter().map(|&(i, weight)| (nodes[i], weight)))?,
+        };
+        self.push_star(&star, middle);
+        Ok(true)
+    }
+
+    /// Adds the tetrahedra between triangles and a point.
+    fn push_star(&mut self, star: &Star, middle: u32) {
+        let before = self.tets.len();
+        self.tets.extend(star.triangles.iter().map(|triangle| {
+            let [a, b, c] = triangle.map(|place| star.point(place));
+            [a, b, middle, c]
+        }));
+        self.n_corners += u64::from(middle as usize >= self.points.len());
+        self.turn(before);
+    }
+
+    /// Gives tetrahedra positive volumes, from number `start` on, and counts flat ones.
+    fn turn(&mut self, start: usize) {
+        for tet in &mut self.tets[start..] {
+            let at = |v: u32| self.points.get(v as usize).unwrap_or_else(|| &self.centres.points[v as usize - self.points.len()]);
+            let volume = volume(tet.map(|v| *at(v)));
+            self.flat += u64::from(volume == 0.0);
+            if volume < 0.0 {
+                tet.swap(0, 1);
+            }
+        }
+    }
+
+    /// The number of a new point: the sum of some others with these weights.
+    fn add_middle(&mut self, corners: impl Iterator<Item = (u32, f64)>) -> Result<u32> {
         let number = u32::try_from(self.points.len() + self.centres.points.len());
         let number = number.map_err(|_| Error::TooLarge(format!("{}: more than 2^32 points", self.path.display())))?;
-        let (n, begin) = (corners.len() as f64, self.centres.corners.len());
+        let begin = self.centres.corners.len();
         self.centres.corners.extend(corners);
         let corners = &self.centres.corners[begin..];
-        let sum = |c: usize| corners.iter().map(|&v| self.points[v as usize][c] / n).sum();
+        let sum = |c: usize| corners.iter().map(|&(v, weight)| self.points[v as usize][c] * weight).sum();
         self.centres.points.push([0, 1, 2].map(sum));
         self.centres.ends.push(self.centres.corners.len());
         Ok(number)
     }
 
-    /// Appends the points in the middle of polyhedra to those of the file, with the means of the values at their corners.
+    /// Appends the points in the middle of cells to those of the file, with the weighted sums of the values around them.
     /// Returns how many there are.
     pub(super) fn append_centres(&mut self) -> u64 {
         let Centres { points, corners, ends } = std::mem::take(&mut self.centres);
@@ -94,8 +150,8 @@ impl Assembly {
             for (begin, &end) in begins().zip(&ends) {
                 let corners = &corners[begin..end];
                 for c in 0..array.components {
-                    let sum: f64 = corners.iter().map(|&v| f64::from(array.values[v as usize * array.components + c])).sum();
-                    array.values.push((sum / corners.len() as f64) as f32);
+                    let value = |v: u32| f64::from(array.values[v as usize * array.components + c]);
+                    array.values.push(corners.iter().map(|&(v, weight)| value(v) * weight).sum::<f64>() as f32);
                 }
             }
         }
