@@ -149,6 +149,7 @@ fn broken_lists_of_faces_are_refused() {
         (legacy, "31 6 4 0 1", "31 5 4 0 1", "cell 0 (polyhedron): its list goes on for 5 numbers after its 5 faces"),
         (legacy, "31 6 4 0 1", "31 6 4 0 11", "cell 0 (polyhedron): names point 11, but points are 0 to 10"),
         (legacy, "31 6 4 0 1", "31 6 -4 0 1", "cell 0 (polyhedron): its list of 6 faces ends in face 0"),
+        (legacy, "0.5 0.5 2 2", "0.5 0.5 nan 2", "point 8 (of cell 1): (0.5, 0.5, NaN): its coordinates must be finite"),
         (listed, "Name='faces'", "Name='other'", "cell 0: a polyhedron, but its piece has no arrays of faces"),
         (listed, "31 53 -1 70", "31 30 -1 70", "cell 1: its list in `faces` would reach from 31 to 30 of 70 values"),
         (listed, "31 53 -1 70", "31 53 -1 71", "cell 3: its list in `faces` would reach from 53 to 71 of 70 values"),

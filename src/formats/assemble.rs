@@ -146,7 +146,7 @@ impl Assembly {
             return Err(Error::TooLarge(message));
         }
         let added_points = self.append_centres();
-        let mut used = self.used()?;
+        let mut used = self.used(added_points)?;
         let merged = self.merge_points(&mut used);
         let (lo, hi) = bounds(&self.points, &used);
         let origin = Self::origin(lo, hi);
@@ -196,11 +196,13 @@ impl Assembly {
     }
 
     /// Marks the points that tetrahedra use; returns an error if one of these is not finite.
-    fn used(&self) -> Result<Vec<bool>> {
+    fn used(&self, added_points: u64) -> Result<Vec<bool>> {
         let mut used = vec![false; self.points.len()];
+        // Where an added point is not finite, one that the file has at the same cell is not.
+        let in_file = self.points.len() - added_points as usize;
         for (tet, id) in self.tets.iter().zip(&self.ids) {
             for &v in tet {
-                if !used[v as usize] && self.points[v as usize].iter().any(|x| !x.is_finite()) {
+                if !used[v as usize] && (v as usize) < in_file && self.points[v as usize].iter().any(|x| !x.is_finite()) {
                     return Err(self.bad_point(v as usize, *id, "its coordinates must be finite"));
                 }
                 used[v as usize] = true;
