@@ -4,15 +4,9 @@
 
 mod formats_small;
 
-use formats_small::{CORNERS, open_bytes, polyhedra, replace, shared};
+use formats_small::{CORNERS, faces, open_bytes, polyhedra, replace, shared, volume};
 use olbvh::formats::{Fate, LoadOptions, Loaded, load, load_bytes, load_points};
 use olbvh::mesh::Mesh;
-
-fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|v| mesh.points[v as usize].map(f64::from));
-    let [u, v, w] = [b, c, d].map(|p| [0, 1, 2].map(|i| p[i] - a[i]));
-    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
-}
 
 /// The volume of each cell of the file.
 fn volumes(mesh: &Mesh) -> Vec<f64> {
@@ -26,13 +20,7 @@ fn volumes(mesh: &Mesh) -> Vec<f64> {
 
 /// Number of triangles that only one tetrahedron has.
 fn boundary(mesh: &Mesh) -> usize {
-    let mut faces = std::collections::HashMap::new();
-    for t in &mesh.tets {
-        for mut face in [[t[1], t[2], t[3]], [t[0], t[2], t[3]], [t[0], t[1], t[3]], [t[0], t[1], t[2]]] {
-            face.sort_unstable();
-            *faces.entry(face).or_insert(0) += 1;
-        }
-    }
+    let faces = faces(mesh);
     assert!(faces.values().all(|&n| n <= 2));
     faces.values().filter(|&&n| n == 1).count()
 }

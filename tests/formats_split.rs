@@ -7,28 +7,9 @@ mod formats_small;
 
 use std::collections::HashMap;
 
-use formats_small::shared;
+use formats_small::{faces, shared, volume};
 use olbvh::formats::{Curved, Fate, LoadOptions, Loaded, load, load_bytes};
 use olbvh::mesh::Mesh;
-
-fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
-    let [a, b, c, d] = tet.map(|v| mesh.points[v as usize].map(f64::from));
-    let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
-}
-
-/// The number of tetrahedra that share each face.
-fn faces(mesh: &Mesh) -> HashMap<[u32; 3], u32> {
-    let mut faces = HashMap::new();
-    for t in &mesh.tets {
-        for face in [[t[1], t[2], t[3]], [t[0], t[2], t[3]], [t[0], t[1], t[3]], [t[0], t[1], t[2]]] {
-            let mut face = face;
-            face.sort_unstable();
-            *faces.entry(face).or_insert(0) += 1;
-        }
-    }
-    faces
-}
 
 /// Checks that tetrahedra fit together: no face belongs to more than two, and the boundary is closed.
 fn check(mesh: &Mesh, wanted: f64, boundary: usize) {

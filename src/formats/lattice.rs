@@ -107,6 +107,12 @@ impl Lattice {
         sums(&[along(0), along(1), along(2)], points);
     }
 
+    /// The points with these coordinates along the axes, of which there must be as many as the lattice has.
+    pub fn at_coordinates(axes: &[Vec<f64>; 3], points: &mut Vec<[f64; 3]>) {
+        let along = |c: usize| axes[c].iter().map(|&x| [0, 1, 2].map(|i| if i == c { x } else { 0.0 })).collect();
+        sums(&[along(0), along(1), along(2)], points);
+    }
+
     /// Spends the memory for points that are not in the file, and for the cells.
     pub fn spend(&self, budget: &mut Budget) -> Result<(), String> {
         let bytes = self.points() * size_of::<[f64; 3]>() as u64 + self.cells() * 6 * (size_of::<[u32; 4]>() + size_of::<u32>()) as u64;
@@ -141,7 +147,7 @@ impl Lattice {
 }
 
 /// Points that are the sums of one vector of each axis.
-pub(crate) fn sums(axes: &[Vec<[f64; 3]>; 3], points: &mut Vec<[f64; 3]>) {
+fn sums(axes: &[Vec<[f64; 3]>; 3], points: &mut Vec<[f64; 3]>) {
     for c in &axes[2] {
         for b in &axes[1] {
             points.extend(axes[0].iter().map(|a| [0, 1, 2].map(|i| a[i] + b[i] + c[i])));

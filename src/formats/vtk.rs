@@ -6,7 +6,7 @@ use super::assemble::Assembly;
 use super::budget::Budget;
 use super::cells::{self, Shape};
 use super::integers::Integers;
-use super::lattice::{Frame, GridKind, Lattice, sums};
+use super::lattice::{Frame, GridKind, Lattice};
 use super::report::Fate;
 use super::scalar::Scalar;
 use super::source::{Source, excerpt};
@@ -68,7 +68,7 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let missing = |what: &str| source.error_line(source.len(), format!("the file ends, and there was no {what}"));
     let lattice = if dataset == GridKind::Cells { None } else { Some(grid.lattice.ok_or_else(|| missing("DIMENSIONS"))?) };
     let points = match (&lattice, dataset) {
-        (Some(lattice), GridKind::Rectilinear) => grid.sums(lattice, source, &mut assembly.padding)?,
+        (Some(lattice), GridKind::Rectilinear) => grid.at_coordinates(lattice, source, &mut assembly.padding)?,
         (Some(lattice), GridKind::Image(_)) => {
             let frame = grid.frame().ok_or_else(|| missing("SPACING"))?;
             lattice.spend(&mut assembly.padding).map_err(|message| source.error(message))?;
@@ -146,7 +146,7 @@ impl StructuredGrid {
     }
 
     /// The points that the coordinates along the axes make.
-    fn sums(&self, lattice: &Lattice, source: &Source, budget: &mut Budget) -> Result<Vec<[f64; 3]>> {
+    fn at_coordinates(&self, lattice: &Lattice, source: &Source, budget: &mut Budget) -> Result<Vec<[f64; 3]>> {
         let mut points = Vec::new();
         lattice.spend(budget).map_err(|message| source.error(message))?;
         let counts = self.axes.each_ref().map(|axis| axis.len() as u64);
@@ -154,8 +154,7 @@ impl StructuredGrid {
             let [[x, y, z], [nx, ny, nz]] = [counts, lattice.size()];
             return Err(source.error(format!("{x}, {y} and {z} coordinates, but the dimensions are {nx}, {ny} and {nz}")));
         }
-        let along = |c: usize| self.axes[c].iter().map(|&x| [0, 1, 2].map(|i| if i == c { x } else { 0.0 })).collect();
-        sums(&[along(0), along(1), along(2)], &mut points);
+        Lattice::at_coordinates(&self.axes, &mut points);
         Ok(points)
     }
 }

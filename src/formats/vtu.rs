@@ -8,10 +8,10 @@ use super::array::Array;
 use super::assemble::Assembly;
 use super::budget::Budget;
 use super::cells::{self, CellType, Shape};
-use super::lattice::{GridKind, sums};
+use super::lattice::{GridKind, Lattice};
 use super::report::Fate;
 use super::source::{Source, excerpt};
-use super::vtu_data::{Codec, StoredArray};
+use super::vtu_data::Codec;
 use super::vtu_faces::Faces;
 use super::vtu_files::{Files, Grid, Origin, grids};
 use super::vtu_parser::Piece;
@@ -69,11 +69,9 @@ fn read_points(source: &Source, codec: &mut Codec, kind: GridKind, points: &mut 
                 return Err(fail("coordinates must have 1 component"));
             }
             lattice.spend(&mut codec.budget).map_err(|message| fail(&message))?;
-            let mut along = |c: usize, array: &StoredArray| -> Result<Vec<[f64; 3]>> {
-                let values: Vec<f64> = codec.floats(source, array, lattice.size()[c])?;
-                Ok(values.into_iter().map(|x| [0, 1, 2].map(|i| if i == c { x } else { 0.0 })).collect())
-            };
-            sums(&[along(0, x)?, along(1, y)?, along(2, z)?], points);
+            let [nx, ny, nz] = lattice.size();
+            let axes = [codec.floats(source, x, nx)?, codec.floats(source, y, ny)?, codec.floats(source, z, nz)?];
+            Lattice::at_coordinates(&axes, points);
             return Ok(());
         }
         (GridKind::Image(frame), Some(lattice)) => {

@@ -9,6 +9,8 @@ pub mod structured;
 
 use not_run::not_run;
 use olbvh::formats::{LoadOptions, Loaded, load_bytes};
+use olbvh::mesh::Mesh;
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub const POINTS: [[f64; 3]; 8] =
@@ -402,4 +404,24 @@ pub fn polyhedra() -> [(&'static str, Vec<u8>); 3] {
         + &array("Int64", "polyhedron_to_faces", join(numbers))
         + &array("Int64", "polyhedron_offsets", "6 11 11 15".into()));
     [("polyhedra.vtk", legacy.into_bytes()), ("listed.vtu", listed), ("numbered.vtu", numbered)]
+}
+
+/// The signed volume of a tetrahedron.
+pub fn volume(mesh: &Mesh, tet: [u32; 4]) -> f64 {
+    let [a, b, c, d] = tet.map(|v| mesh.points[v as usize].map(f64::from));
+    let [u, v, w] = [b, c, d].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+    (u[0] * (v[1] * w[2] - v[2] * w[1]) - u[1] * (v[0] * w[2] - v[2] * w[0]) + u[2] * (v[0] * w[1] - v[1] * w[0])) / 6.0
+}
+
+/// The number of tetrahedra that share each face.
+pub fn faces(mesh: &Mesh) -> HashMap<[u32; 3], u32> {
+    let mut faces = HashMap::new();
+    for t in &mesh.tets {
+        for face in [[t[1], t[2], t[3]], [t[0], t[2], t[3]], [t[0], t[1], t[3]], [t[0], t[1], t[2]]] {
+            let mut face = face;
+            face.sort_unstable();
+            *faces.entry(face).or_insert(0) += 1;
+        }
+    }
+    faces
 }
