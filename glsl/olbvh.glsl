@@ -89,9 +89,9 @@ void olbvh_open(uvec2 tree) {
 uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     weights_of_owner = vec4(0.0);
     Grid g = grid.at[0];
-    uint leaf = near_bounds(g, place) ? find_leaf(g.level, quantize(g, place)) : NONE;
-    if (leaf == NONE) return NONE;
     vec3 x = normalise(g, place);
+    uint leaf = leaf_to_search(g, place, x, tolerance);
+    if (leaf == NONE) return NONE;
     uvec2 range = entry_range(leaf);
     Best best = walked(g, leaf, range, place, x);
     if (!best.inside && !walks_in(leaf, range)) search(best, range.x, range.y, sought_at(g, place, x, tolerance));
@@ -133,9 +133,9 @@ uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out 
 #endif
 uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     Grid g = grid.at[0];
-    uint leaf = near_bounds(g, place) ? find_leaf(g.level, quantize(g, place)) : NONE;
-    if (leaf == NONE) return 0u;
     vec3 x = normalise(g, place);
+    uint leaf = leaf_to_search(g, place, x, 0.0);
+    if (leaf == NONE) return 0u;
     uvec2 range = entry_range(leaf);
     bool by_walk = walks_in(leaf, range);
     if (by_walk) {

@@ -18,6 +18,7 @@ use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::quarters::split_entries;
+use olbvh::reference::slabs::split_slabs;
 use olbvh::reference::vertices::Vertices;
 use olbvh::tree::{TreeArrays, TreeBytes};
 use submit::submit;
@@ -158,13 +159,18 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
     let (p, quarters) = split_entries(words(tree.p, status.entries), &grid);
+    let (po, slabs) = match tree.lists {
+        Lists::All => (words(tree.po, status.leaves + 1), Vec::new()),
+        Lists::Boundary => split_slabs(words(tree.po, 2 * status.leaves + 1)),
+    };
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,
         grid,
         p,
         quarters,
-        po: words(tree.po, status.leaves + 1),
+        po,
+        slabs,
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         flags: words(tree.flags, nodes.div_ceil(32)),

@@ -35,7 +35,7 @@ uvec2 plus(uvec2 a, uint b) {
 
 uvec2 total(uint level) { return uvec2(status.at[0].total[2u * level], status.at[0].total[2u * level + 1u]); }
 
-// The most words that a tree of this level can take: P, PO, CO, NO, flags, masks, boxes. A level has at most as many
+// The most words that a tree of this level can take: P, PO, slabs, CO, NO, flags, masks, boxes. A level has at most as many
 // nodes as it has entries or cells.
 uvec2 most_words(uint level) {
     uint nodes = 1u, internal = 0u, leaves = 1u;
@@ -46,7 +46,7 @@ uvec2 most_words(uint level) {
         internal = nodes;
         nodes += leaves;
     }
-    uvec2 words = plus(plus(total(level), leaves + 1u), internal + 1u);
+    uvec2 words = plus(plus(plus(total(level), leaves + 1u), leaves), internal + 1u);
     words = plus(words, level + 1u + (nodes + 31u) / 32u + (nodes + 3u) / 4u);
     for (uint i = 0u; i < box_words; ++i) words = plus(words, nodes);
     return words;

@@ -8,6 +8,7 @@
 ARGUMENTS(7)
     uint capacity;
     uint id_mask; // bits of an entry of P that hold its tetrahedron
+    uint slabs;   // not 0: leaves have slabs, behind PO
 END_ARGUMENTS
 BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, entries)
@@ -26,6 +27,7 @@ void main() {
     if (run == 0u) {
         grid.at[0].first_leaf = first_leaf;
         grid.at[0].ids = id_mask;
+        grid.at[0].slabs = slabs == 0u ? 0u : status.at[0].leaves + 1u;
         po.at[0] = 0u;
         co.at[0] = 0u;
         // A tree that does not fit also has a root, with an empty list.

@@ -93,7 +93,7 @@ void main() {
             uint owner = owner_at_face(stand, a.x);
             if (owner != NONE) best = Best(owner, true, true, 0.0);
         }
-        uint leaf = !best.inside && near_bounds(g, a.at) ? find_leaf(g.level, quantize(g, a.at)) : NONE;
+        uint leaf = best.inside ? NONE : leaf_to_search(g, a.at, a.x, tolerance);
         uvec2 range = leaf == NONE ? uvec2(0u) : entry_range(leaf);
         bool walks = walks_in(leaf, range);
         if (LISTS != 0u && !in_leaf && range.x < range.y) {

@@ -35,13 +35,15 @@ void main() {
         vec3 x = vec3(own_positions.at[i * stride], own_positions.at[i * stride + 1u], own_positions.at[i * stride + 2u]);
         x = vec3(canonical(x.x), canonical(x.y), canonical(x.z));
         bool within = all(lessThanEqual(g.lo.xyz, x)) && all(lessThanEqual(x, g.hi.xyz));
-        uint leaf = within ? find_leaf(g.level, quantize(g, x)) : NONE;
+        uvec3 finest = quantize(g, x);
+        uint leaf = within ? find_leaf(g.level, finest) : NONE;
         if (leaf != NONE && !is_boundary_node(leaf)) {
             places.at[i] = 1u;
         } else if (leaf != NONE) {
             located = uint(part == 0u);
-            Sought sought = sought_at(g, x, normalise(g, x), 0.0);
-            uvec2 range = entry_range(leaf);
+            vec3 place = normalise(g, x);
+            Sought sought = sought_at(g, x, place, 0.0);
+            uvec2 range = beside(g, leaf, finest, place) != 0 ? uvec2(0u) : entry_range(leaf);
             uint begin = min(range.y, range.x + part * PART_LENGTH), end = min(range.y, begin + PART_LENGTH);
             bool inside = false;
             for (; begin < end && !inside; begin += 32u) {

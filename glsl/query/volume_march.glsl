@@ -243,15 +243,19 @@ void pass_by() {
 }
 
 #ifndef BINARY_TREE
-// Passes samples that no tetrahedron is near, all those of one octree cell together, so that rays beside the mesh catch
-// up with rays in it.
+// Passes samples that no tetrahedron is near, all those of one octree cell or beside one leaf's slab together, so that
+// rays beside the mesh catch up with rays in it.
 void pass_empty(Grid g, inout uint work) {
     for (; state.next < state.end && !is_to_look() && work < BUDGET; ++work) {
-        uvec3 finest = quantize(g, sample_at(view, origin, direction, state.next));
-        uint level = empty_level(g.level, morton(finest));
-        if (level == 0u) return;
+        vec3 at = sample_at(view, origin, direction, state.next);
+        uvec3 finest = quantize(g, at);
+        uint leaf, level = empty_level(g.level, morton(finest), leaf);
+        bool in_leaf = level == 0u;
+        int side = in_leaf ? beside(g, leaf, finest, normalise(g, at)) : 0;
+        if (in_leaf && side == 0) return;
         uint end = SKIP != 0u ? min(state.end, state.check) : state.end;
-        uint last = sample_behind(g, origin, direction, inverse_direction, state.next, end, finest, level) - 1u;
+        uint last = sample_behind(g, origin, direction, inverse_direction, state.next, end, finest, in_leaf ? g.level : level) - 1u;
+        if (in_leaf && beside(g, leaf, finest, normalise(g, sample_at(view, origin, direction, last))) != side) last = state.next;
         samples += last - state.next;
         state.next = last;
         pass_by();

@@ -9,13 +9,18 @@ struct Sought {
     uint quarters;      // quarters of its leaf's cell that contain it, packed as in an entry; 0: not tested
 };
 
+// How many finest cells a box grows by on every side so that it contains all points that its tetrahedron may own.
+uint cells_beyond(float tolerance) { return 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0); }
+
+// Whether quarters and slabs leave room for a tolerance.
+bool leaves_room(float tolerance) { return cells_beyond(tolerance) == 1u; }
+
 // The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
 // tetrahedron's box by at most 3 t times the size of the box.
 Sought sought_at(Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = quantize(g, at);
-    uint least = 1u + whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
-    uvec3 reach = reach_of(g, least);
-    return Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : quarters_around(g, cell));
+    uvec3 reach = reach_of(g, cells_beyond(tolerance));
+    return Sought(x, cell - min(cell, reach), cell + reach, leaves_room(tolerance) ? quarters_around(g, cell) : 0u);
 }
 
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its

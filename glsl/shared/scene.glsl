@@ -10,6 +10,8 @@ struct Grid {
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
     uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
+    uint slabs;   // Word of PO where the slabs of the leaves begin; 0: there are none.
+    uint pad[3];  // Unused.
 };
 
 // Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.
@@ -17,7 +19,7 @@ struct SceneAddresses {
     uvec2 grid;       // Grid with the level of the leaves.
     uvec2 masks;      // Child masks.
     uvec2 co;         // Child offsets.
-    uvec2 po;         // Offsets of the leaves in `p`.
+    uvec2 po;         // Offsets of the leaves in `p`, and the slabs of the leaves.
     uvec2 p;          // Entries: ids of tetrahedra, and their quarters above them.
     uvec2 flags;      // Boundary flags.
     uvec2 cells;      // Vertex indices.

@@ -13,7 +13,7 @@ layout(constant_id = 4) const uint LISTS = 0;
 // spent before the search has ended.
 bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
     owner = NONE;
-    uint leaf = near_bounds(g, at) ? find_leaf(g.level, quantize(g, at)) : NONE;
+    uint leaf = leaf_to_search(g, at, x, tolerance);
     if (leaf == NONE) return true;
     uvec2 range = entry_range(leaf);
     if (s.cursor == 0u) {

@@ -87,7 +87,7 @@ impl DeviceMesh {
         let (points, tets) = (number(places.len())?, number(corners.len())?);
         check_tets(tets)?;
         // Level and ids are those of a tree; each tree over the mesh sets its own.
-        let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, ..*grid };
+        let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, slabs: 0, ..*grid };
         let grid = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[finest(grid)])).transpose()?;
         let thin = || {
             let mut thin = vec![0; places.len()];

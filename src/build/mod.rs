@@ -8,6 +8,7 @@
 //!            · emit (code, tetrahedron) · stable radix sort
 //! 3 splits   count node ends per level · scan · emit PO and CO in place                              Eq. 7–10
 //! 4 leaves   boundary flags, quarters of entries, octants, boxes                                     Alg. 1
+//!   slabs    two planes around the tetrahedra of each leaf at the surface
 //!   levels   flags, masks, boxes of the parents, level by level, with a barrier between levels       Alg. 2
 //! 5 ranges   smallest and largest value of a field per node: cells · down · up
 //!            (once per field and time step)
@@ -123,5 +124,6 @@ pub fn cmd_build(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, optio
     build.count_splits(r, capacity, sorted)?;
     build.splits(r, tree, sorted)?;
     build.leaves(r, tree, sorted)?;
+    build.slabs(r, tree, sorted)?;
     build.levels(r, tree, sorted)
 }

@@ -103,7 +103,8 @@ pub struct TreeMemory {
     /// Tetrahedron ids in the order of the leaves' Morton codes; with `Lists::Boundary` and few enough tetrahedra, the
     /// bits above an id are the quarters of its entry ([`crate::reference::quarters`]).
     pub p: BufferRef,
-    /// Offsets of the leaves' entries in `p` ([`crate::tree::TreeArrays::po`]).
+    /// Offsets of the leaves' entries in `p` ([`crate::tree::TreeArrays::po`]); behind the last one, with
+    /// `Lists::Boundary`, the leaves' slabs ([`crate::tree::TreeArrays::slabs`]).
     pub po: BufferRef,
     /// Children of the internal nodes ([`crate::tree::TreeArrays::co`]).
     pub co: BufferRef,
@@ -157,7 +158,7 @@ impl TreeMemory {
             status,
             grid,
             p,
-            po: arena.words(leaves + 1)?,
+            po: arena.words(leaves + 1 + if lists == Lists::Boundary { leaves } else { 0 })?,
             co: arena.words(internal + 1)?,
             flags: arena.words(nodes.div_ceil(32))?,
             masks: arena.words(nodes.div_ceil(4))?,

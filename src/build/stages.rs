@@ -7,11 +7,11 @@ use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
     ChooseDepth, ChooseDepthSpec, CountSplits, CountSplitsSpec, Emit, EmitHits, EmitHitsSpec, EmitSpec, EmitSplits, EmitSplitsSpec,
-    EstimateDepth, EstimateDepthSpec, FinishLeaves, FinishLeavesSpec, FlagLeaves, FlagLeavesSpec, MarkQuarters, MarkQuartersSpec,
-    MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
+    EstimateDepth, EstimateDepthSpec, FinishLeaves, FinishLeavesSpec, FitSlabs, FitSlabsSpec, FlagLeaves, FlagLeavesSpec, MarkQuarters,
+    MarkQuartersSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
 };
 use crate::layout::{BuildStatus, Grid, NONE};
-use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
+use crate::options::{BuildOptions, LEAST_USUAL, Lists, USUAL_ENTRIES};
 use crate::primitives::{Count, Unsorted, cmd_exclusive_scan, cmd_sort};
 use crate::reference::quarters::id_mask;
 
@@ -191,6 +191,7 @@ impl Build<'_> {
                 co,
                 capacity: capacity.entries,
                 id_mask: id_mask(tree.lists, self.mesh.input.tets as usize),
+                slabs: u32::from(tree.lists == Lists::Boundary),
             };
             r.dispatch(
                 &arguments,
@@ -233,7 +234,24 @@ impl Build<'_> {
         })
     }
 
-    /// Stage 4, second part: the internal nodes, level by level upwards (Alg. 2).
+    /// Stage 4, second part: the slabs of leaves at the surface, in trees that have them.
+    pub fn slabs(&self, r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
+        let Self { mesh, status, grid, .. } = *self;
+        let TreeMemory { p, po, flags, .. } = *tree;
+        if tree.lists == Lists::All {
+            return Ok(());
+        }
+        let (cells, vertices, neighbours) = (mesh.input.cells, mesh.arrays.vertices, mesh.arrays.neighbours);
+        r.stage("build.slabs", |r| {
+            let fit = FitSlabs { grid, status, codes: scratch.codes, po, p, flags, cells, vertices, neighbours };
+            let spec = FitSlabsSpec { workgroup: r.gpu().target().each, ..Default::default() };
+            r.dispatch(&fit, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
+            r.barrier("slabs → levels");
+            Ok(())
+        })
+    }
+
+    /// Stage 4, third part: the internal nodes, level by level upwards (Alg. 2).
     pub fn levels(&self, r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
         let Self { status, grid, .. } = *self;
         let workgroup = r.gpu().target().each;

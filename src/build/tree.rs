@@ -8,9 +8,10 @@ use crate::error::Result;
 use crate::gpu::{Arena, Buffer, BufferRef, Gpu, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid, wide};
-use crate::options::BuildOptions;
+use crate::options::{BuildOptions, Lists};
 use crate::reference::depth::{finer, too_large};
 use crate::reference::quarters::split_entries;
+use crate::reference::slabs::split_slabs;
 use crate::tree::{TreeArrays, TreeBytes};
 
 /// An OLBVH in device memory.
@@ -122,6 +123,7 @@ impl Tree {
             let build = Build { status: memory.status, grid: memory.grid, ..build };
             build.splits(r, &memory, &sorted)?;
             build.leaves(r, &memory, &sorted)?;
+            build.slabs(r, &memory, &sorted)?;
             build.levels(r, &memory, &sorted)
         })?;
         stages.extend(time.stages);
@@ -156,13 +158,19 @@ impl Tree {
         };
         let entries = self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?;
         let (p, quarters) = split_entries(entries, &self.grid);
+        let leaves = u64::from(self.status.leaves);
+        let (po, slabs) = match self.options.lists {
+            Lists::All => (words(self.memory.po, leaves + 1)?, Vec::new()),
+            Lists::Boundary => split_slabs(words(self.memory.po, 2 * leaves + 1)?),
+        };
         Ok(TreeArrays {
             assign: self.options.assign,
             lists: self.options.lists,
             grid: self.grid,
             p,
             quarters,
-            po: words(self.memory.po, u64::from(self.status.leaves) + 1)?,
+            po,
+            slabs,
             co: words(self.memory.co, internal + 1)?,
             no: self.status.levels[..=self.status.level as usize].to_vec(),
             flags: words(self.memory.flags, nodes.div_ceil(32))?,
@@ -209,7 +217,7 @@ impl Tree {
     /// Bytes of each array.
     pub fn sizes(&self) -> TreeBytes {
         let BuildStatus { entries, nodes, internal, level, .. } = self.status;
-        TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes)
+        TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes, self.options.lists)
     }
 
     /// Bytes of scratch memory that the build used in addition to the tree.

@@ -11,6 +11,7 @@ use crate::gpu::{Arena, BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::reference::quarters::split_entries;
+use crate::reference::slabs::split_slabs;
 use crate::tree::{TreeArrays, TreeBytes};
 
 /// Which interface builds the tree, and within which limits.
@@ -114,7 +115,8 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
     let (s, memory) = (&expected.status, tree.memory());
     let size = |name: &str, words: u32, part: BufferRef| compare_one("build.plan", name, &(4 * u64::from(words)).max(16), &part.size);
     size("P (bytes)", s.entries, memory.p)?;
-    size("PO (bytes)", s.leaves + 1, memory.po)?;
+    let slabs = if options.lists == Lists::Boundary { s.leaves } else { 0 };
+    size("PO (bytes)", s.leaves + 1 + slabs, memory.po)?;
     size("CO (bytes)", s.internal + 1, memory.co)?;
     size("flags (bytes)", s.nodes.div_ceil(32), memory.flags)?;
     size("masks (bytes)", s.nodes.div_ceil(4), memory.masks)?;
@@ -161,13 +163,19 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let (nodes, internal) = (status.nodes as usize, status.internal as usize);
     let boxes =
         tree.boxes.map(|part| words(part, 6 * nodes).chunks_exact(6).map(|b| [0, 1, 2, 3, 4, 5].map(|i| f32::from_bits(b[i]))).collect());
+    let leaves = nodes - internal;
+    let (po, slabs) = match options.lists {
+        Lists::All => (words(tree.po, leaves + 1), Vec::new()),
+        Lists::Boundary => split_slabs(words(tree.po, 2 * leaves + 1)),
+    };
     let found = TreeArrays {
         assign: options.assign,
         lists: options.lists,
         grid,
         p,
         quarters,
-        po: words(tree.po, nodes - internal + 1),
+        po,
+        slabs,
         co: words(tree.co, internal + 1),
         no: status.levels[..=status.level as usize].to_vec(),
         flags: words(tree.flags, nodes.div_ceil(32)),
@@ -214,6 +222,7 @@ fn compare_arrays(expected: &Expected, f: &TreeArrays) -> Verdict {
     compare("build.flag_leaves", "boundary of the leaves (node, flag)", &flags(e), &flags(f))?;
     let octants = |t: &TreeArrays| t.leaves().map(|j| (j, t.mask_of(j))).collect::<Vec<_>>();
     compare("build.finish_leaves", "masks of the leaves (node, octants)", &octants(e), &octants(f))?;
+    compare("build.fit_slabs", "slabs of the leaves", &e.slabs, &f.slabs)?;
     compare("build.merge_level", "flags", &e.flags, &f.flags)?;
     compare("build.merge_level", "masks", &e.masks, &f.masks)?;
     compare_one("build.finish_leaves", "boxes.is_some()", &expected.boxes, &f.boxes.is_some())?;

@@ -4,7 +4,7 @@ use super::boundary::Topology;
 use super::codes::Stage;
 use super::marks::Marks;
 use super::vertices::Vertices;
-use super::{depth, leaves, levels, quarters};
+use super::{depth, leaves, levels, quarters, slabs};
 use crate::error::{Error, Result};
 use crate::grid::{Grid, MAX_LEVEL};
 use crate::mesh::Mesh;
@@ -69,11 +69,15 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let leaf_flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
     let quarters = quarters::quarters(&entries.codes, &entries.primitives, &grid, mesh, vertices);
     let octants = leaves::masks(&splits, &leaf_flags, &quarters, &grid);
+    let slabs = match options.lists {
+        Lists::All => Vec::new(),
+        Lists::Boundary => slabs::slabs(&entries.primitives, &splits, &leaf_flags, mesh, topology, vertices, &grid),
+    };
     let flags = levels::flags(leaf_flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let masks = levels::masks(&octants, &splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    let grid = Grid { first_leaf: co.len() as u32 - 1, ..grid };
-    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, co, no, flags, masks, boxes };
+    let grid = Grid { first_leaf: co.len() as u32 - 1, slabs: if slabs.is_empty() { 0 } else { po.len() as u32 }, ..grid };
+    let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, slabs, co, no, flags, masks, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

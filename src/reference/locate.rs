@@ -3,7 +3,8 @@
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;
 use super::candidates::Best;
-use super::quarters::{is_near, reach};
+use super::quarters::{is_near, leaves_room, reach};
+use super::slabs::SlabCell;
 use super::tet::{Tet, Vec3, Weights};
 use super::traverse::{Node, traverse_leaves};
 use super::vertices::Vertices;
@@ -210,11 +211,21 @@ impl<'a> Locator<'a> {
 
     /// The owner among the tetrahedra of a leaf, whether they are listed or reached by a walk.
     fn in_leaf(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> Location {
+        if self.is_beside(leaf, finest, x) {
+            return Location::NOWHERE;
+        }
         let walk = |seed| self.walker().walk(seed, &self.leaf_cell(finest), x).best;
         let walked = self.stride_from_middle(leaf, x).map(Best::inside).or_else(|| self.tree.seed(leaf).map(walk));
         let best = walked.unwrap_or_else(|| self.listed(leaf, finest, x));
         let close = best.inside || !self.tree.is_boundary(leaf) || best.smallest >= -self.tolerance;
         if best.owner != NONE && close { self.location(best.owner, x) } else { Location::NOWHERE }
+    }
+
+    /// Whether the leaf's slab says that x lies beside the mesh.
+    fn is_beside(&self, leaf: u32, finest: [u32; 3], x: Vec3) -> bool {
+        let (grid, slabs) = (&self.tree.grid, &self.tree.slabs);
+        let slab = slabs.get((leaf - self.tree.internal_nodes()) as usize).filter(|_| leaves_room(self.tolerance));
+        slab.is_some_and(|&slab| SlabCell::new(grid, finest.map(|q| q >> (MAX_LEVEL - grid.level))).is_outside(slab, x))
     }
 
     /// The owner by a stride from the tetrahedron in the middle of the list, in trees with seeds.

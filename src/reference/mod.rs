@@ -19,6 +19,7 @@ pub mod overlap;
 pub mod quarters;
 pub mod ranges;
 pub mod separate;
+pub mod slabs;
 pub mod slice;
 pub mod sort;
 pub mod splits;

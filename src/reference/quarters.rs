@@ -89,10 +89,19 @@ pub fn octants_near(grid: &Grid, quarters: u32) -> u32 {
     (0..8).filter(near).fold(0, |mask, d| mask | 1 << d)
 }
 
+/// Whether quarters and slabs leave room for a tolerance: that of one finest cell.
+pub fn leaves_room(tolerance: f32) -> bool {
+    cells_beyond(tolerance) == 1
+}
+
+fn cells_beyond(tolerance: f32) -> u32 {
+    1 + (tolerance.clamp(0.0, 1.0) * 4096.0) as u32
+}
+
 /// The number of finest cells by which the box of a tetrahedron is enlarged on each axis, so that it contains every
 /// point that this tolerance lets the tetrahedron own.
 pub fn reach(grid: &Grid, tolerance: f32) -> [u32; 3] {
-    grown(grid, 1 + (tolerance.clamp(0.0, 1.0) * 4096.0) as u32)
+    grown(grid, cells_beyond(tolerance))
 }
 
 /// Whether a tetrahedron's quantized box is near enough for it to own a point in that finest cell.

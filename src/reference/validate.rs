@@ -6,6 +6,7 @@ use super::leaves::{cell_box, flag, octants};
 use super::levels::union;
 use super::marks::Marks;
 use super::quarters::{id_mask, quarters_near};
+use super::slabs::Fit;
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
 use crate::grid::{MAX_LEVEL, unmorton};
@@ -61,6 +62,7 @@ impl TreeArrays {
         let mut expected = topology.grid;
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
         expected.ids = id_mask(self.lists, topology.neighbours.len());
+        expected.slabs = if self.lists == Lists::Boundary { self.po.len() as u32 } else { 0 };
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
@@ -76,6 +78,8 @@ impl TreeArrays {
         let quarters = if self.grid.ids == u32::MAX { 0 } else { self.p.len() };
         length("quarters", self.quarters.len(), quarters)?;
         length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
+        let slabs = if self.lists == Lists::Boundary { nodes.saturating_sub(internal) } else { 0 };
+        length("slabs", self.slabs.len(), slabs)?;
         length("CO", self.co.len(), internal + 1)?;
         length("BF", self.flags.len(), nodes.div_ceil(32))?;
         length("mask", self.masks.len(), nodes.div_ceil(4))?;
@@ -178,10 +182,11 @@ impl TreeArrays {
     }
 
     /// BF: a leaf's flag is 0 if one of its tetrahedra touches its cell and none is a boundary tetrahedron; an internal
-    /// node's flag is set if a child's is. Also checks the masks of the leaves.
+    /// node's flag is set if a child's is. Also checks the masks and slabs of the leaves.
     fn check_flags(&self, mesh: &Mesh, topology: &Topology, codes: &[u32]) -> Rule {
         let internal = self.internal_nodes();
         let vertices = Vertices::new(mesh, &self.grid);
+        let fit = Fit { mesh, topology, vertices: &vertices, grid: &self.grid };
         let check = |j: u32| -> Rule {
             let expected = if j < internal {
                 self.children(j).any(|c| self.is_boundary(c))
@@ -193,8 +198,11 @@ impl TreeArrays {
             if j < internal {
                 return Ok(());
             }
-            let (mask, expected) = (self.mask_of(j), octants(self.entries(j), expected, &self.quarters, &self.grid));
-            rule(mask == expected, || format!("mask of leaf {j} is {mask:#010b}, its entries say {expected:#010b}"))
+            let (mask, octants) = (self.mask_of(j), octants(self.entries(j), expected, &self.quarters, &self.grid));
+            rule(mask == octants, || format!("mask of leaf {j} is {mask:#010b}, its entries say {octants:#010b}"))?;
+            let slab = self.slabs.get((j - internal) as usize).copied();
+            let fitted = slab.map(|_| fit.slab(self.primitives(j), expected, codes[j as usize]));
+            rule(slab == fitted, || format!("slab of leaf {j} is {slab:x?}, its tetrahedra say {fitted:x?}"))
         };
         (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)
     }
