@@ -28,7 +28,7 @@ pub struct TreeArrays {
     /// `PO[n_l + 1]`: the entries of leaf j, which is node `n_ni + j`, are `po[j] .. po[j + 1]`. The paper stores
     /// offsets for every node; here those of internal nodes follow from their leaves.
     pub po: Vec<u32>,
-    /// The slab of each leaf (see [`crate::reference::slabs`]); empty with `Lists::All`.
+    /// The slab of each leaf (see [`crate::reference::slabs`]); empty if they have none.
     pub slabs: Vec<u32>,
     /// `CO[n_ni + 1]`: the children of internal node i are `co[i] + 1 ..= co[i + 1]`.
     pub co: Vec<u32>,

@@ -61,16 +61,18 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let sizes = measure(mesh, &topology, &Vertices::new(mesh, &topology.grid));
     let deepest = sizes.level(&BuildOptions::default()).unwrap();
-    for (assign, lists, boxes) in [
-        (Assign::Aabb, Lists::All, false),
-        (Assign::Aabb, Lists::All, true),
-        (Assign::Exact, Lists::All, true),
-        (Assign::Planes, Lists::Boundary, false),
+    for (assign, lists, boxes, slabs) in [
+        (Assign::Aabb, Lists::All, false, true),
+        (Assign::Aabb, Lists::All, true, false),
+        (Assign::Exact, Lists::All, true, false),
+        (Assign::Planes, Lists::Boundary, false, false),
+        (Assign::Planes, Lists::Boundary, false, true),
     ] {
-        let of = |level: u32| TreeBytes::most(&sizes.entries, level, boxes).total();
-        let options = |budget: u64| BuildOptions { assign, lists, boxes, budget: Some(budget), ..BuildOptions::default() };
+        let unlimited = BuildOptions { assign, lists, boxes, slabs, ..BuildOptions::default() };
+        let of = |level: u32| TreeBytes::most(&sizes.entries, level, &unlimited).total();
+        let options = |budget: u64| BuildOptions { budget: Some(budget), ..unlimited };
         // A budget that is too small by one byte: both refuse it, with the sizes.
-        let (short, what) = (of(0) - 1, format!("{name} {assign} {lists} boxes {boxes}"));
+        let (short, what) = (of(0) - 1, format!("{name} {assign} {lists} boxes {boxes} slabs {slabs}"));
         let refused = [Tree::build(gpu, &device, &options(short)).err(), build(mesh, &topology, &options(short)).err()];
         for error in refused {
             let Some(Error::TooLarge(text)) = error else { panic!("{what}: {error:?}") };
@@ -92,7 +94,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh) {
         let found = locate(&tree, &mesh.points, None, &LocateOptions::default(), SILENT).unwrap();
         (tree.status().level, found.owners)
     };
-    let ((coarse, found), (fine, expected)) = (of(Some(TreeBytes::most(&sizes.entries, 1, false).total())), of(None));
+    let ((coarse, found), (fine, expected)) = (of(Some(TreeBytes::most(&sizes.entries, 1, &BuildOptions::default()).total())), of(None));
     assert!(coarse < fine, "{name}");
     assert_eq!(found, expected, "{name}");
     assert!(!found.contains(&u32::MAX), "{name}");
@@ -159,10 +161,7 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
     let (p, quarters) = split_entries(words(tree.p, status.entries), &grid);
-    let (po, slabs) = match tree.lists {
-        Lists::All => (words(tree.po, status.leaves + 1), Vec::new()),
-        Lists::Boundary => split_slabs(words(tree.po, 2 * status.leaves + 1)),
-    };
+    let (po, slabs) = split_slabs(words(tree.po, if tree.slabs { 2 * status.leaves + 1 } else { status.leaves + 1 }), status.leaves as usize);
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,

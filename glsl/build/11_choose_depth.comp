@@ -15,6 +15,7 @@ ARGUMENTS(6)
     uint deepest;  // deepest level allowed
     uint budget[2]; // most words of all arrays, low word first
     uint box_words; // words of a box, per node
+    uint slab_words; // words of a slab, per leaf
     uint in_shares; // not 0: candidates are counted in shares
     uint marked;     // not 0: the dispatch also clears the marks of the level
 END_ARGUMENTS
@@ -46,7 +47,7 @@ uvec2 most_words(uint level) {
         internal = nodes;
         nodes += leaves;
     }
-    uvec2 words = plus(plus(plus(total(level), leaves + 1u), leaves), internal + 1u);
+    uvec2 words = plus(plus(plus(total(level), leaves + 1u), slab_words * leaves), internal + 1u);
     words = plus(words, level + 1u + (nodes + 31u) / 32u + (nodes + 3u) / 4u);
     for (uint i = 0u; i < box_words; ++i) words = plus(words, nodes);
     return words;

@@ -19,6 +19,14 @@ RECORDS(8, uvec4, neighbours)
 #include "shared/slab.glsl"
 
 const uint MAX_LIST_FOR_SLAB = 16384u;
+const uint LOOKED_AT = 16u;             // entries whose faces may give the normal
+const uint PLACES = 4u * LOOKED_AT - 1u; // bits for the place of a face
+
+// The corners of a tetrahedron in the caller's order.
+vec3[4] corners_of(uint t) {
+    uvec4 ids = words(cells.at[t]);
+    return vec3[4](vertex(ids.x), vertex(ids.y), vertex(ids.z), vertex(ids.w));
+}
 
 uint normal_bits(vec3 n) {
     vec3 a = abs(n);
@@ -30,32 +38,30 @@ uint normal_bits(vec3 n) {
     return axis << 30 | whole_of(part.y) << 23 | whole_of(part.x) << 16;
 }
 
-// The bits of the normal of the largest boundary face among entries [first, last), which the whole subgroup looks for
-// together. Returns false if there is none.
+// The bits of the normal of the largest boundary face among the first entries of [first, last), which the whole subgroup
+// looks for together. Returns false if there is none.
 bool largest_face(Grid g, uint first, uint last, SlabCell cell, out uint bits) {
-    float largest = 0.0;
-    uint place = NONE;
+    uint largest = 0u; // size and place of a face
     vec3 normal = vec3(0.0);
+    last = min(last, first + LOOKED_AT);
     for (uint i = first + gl_SubgroupInvocationID; i < last; i += gl_SubgroupSize) {
         uint t = p.at[i] & g.ids;
-        uvec4 beside = words(neighbours.at[t]), ids = words(cells.at[t]);
+        uvec4 beside = words(neighbours.at[t]);
         if (all(notEqual(beside, uvec4(NONE)))) continue;
-        vec3 v[4] = vec3[4](vertex(ids.x), vertex(ids.y), vertex(ids.z), vertex(ids.w));
+        vec3 v[4] = corners_of(t);
         for (uint f = 0u; f < 4u; ++f) {
             uvec3 face = FACES[f];
             precise vec3 b = (v[face.y] - v[face.x]) * cell.inverse, c = (v[face.z] - v[face.x]) * cell.inverse;
             vec3 n = cross_product(b, c), a = abs(n);
-            float size = max(max(a.x, a.y), a.z);
-            if (beside[f] != NONE || size <= largest) continue;
-            largest = size;
-            place = 4u * (i - first) + f;
+            uint face_key = (floatBitsToUint(max(max(a.x, a.y), a.z)) & ~PLACES) | (PLACES - (4u * (i - first) + f));
+            if (beside[f] != NONE || face_key <= largest) continue;
+            largest = face_key;
             normal = n;
         }
     }
-    float most = subgroupMax(largest);
-    uint winner = subgroupMin(largest == most ? place : NONE);
-    bits = subgroupMax(place == winner ? normal_bits(normal) : 0u);
-    return most > 0.0;
+    uint most = subgroupMax(largest);
+    bits = subgroupBroadcast(normal_bits(normal), subgroupBallotFindLSB(subgroupBallot(largest == most)));
+    return most > PLACES;
 }
 
 // A range of distances, enlarged by `by` and for the rounding of distances whose summands amount to `far`.
@@ -66,11 +72,11 @@ vec2 enlarged(float least, float most, float far, float by) {
 }
 
 // The smallest and the largest distance along n of a point in the cell that a tetrahedron may own.
-vec2 range_of(Grid g, Tet tet, SlabCell cell, vec3 n) {
-    Bounds box = bounds_of(tet.v);
+vec2 range_of(Grid g, vec3 v[4], SlabCell cell, vec3 n) {
+    Bounds box = bounds_of(v);
     precise vec3 beyond = g.extent.xyz * two_to(-9), size = (box.hi - box.lo) + beyond;
     precise float rounding = ((size.x * size.y) * size.z) * two_to(-18);
-    float vol = abs(volume(tet));
+    float vol = abs(orient(v[0], v[1], v[2], v[3]));
     if (vol <= 4.0 * rounding) {
         precise vec3 lo = box.lo - beyond, hi = box.hi + beyond;
         vec3 a = place_in(cell, lo), b = place_in(cell, hi);
@@ -79,18 +85,19 @@ vec2 range_of(Grid g, Tet tet, SlabCell cell, vec3 n) {
         precise float least = (lower.x + lower.y) + lower.z, most = (upper.x + upper.y) + upper.z;
         return enlarged(least, most, dot_product(abs(n), max(abs(a), abs(b))), 0.0);
     }
-    float least = 3.40282347e38, most = -3.40282347e38, far = 0.0;
+    float least = 3.40282347e38, most = -3.40282347e38;
+    vec3 far = vec3(0.0);
     for (uint k = 0u; k < 4u; ++k) {
-        vec3 y = place_in(cell, tet.v[k]);
+        vec3 y = place_in(cell, v[k]);
         float d = dot_product(n, y);
         least = min(least, d);
         most = max(most, d);
-        far = max(far, dot_product(abs(n), abs(y)));
+        far = max(far, abs(y));
     }
     precise float room = vol - rounding;
     precise float e = two_to(-12) + rounding * reciprocal(room);
     precise float by = (3.0 * (most - least)) * e;
-    return enlarged(least, most, far, by);
+    return enlarged(least, most, dot_product(abs(n), far), by);
 }
 
 // The slab of a leaf with entries [first, last), for which the whole subgroup works together.
@@ -101,7 +108,7 @@ uint fitted(Grid g, uint first, uint last, uint code) {
     vec3 n = slab_normal(bits);
     uint lowest = 255u, highest = 0u;
     for (uint i = first + gl_SubgroupInvocationID; i < last; i += gl_SubgroupSize) {
-        vec2 range = range_of(g, load_tet(words(cells.at[p.at[i] & g.ids])), cell, n);
+        vec2 range = range_of(g, corners_of(p.at[i] & g.ids), cell, n);
         lowest = min(lowest, slab_place(range.x));
         highest = max(highest, slab_place(range.y));
     }
@@ -120,10 +127,11 @@ void main() {
     }
     bool asks = begin < end && end - begin <= MAX_LIST_FOR_SLAB;
     while (subgroupAny(asks)) {
-        bool turn = gl_SubgroupInvocationID == subgroupMin(asks ? gl_SubgroupInvocationID : NONE);
-        uint of_leaf = fitted(g, subgroupMax(turn ? begin : 0u), subgroupMax(turn ? end : 0u), subgroupMax(turn ? code : 0u));
-        if (turn) slab = of_leaf;
-        asks = asks && !turn;
+        uint turn = subgroupBallotFindLSB(subgroupBallot(asks));
+        uint of_leaf = fitted(g, subgroupBroadcast(begin, turn), subgroupBroadcast(end, turn), subgroupBroadcast(code, turn));
+        if (gl_SubgroupInvocationID != turn) continue;
+        slab = of_leaf;
+        asks = false;
     }
     if (is_leaf) po.at[g.slabs + i] = slab;
 }

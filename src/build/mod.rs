@@ -83,11 +83,11 @@ impl BuildScratch {
     /// Rejects a build of another kind or size than the one that the memory was carved for.
     fn check(&self, tets: u32, tree: &TreeMemory, options: &BuildOptions) -> Result<()> {
         let (room, capacity, carved) = &self.made_for;
-        let kind = |o: &BuildOptions| (o.assign, o.lists, o.boxes, o.capacity);
+        let kind = |o: &BuildOptions| (o.assign, o.lists, o.boxes, o.has_slabs(), o.capacity);
         let wrong = if tets > *room {
             format!("{tets} tetrahedra, in memory for {room}")
-        } else if kind(options) != kind(carved) || kind(options) != (tree.assign, tree.lists, tree.boxes.is_some(), options.capacity) {
-            "assign, lists, boxes or capacity other than those that tree and scratch were carved for".into()
+        } else if kind(options) != kind(carved) || kind(options) != (tree.assign, tree.lists, tree.boxes.is_some(), tree.slabs, options.capacity) {
+            "assign, lists, boxes, slabs or capacity other than those that tree and scratch were carved for".into()
         } else if *capacity != tree.capacity {
             "a tree and scratch that were carved for different capacities".into()
         } else {
@@ -102,7 +102,7 @@ impl BuildScratch {
 /// entries than there are tetrahedra. `tree.status` reports the level that was built, or, where a budget or
 /// [`Capacity::entries`] is too small for the root, that nothing was.
 ///
-/// `scratch` must be carved for that capacity and options with the same `assign`, `lists`, `boxes` and `capacity`. The
+/// `scratch` must be carved for that capacity and options with the same `assign`, `lists`, `boxes`, `slabs` and `capacity`. The
 /// first use of `tree` and `scratch` is a transfer or compute write. `mesh` is read by compute shaders and transfers. The
 /// last use is a compute write, followed by a barrier to compute, transfer and indirect reads.
 ///

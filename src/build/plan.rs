@@ -96,6 +96,8 @@ pub struct TreeMemory {
     pub capacity: Capacity,
     /// The tetrahedra that a leaf lists.
     pub lists: Lists,
+    /// Whether leaves have slabs.
+    pub slabs: bool,
     /// [`BuildStatus`]: the sizes of the tree that was built.
     pub status: BufferRef,
     /// [`Grid`] with the level of the leaves.
@@ -103,8 +105,8 @@ pub struct TreeMemory {
     /// Tetrahedron ids in the order of the leaves' Morton codes; with `Lists::Boundary` and few enough tetrahedra, the
     /// bits above an id are the quarters of its entry ([`crate::reference::quarters`]).
     pub p: BufferRef,
-    /// Offsets of the leaves' entries in `p` ([`crate::tree::TreeArrays::po`]); behind the last one, with
-    /// `Lists::Boundary`, the leaves' slabs ([`crate::tree::TreeArrays::slabs`]).
+    /// Offsets of the leaves' entries in `p` ([`crate::tree::TreeArrays::po`]); behind the last one
+    /// the slabs of the leaves ([`crate::tree::TreeArrays::slabs`]), if they have any.
     pub po: BufferRef,
     /// Children of the internal nodes ([`crate::tree::TreeArrays::co`]).
     pub co: BufferRef,
@@ -155,10 +157,11 @@ impl TreeMemory {
             assign,
             capacity: *capacity,
             lists,
+            slabs: options.has_slabs(),
             status,
             grid,
             p,
-            po: arena.words(leaves + 1 + if lists == Lists::Boundary { leaves } else { 0 })?,
+            po: arena.words(leaves + 1 + if options.has_slabs() { leaves } else { 0 })?,
             co: arena.words(internal + 1)?,
             flags: arena.words(nodes.div_ceil(32))?,
             masks: arena.words(nodes.div_ceil(4))?,

@@ -11,7 +11,7 @@ use crate::kernels::{
     MarkQuartersSpec, MergeLevel, MergeLevelSpec, PlanNodes, PlanNodesSpec,
 };
 use crate::layout::{BuildStatus, Grid, NONE};
-use crate::options::{BuildOptions, LEAST_USUAL, Lists, USUAL_ENTRIES};
+use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, Unsorted, cmd_exclusive_scan, cmd_sort};
 use crate::reference::quarters::id_mask;
 
@@ -40,6 +40,7 @@ impl Build<'_> {
         let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
         let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
         let (budget, box_words) = ([words as u32, (words >> 32) as u32], if options.boxes { 6 } else { 0 });
+        let slab_words = u32::from(options.has_slabs());
         r.stage("build.depth", |r| {
             r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
             r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
@@ -70,6 +71,7 @@ impl Build<'_> {
                 deepest,
                 budget,
                 box_words,
+                slab_words,
                 in_shares: u32::from(filtered(options)),
                 marked: u32::from(self.marks().is_some()),
             };
@@ -191,7 +193,7 @@ impl Build<'_> {
                 co,
                 capacity: capacity.entries,
                 id_mask: id_mask(tree.lists, self.mesh.input.tets as usize),
-                slabs: u32::from(tree.lists == Lists::Boundary),
+                slabs: u32::from(tree.slabs),
             };
             r.dispatch(
                 &arguments,
@@ -238,7 +240,7 @@ impl Build<'_> {
     pub fn slabs(&self, r: &mut Recorder<'_>, tree: &TreeMemory, scratch: &SortedScratch) -> Result<()> {
         let Self { mesh, status, grid, .. } = *self;
         let TreeMemory { p, po, flags, .. } = *tree;
-        if tree.lists == Lists::All {
+        if !tree.slabs {
             return Ok(());
         }
         let (cells, vertices, neighbours) = (mesh.input.cells, mesh.arrays.vertices, mesh.arrays.neighbours);

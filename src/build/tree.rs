@@ -8,7 +8,7 @@ use crate::error::Result;
 use crate::gpu::{Arena, Buffer, BufferRef, Gpu, StageTime};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid, wide};
-use crate::options::{BuildOptions, Lists};
+use crate::options::BuildOptions;
 use crate::reference::depth::{finer, too_large};
 use crate::reference::quarters::split_entries;
 use crate::reference::slabs::split_slabs;
@@ -159,10 +159,8 @@ impl Tree {
         let entries = self.gpu.download(&self.entry_buffer, self.memory.p.part(0, 4 * u64::from(self.status.entries)))?;
         let (p, quarters) = split_entries(entries, &self.grid);
         let leaves = u64::from(self.status.leaves);
-        let (po, slabs) = match self.options.lists {
-            Lists::All => (words(self.memory.po, leaves + 1)?, Vec::new()),
-            Lists::Boundary => split_slabs(words(self.memory.po, 2 * leaves + 1)?),
-        };
+        let behind_po = if self.memory.slabs { leaves } else { 0 };
+        let (po, slabs) = split_slabs(words(self.memory.po, leaves + 1 + behind_po)?, leaves as usize);
         Ok(TreeArrays {
             assign: self.options.assign,
             lists: self.options.lists,
@@ -217,7 +215,7 @@ impl Tree {
     /// Bytes of each array.
     pub fn sizes(&self) -> TreeBytes {
         let BuildStatus { entries, nodes, internal, level, .. } = self.status;
-        TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes, self.options.lists)
+        TreeBytes::new(u64::from(entries), u64::from(nodes), u64::from(internal), level, self.options.boxes, self.memory.slabs)
     }
 
     /// Bytes of scratch memory that the build used in addition to the tree.

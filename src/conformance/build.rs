@@ -64,12 +64,12 @@ pub(crate) struct BuildCase {
 }
 
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, slabs: true, ..BuildOptions::default() };
     if case.way == Way::Owned {
         return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), u32::MAX, 10)?);
     }
     let (capacity, expected) = within(case.way, twin, &options)?;
-    let budget = (case.way == Way::Nothing).then(|| TreeBytes::most(&twin.sizes.entries, 0, case.boxes).total() - 1);
+    let budget = (case.way == Way::Nothing).then(|| TreeBytes::most(&twin.sizes.entries, 0, &options).total() - 1);
     recorded(gpu, device, &BuildOptions { budget, ..options }, &capacity, &expected)
 }
 
@@ -115,7 +115,7 @@ fn owned(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, expected: &Expe
     let (s, memory) = (&expected.status, tree.memory());
     let size = |name: &str, words: u32, part: BufferRef| compare_one("build.plan", name, &(4 * u64::from(words)).max(16), &part.size);
     size("P (bytes)", s.entries, memory.p)?;
-    let slabs = if options.lists == Lists::Boundary { s.leaves } else { 0 };
+    let slabs = if options.has_slabs() { s.leaves } else { 0 };
     size("PO (bytes)", s.leaves + 1 + slabs, memory.po)?;
     size("CO (bytes)", s.internal + 1, memory.co)?;
     size("flags (bytes)", s.nodes.div_ceil(32), memory.flags)?;
@@ -164,10 +164,7 @@ fn recorded(gpu: &Gpu, device: &DeviceMesh, options: &BuildOptions, capacity: &C
     let boxes =
         tree.boxes.map(|part| words(part, 6 * nodes).chunks_exact(6).map(|b| [0, 1, 2, 3, 4, 5].map(|i| f32::from_bits(b[i]))).collect());
     let leaves = nodes - internal;
-    let (po, slabs) = match options.lists {
-        Lists::All => (words(tree.po, leaves + 1), Vec::new()),
-        Lists::Boundary => split_slabs(words(tree.po, 2 * leaves + 1)),
-    };
+    let (po, slabs) = split_slabs(words(tree.po, if tree.slabs { 2 * leaves + 1 } else { leaves + 1 }), leaves);
     let found = TreeArrays {
         assign: options.assign,
         lists: options.lists,

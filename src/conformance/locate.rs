@@ -72,7 +72,7 @@ pub(crate) struct LocateCase {
 }
 
 pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, slabs: true, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
     let (points, _) = twin.points();

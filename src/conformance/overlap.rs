@@ -73,7 +73,7 @@ impl HostAndDevice {
 type Sides<'a> = (OverlapSide<'a>, &'a Tree);
 
 pub(crate) fn check(gpu: &Gpu, case: &OverlapCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, slabs: true, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
     let own = (OverlapSide { mesh: &twin.mesh, topology: &twin.topology, tree: built.tree() }, &tree);

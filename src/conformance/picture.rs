@@ -58,7 +58,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
     let mut first: Option<Vec<u8>> = None;
     let (all, boundary) = (Lists::All, Lists::Boundary);
     for (alpha, assign, lists) in [(0.0, Assign::Aabb, all), (0.0, Assign::Planes, boundary), (2.0, Assign::Exact, all)] {
-        let options = BuildOptions { alpha, assign, lists, ..BuildOptions::default() };
+        let options = BuildOptions { alpha, assign, lists, slabs: true, ..BuildOptions::default() };
         let built = twin.tree(&options)?;
         let scene = Drawing::new(&twin.mesh, &twin.topology, built.tree(), &field, &settings)?;
         let plan = scene.plan();

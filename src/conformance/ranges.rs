@@ -38,7 +38,7 @@ fn spoil(field: &mut Field) {
 }
 
 pub(crate) fn check(gpu: &Gpu, case: &RangesCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, slabs: true, ..BuildOptions::default() };
     let built = twin.tree(&options)?;
     let (mesh, topology, host) = (&twin.mesh, &twin.topology, built.tree());
     let tree = Tree::build(gpu, device, &options)?;

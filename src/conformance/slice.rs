@@ -59,7 +59,7 @@ fn field(mesh: &Mesh, on: On) -> Field {
 
 pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
     let Stack { plane, layers, size, extrapolate, .. } = case.stack;
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, ..BuildOptions::default() };
+    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, slabs: true, ..BuildOptions::default() };
     let tree = Tree::build(gpu, device, &options)?;
     let built = twin.tree(&options)?;
     let (mesh, host) = (&twin.mesh, built.tree());

@@ -69,7 +69,7 @@ impl Twin {
         if let Some(built) = self.trees.get(&kind) {
             return Ok(built.clone());
         }
-        let options = BuildOptions { assign, lists, boxes: true, ..BuildOptions::default() };
+        let options = BuildOptions { assign, lists, boxes: true, slabs: true, ..BuildOptions::default() };
         let made = construct(&self.mesh, &self.topology, &self.vertices, level, &options)?;
         made.tree.validate(&self.mesh, &self.topology)?;
         let built = Arc::new(Built { made, locations: OnceLock::new() });

@@ -69,9 +69,10 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let leaf_flags = leaves::flags(&entries.primitives, &splits, options.lists, mesh, topology, vertices, &grid);
     let quarters = quarters::quarters(&entries.codes, &entries.primitives, &grid, mesh, vertices);
     let octants = leaves::masks(&splits, &leaf_flags, &quarters, &grid);
-    let slabs = match options.lists {
-        Lists::All => Vec::new(),
-        Lists::Boundary => slabs::slabs(&entries.primitives, &splits, &leaf_flags, mesh, topology, vertices, &grid),
+    let slabs = if options.has_slabs() {
+        slabs::slabs(&entries.primitives, &splits, &leaf_flags, mesh, topology, vertices, &grid)
+    } else {
+        Vec::new()
     };
     let flags = levels::flags(leaf_flags, &splits);
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));

@@ -89,7 +89,7 @@ impl Sizes {
         let most = u64::from(options.capacity.unwrap_or_else(|| usual_capacity(valid)));
         let fits = |&l: &u32| {
             self.entries[l as usize] <= most
-                && options.budget.is_none_or(|budget| TreeBytes::most(&self.entries, l, options.boxes).total() <= budget)
+                && options.budget.is_none_or(|budget| TreeBytes::most(&self.entries, l, options).total() <= budget)
         };
         (0..=wanted).rev().find(fits).ok_or_else(|| too_large(&self.entries, options))
     }
@@ -127,7 +127,7 @@ pub fn too_large(entries: &[u64; LEVELS], options: &BuildOptions) -> Error {
             format!("a tree of a single node has {root} entries, the capacity is {capacity}; raise it to that at least")
         }
         (_, Some(budget)) => {
-            let bytes = TreeBytes::most(entries, 0, options.boxes).total();
+            let bytes = TreeBytes::most(entries, 0, options).total();
             format!(
                 "a tree of a single node takes {bytes} bytes for {root} entries, the budget is {budget} bytes; raise it to that at least"
             )

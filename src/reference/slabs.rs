@@ -6,14 +6,14 @@
 //! **Coordinates.** `y = (x − centre)·inverse` runs from −1 to 1 across the leaf's cell; it is 0 on axes that normalised
 //! coordinates are too coarse for.
 //!
-//! **Normal.** That of the largest boundary face among the listed tetrahedra, measured by the largest component of the
-//! cross of its edges in these coordinates, the first one if there are several. It is divided by that component; the other
-//! two are rounded to multiples of 1/64.
+//! **Normal.** That of the largest boundary face among the first 16 tetrahedra of the list, measured by the largest component
+//! of the cross of its edges in these coordinates, without the six lowest bits; the first face if several are as large. It
+//! is divided by that component; the other two are rounded to multiples of 1/64.
 //!
 //! **Word.** From the lowest bit: 8 bits for the place of the lower plane and 8 for the upper, 7 for each of the two
 //! smaller components of the normal, plus 64, and 2 for the axis of the largest. The place of a distance d is
-//! `⌊42·d + 127.5⌋`, from 0 to 255: distances in the cell are at most 3. A leaf without boundary faces, one within the
-//! mesh, and one with a very long list have [`EVERYTHING`].
+//! `⌊42·d + 127.5⌋`, from 0 to 255: distances in the cell are at most 3. A leaf without boundary faces there, one within
+//! the mesh, and one with a very long list have [`EVERYTHING`].
 //!
 //! **Rounding.** A tetrahedron may own a point beside it by virtue of rounding or of a tolerance t < 2^-12. Let E be 2^-18 of the
 //! volume of the tetrahedron's box, enlarged by two finest cells, within which its points must lie, and V six times its
@@ -24,7 +24,7 @@
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;
 use super::splits::Splits;
-use super::tet::{Bounds, FACES, Vec3, abs, cross, dot, sub};
+use super::tet::{Bounds, FACES, Vec3, abs, cross, dot, orient, sub};
 use super::vertices::Vertices;
 use crate::grid::{Grid, per_axis, reciprocal, two_to, unmorton};
 use crate::layout::NONE;
@@ -36,6 +36,11 @@ pub const EVERYTHING: u32 = 255 << 8;
 
 /// Leaves with longer lists than this have no slab.
 pub const MAX_LIST_FOR_SLAB: usize = 16_384;
+
+/// Tetrahedra of a list whose faces may give the normal.
+const LOOKED_AT: usize = 16;
+/// Bits for the place of a face among these.
+const PLACES: u32 = 4 * LOOKED_AT as u32 - 1;
 
 /// On an axis with a smaller extent than this in normalised coordinates, slabs are not tilted.
 const COARSE: f32 = two_to(-30);
@@ -91,9 +96,9 @@ fn normal_bits(n: Vec3) -> u32 {
     (axis as u32) << 30 | part(2) << 23 | part(1) << 16
 }
 
-/// Splits what a device stores of leaves with slabs into the offsets of PO and the slabs behind them.
-pub fn split_slabs(mut words: Vec<u32>) -> (Vec<u32>, Vec<u32>) {
-    let slabs = words.split_off(words.len() / 2 + 1);
+/// Splits what a device stores of so many leaves into the offsets of PO and the slabs behind them.
+pub fn split_slabs(mut words: Vec<u32>, leaves: usize) -> (Vec<u32>, Vec<u32>) {
+    let slabs = words.split_off(words.len().min(leaves + 1));
     (words, slabs)
 }
 
@@ -123,11 +128,11 @@ impl Fit<'_> {
         bits | highest << 8 | lowest
     }
 
-    /// The normal of the largest boundary face of the listed tetrahedra.
+    /// The normal of the largest boundary face of the first listed tetrahedra.
     fn largest_face(&self, listed: &[u32], cell: &SlabCell) -> Option<Vec3> {
-        let (mut largest, mut normal) = (0.0, None);
-        for &t in listed {
-            let v = self.mesh.tets[t as usize].map(|id| self.vertices.normalised[id as usize]);
+        let (mut largest, mut normal) = (PLACES, None);
+        for (i, &t) in listed.iter().take(LOOKED_AT).enumerate() {
+            let v = self.corners(t);
             for (f, [a, b, c]) in FACES.into_iter().enumerate() {
                 if self.topology.neighbours[t as usize][f] != NONE {
                     continue;
@@ -135,31 +140,36 @@ impl Fit<'_> {
                 let edge = |to: usize| per_axis(|k| (v[to][k] - v[a][k]) * cell.inverse[k]);
                 let n = cross(edge(b), edge(c));
                 let size = abs(n).into_iter().fold(0.0, f32::max);
-                if size > largest {
-                    (largest, normal) = (size, Some(n));
+                let key = (size.to_bits() & !PLACES) | (PLACES - (4 * i + f) as u32);
+                if key > largest {
+                    (largest, normal) = (key, Some(n));
                 }
             }
         }
         normal
     }
 
+    fn corners(&self, t: u32) -> [Vec3; 4] {
+        self.mesh.tets[t as usize].map(|id| self.vertices.normalised[id as usize])
+    }
+
     /// The smallest and the largest distance along n of a point in the cell that a tetrahedron may own.
     fn range(&self, t: u32, cell: &SlabCell, n: Vec3) -> [f32; 2] {
-        let tet = self.vertices.tet(self.mesh.tets[t as usize]);
-        let Bounds { lo, hi, .. } = Bounds::new(tet.v);
+        let v @ [a, b, c, d] = self.corners(t);
+        let Bounds { lo, hi, .. } = Bounds::new(v);
         let beyond = per_axis(|c| self.grid.extent[c] * two_to(-9));
         let size = per_axis(|c| (hi[c] - lo[c]) + beyond[c]);
         let rounding = ((size[0] * size[1]) * size[2]) * two_to(-18);
-        let volume = tet.volume().abs();
+        let volume = orient(a, b, c, d).abs();
         if volume <= 4.0 * rounding {
             let (a, b) = (cell.place(sub(lo, beyond)), cell.place(per_axis(|c| hi[c] + beyond[c])));
             let side = |of: fn(f32, f32) -> f32| per_axis(|c| of(n[c] * a[c], n[c] * b[c]));
             let ([x, y, z], [p, q, r]) = (side(f32::min), side(f32::max));
             return enlarged((x + y) + z, (p + q) + r, dot(abs(n), per_axis(|c| a[c].abs().max(b[c].abs()))), 0.0);
         }
-        let y = tet.v.map(|v| cell.place(v));
+        let y = v.map(|v| cell.place(v));
         let d = y.map(|y| dot(n, y));
-        let far = y.map(|y| dot(abs(n), abs(y))).into_iter().fold(0.0, f32::max);
+        let far = dot(abs(n), per_axis(|k| y.iter().fold(0.0, |far: f32, y| far.max(y[k].abs()))));
         let (least, most) = (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])));
         let e = two_to(-12) + rounding * reciprocal(volume - rounding);
         enlarged(least, most, far, (3.0 * (most - least)) * e)

@@ -62,7 +62,7 @@ impl TreeArrays {
         let mut expected = topology.grid;
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
         expected.ids = id_mask(self.lists, topology.neighbours.len());
-        expected.slabs = if self.lists == Lists::Boundary { self.po.len() as u32 } else { 0 };
+        expected.slabs = if self.slabs.is_empty() { 0 } else { self.po.len() as u32 };
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
@@ -78,7 +78,7 @@ impl TreeArrays {
         let quarters = if self.grid.ids == u32::MAX { 0 } else { self.p.len() };
         length("quarters", self.quarters.len(), quarters)?;
         length("PO", self.po.len(), (nodes + 1).saturating_sub(internal))?;
-        let slabs = if self.lists == Lists::Boundary { nodes.saturating_sub(internal) } else { 0 };
+        let slabs = if self.slabs.is_empty() { 0 } else { nodes.saturating_sub(internal) };
         length("slabs", self.slabs.len(), slabs)?;
         length("CO", self.co.len(), internal + 1)?;
         length("BF", self.flags.len(), nodes.div_ceil(32))?;

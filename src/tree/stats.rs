@@ -1,7 +1,7 @@
 //! Statistics and sizes of a tree.
 
 use super::TreeArrays;
-use crate::options::Lists;
+use crate::options::BuildOptions;
 
 /// Statistics gathered by [`TreeArrays::validate`].
 #[derive(Clone, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub struct TreeBytes {
     pub p: u64,
     /// Entry offsets of the leaves.
     pub po: u64,
-    /// Slabs of the leaves, 0 with `Lists::All`.
+    /// Slabs of the leaves, 0 if they have none.
     pub slabs: u64,
     /// Child offsets.
     pub co: u64,
@@ -53,11 +53,11 @@ pub struct TreeBytes {
 
 impl TreeBytes {
     /// Sizes for a tree with this many entries, nodes and internal nodes, and leaves on `level`.
-    pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool, lists: Lists) -> Self {
+    pub fn new(entries: u64, nodes: u64, internal: u64, level: u32, boxes: bool, slabs: bool) -> Self {
         Self {
             p: 4 * entries,
             po: 4 * (nodes - internal + 1),
-            slabs: if lists == Lists::Boundary { 4 * (nodes - internal) } else { 0 },
+            slabs: if slabs { 4 * (nodes - internal) } else { 0 },
             co: 4 * (internal + 1),
             no: 4 * (u64::from(level) + 1),
             boundary: 4 * nodes.div_ceil(32),
@@ -67,11 +67,11 @@ impl TreeBytes {
     }
 
     /// Upper bounds for a tree with leaves on `level`, where `entries` are the numbers of `Aabb` entries on every
-    /// level: a level has no more nodes than entries or cells. Slabs count with either kind of lists. Twin of `most_words` in `glsl/build/11_choose_depth`.
-    pub fn most(entries: &[u64; 11], level: u32, boxes: bool) -> Self {
+    /// level: a level has no more nodes than entries or cells. Twin of `most_words` in `glsl/build/11_choose_depth`.
+    pub fn most(entries: &[u64; 11], level: u32, options: &BuildOptions) -> Self {
         let nodes = |levels: u32| 1 + (1..=levels).map(|k| entries[k as usize].min(8u64.pow(k))).sum::<u64>();
         let internal = if level == 0 { 0 } else { nodes(level - 1) };
-        Self::new(entries[level as usize], nodes(level), internal, level, boxes, Lists::Boundary)
+        Self::new(entries[level as usize], nodes(level), internal, level, options.boxes, options.has_slabs())
     }
 
     /// Bytes as the paper's Table 2 counts them: 4·`n_m` + 25·`n_n` + 4·`n_ni`, which is P, boxes, one byte per
@@ -97,7 +97,7 @@ impl TreeArrays {
     /// Bytes of each array.
     pub fn memory(&self) -> TreeBytes {
         let (nodes, internal) = (u64::from(self.nodes()), u64::from(self.internal_nodes()));
-        TreeBytes::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some(), self.lists)
+        TreeBytes::new(self.p.len() as u64, nodes, internal, self.grid.level, self.boxes.is_some(), !self.slabs.is_empty())
     }
 
     /// Gathers the statistics of a valid tree.

@@ -130,7 +130,7 @@ struct Iso(Vec<f32>);
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
-    let mut options = args.tree.suited(Fineness::Pictures)?;
+    let mut options = args.tree.suited(Fineness::Pictures, true)?;
     let legend = args.legend()?;
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;

@@ -107,7 +107,7 @@ const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, Output
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = args.format()?;
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
-    let options = args.tree.suited(Fineness::Points)?;
+    let options = args.tree.suited(Fineness::Points, true)?;
     let engine = engine::open(common)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
