@@ -102,7 +102,7 @@ vec2 range_of(Grid g, vec3 v[4], SlabCell cell, vec3 n) {
 
 // The slab of a leaf with entries [first, last), for which the whole subgroup works together.
 uint fitted(Grid g, uint first, uint last, uint code) {
-    SlabCell cell = slab_cell(g, unmorton(code));
+    SlabCell cell = slab_cell(g, slab_scale(g), unmorton(code));
     uint bits;
     if (!largest_face(g, first, last, cell, bits)) return EVERYTHING;
     vec3 n = slab_normal(bits);

@@ -105,7 +105,7 @@ bool is_empty(Grid g, vec3 at) {
     uvec3 lo, hi;
     if (!reached_cells(g, at, plan.reach.xyz, lo, hi)) return true;
     uvec3 cell = quantize(g, at);
-    uint leaf, level = empty_level(g.level, morton(cell), leaf), shift = MAX_LEVEL - level;
+    uint leaf = 0u, level = empty_level(g.level, morton(cell), 0u, leaf), shift = MAX_LEVEL - level;
     if (level == 0u) return false;
     empty_lo = cell >> shift << shift;
     empty_hi = empty_lo + (1u << shift) - 1u;

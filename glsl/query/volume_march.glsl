@@ -244,18 +244,23 @@ void pass_by() {
 
 #ifndef BINARY_TREE
 // Passes samples that no tetrahedron is near, all those of one octree cell or beside one leaf's slab together, so that
-// rays beside the mesh catch up with rays in it.
-void pass_empty(Grid g, inout uint work) {
+// rays beside the mesh catch up with rays in it. If it ends before the ray does, or its budget, or a sample from which
+// visibility must be looked for, `leaf` is that of the next sample.
+void pass_empty(Grid g, inout uint work, out uint leaf) {
+    leaf = NONE;
     for (; state.next < state.end && !is_to_look() && work < BUDGET; ++work) {
         vec3 at = sample_at(view, origin, direction, state.next);
         uvec3 finest = quantize(g, at);
-        uint leaf, level = empty_level(g.level, morton(finest), leaf);
+        uint code = morton(finest), top_level = min(TOP_LEVEL, g.level);
+        leaf = frames.at[0].top[code >> 3u * (MAX_LEVEL - top_level)];
+        uint level = (leaf & MISSING) != 0u ? leaf & ~MISSING : empty_level(g.level, code, top_level, leaf);
         bool in_leaf = level == 0u;
-        int side = in_leaf ? beside(g, leaf, finest, normalise(g, at)) : 0;
+        vec3 scale = frames.at[0].plan.slab_scale.xyz;
+        int side = in_leaf ? beside(g, scale, leaf, finest, normalise(g, at)) : 0;
         if (in_leaf && side == 0) return;
         uint end = SKIP != 0u ? min(state.end, state.check) : state.end;
         uint last = sample_behind(g, origin, direction, inverse_direction, state.next, end, finest, in_leaf ? g.level : level) - 1u;
-        if (in_leaf && beside(g, leaf, finest, normalise(g, sample_at(view, origin, direction, last))) != side) last = state.next;
+        if (in_leaf && beside(g, scale, leaf, finest, normalise(g, sample_at(view, origin, direction, last))) != side) last = state.next;
         samples += last - state.next;
         state.next = last;
         pass_by();
@@ -343,7 +348,6 @@ void main() {
                 }
             }
 #ifndef BINARY_TREE
-            if (!stands) pass_empty(g, work);
             if (state.next < state.end && is_to_look()) {
                 bool hidden;
                 uint behind = stretch_end(g, origin, direction, inverse_direction, state.next, state.end, hidden);
@@ -360,6 +364,8 @@ void main() {
                     state.last = NONE; // as after a transparent sample
                 }
             }
+            uint leaf = NONE;
+            if (!stands) pass_empty(g, work, leaf);
 #endif
             if (stands || state.next >= state.end || is_to_look() || work >= BUDGET) continue;
             leave();
@@ -370,7 +376,11 @@ void main() {
             if (all(greaterThanEqual(x, vec3(0.0))) && all(lessThanEqual(x, g.extent.xyz))) {
                 OwnerSearch search = no_search();
                 if (state.cursor != 0u) search = OwnerSearch(state.cursor, best_of(state.tet, known, state.smallest));
+#ifdef BINARY_TREE
                 bool ended = find_owner(search, g, at, x, 0.0, work, BUDGET, owner);
+#else
+                bool ended = find_owner_in(search, g, leaf, at, x, 0.0, work, BUDGET, owner);
+#endif
                 state.cursor = search.cursor;
                 state.tet = search.best.owner;
                 known = best_bits(search.best);

@@ -58,6 +58,7 @@ struct ViewUniforms {
 // What the device computes from a view.
 struct DrawUniforms {
     vec4 slack;      // Boxes are enlarged by this, so that rounding loses no sample.
+    vec4 slab_scale; // Reciprocals of the half sizes of the octree's leaves, see slab.glsl.
     uint size[2];    // Width and height in pixels.
     uint visible_at; // Word of the flags where the marks of visible nodes start, if there are any.
     uint row;        // Row of the view that is the first row of this picture.

@@ -10,13 +10,14 @@ struct SlabCell {
     vec3 inverse;
 };
 
-SlabCell slab_cell(Grid g, uvec3 cell) {
-    vec3 h = half_cell(g, g.level);
-    SlabCell r;
-    r.centre = cell_centre(h, cell);
-    for (uint c = 0u; c < 3u; ++c) r.inverse[c] = g.extent[c] < two_to(-30) ? 0.0 : reciprocal(h[c]);
+// Reciprocals of the half sizes of a leaf's cell, 0 on axes that normalised coordinates are too coarse for.
+vec3 slab_scale(Grid g) {
+    vec3 h = half_cell(g, g.level), r;
+    for (uint c = 0u; c < 3u; ++c) r[c] = g.extent[c] < two_to(-30) ? 0.0 : reciprocal(h[c]);
     return r;
 }
+
+SlabCell slab_cell(Grid g, vec3 scale, uvec3 cell) { return SlabCell(cell_centre(half_cell(g, g.level), cell), scale); }
 
 vec3 place_in(SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;

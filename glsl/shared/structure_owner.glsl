@@ -9,12 +9,10 @@ layout(constant_id = 4) const uint LISTS = 0;
 #include "shared/owner_walk.glsl"
 #include "shared/owner_search.glsl"
 
-// Continues a search for the owner of the point `at`, `x` in normalised coordinates. Returns false if the budget is
-// spent before the search has ended.
-bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
+// Continues a search for the owner of the point `at`, `x` in normalised coordinates, in the leaf around it. Returns false
+// if the budget is spent before the search has ended.
+bool find_owner_in(inout OwnerSearch s, Grid g, uint leaf, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
     owner = NONE;
-    uint leaf = leaf_to_search(g, at, x, tolerance);
-    if (leaf == NONE) return true;
     uvec2 range = entry_range(leaf);
     if (s.cursor == 0u) {
         uint before = walked_tets;
@@ -31,5 +29,12 @@ bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, i
     owner = decide(s.best, leaf, tolerance);
     s = no_search();
     return true;
+}
+
+// The same, of a point anywhere.
+bool find_owner(inout OwnerSearch s, Grid g, vec3 at, vec3 x, float tolerance, inout uint work, uint budget, out uint owner) {
+    owner = NONE;
+    uint leaf = leaf_to_search(g, at, x, tolerance);
+    return leaf == NONE || find_owner_in(s, g, leaf, at, x, tolerance, work, budget, owner);
 }
 #endif

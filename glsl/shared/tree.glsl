@@ -12,10 +12,9 @@ uint find_leaf(uint level, uvec3 finest) {
 }
 
 // The level of the largest cell around a finest-grid cell, given by its code, that no tetrahedron is near: a missing
-// node, or an octant of a leaf. 0 if there is none; `node` is then the leaf.
-uint empty_level(uint level, uint code, out uint node) {
-    node = 0u;
-    for (uint at = 1u; at <= min(level + 1u, MAX_LEVEL); ++at) {
+// node, or an octant of a leaf. 0 if there is none; `node`, the node of level `from` around it, then becomes the leaf.
+uint empty_level(uint level, uint code, uint from, inout uint node) {
+    for (uint at = from + 1u; at <= min(level + 1u, MAX_LEVEL); ++at) {
         uint digit = code >> (3u * (MAX_LEVEL - at)) & 7u, mask = child_mask(node);
         if ((mask >> digit & 1u) == 0u) return at;
         if (at <= level) node = child_of(node, mask, digit);

@@ -32,6 +32,8 @@ use std::mem::offset_of;
 const BUDGET: u32 = 1024;
 /// Nodes on the short stack of the traversal.
 const STACK: u32 = 8;
+/// Cells of `TOP_LEVEL` in `glsl/shared/frame.glsl`.
+const TOP_CELLS: usize = 1 << (3 * 4);
 /// Side, in pixels, of the square blocks that a picture is drawn in.
 const BLOCK: u32 = 8;
 
@@ -122,7 +124,7 @@ pub struct RenderMemory {
     pub colors: BufferRef,
     /// [`RenderStatus`]: numbers of samples, and how many rays are unfinished.
     pub status: BufferRef,
-    /// [`ViewUniforms`], [`DrawUniforms`], and the transfer function.
+    /// [`ViewUniforms`], [`DrawUniforms`], the transfer function, and the top of the octree.
     pub frame: BufferRef,
     /// [`RayState`] per ray, in blocks of 8×8 pixels, the rays of a block along a Z curve.
     pub rays: BufferRef,
@@ -156,7 +158,7 @@ impl RenderMemory {
         Ok(Self {
             colors: arena.take(16 * pixels)?,
             status: arena.take(size_of::<RenderStatus>() as u64)?,
-            frame: arena.take((size_of::<ViewUniforms>() + size_of::<DrawUniforms>() + 16 * TABLE_SIZE) as u64)?,
+            frame: arena.take((size_of::<ViewUniforms>() + size_of::<DrawUniforms>() + 16 * TABLE_SIZE + 4 * TOP_CELLS) as u64)?,
             rays: arena.take(size_of::<RayState>() as u64 * rays)?,
             visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
         })
@@ -291,11 +293,19 @@ fn cmd_plan(
     visible: Option<Visible>,
 ) -> Result<()> {
     let [first_cell, last_cell] = cells.unwrap_or(CellRange::WHOLE).words();
+    let nothing = r.gpu().nothing();
+    let (octree, grid, masks, co) = match searched.octree() {
+        Some(tree) => (1, tree.grid, tree.masks, tree.co),
+        None => (0, searched.mesh.arrays.grid, nothing, nothing),
+    };
     let arguments = VolumePlan {
-        grid: searched.mesh.arrays.grid,
+        grid,
         views: input.view,
         table: input.table,
         frames: memory.frame,
+        masks,
+        co,
+        octree,
         width: input.size[0],
         height: input.size[1],
         visible_at: visible.map_or(0, |v| ((v.marks.offset - v.flags.offset) / 4) as u32),
@@ -304,7 +314,7 @@ fn cmd_plan(
         last_cell,
     };
     let workgroup = r.gpu().target().each;
-    r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, Groups::Count((TABLE_SIZE as u32).div_ceil(workgroup)))
+    r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, Groups::Count((TABLE_SIZE.max(TOP_CELLS) as u32).div_ceil(workgroup)))
 }
 
 fn cmd_intervals(
