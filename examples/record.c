@@ -196,12 +196,12 @@ int main(int argc, char **argv) {
     int same_picture = !memcmp((char *)picture_bytes + drawn.colors.offset, pixels, sizeof pixels);
     int same_slice = !memcmp((char *)slice_bytes + sliced.answers.offset, answers, sizeof answers)
                      && !memcmp((char *)slice_bytes + sliced.values.offset, results, sizeof results);
-    printf("picture: %u samples in the mesh, %u skipped, %u rays left: %s\n", counted[2], counted[4], counted[6], same_picture ? "the same" : "ANOTHER");
+    printf("picture: %u samples in the mesh, %u skipped, %u rays left: %s\n", counted[3], counted[5], counted[7], same_picture ? "the same" : "ANOTHER");
     printf("slice: %u voxels inside, %u touched, %u empty: %s\n", kinds[3], kinds[4], kinds[5], same_slice ? "the same" : "ANOTHER");
     olbvh_tree_free(tree);
     olbvh_mesh_free(mesh);
     olbvh_recording_free(recording);
     olbvh_scene_free(scene);
     olbvh_gpu_free(gpu);
-    return !(same_picture && same_slice && counted[2] > 0 && counted[6] == 0 && kinds[3] > 0 && kinds[4] > 0);
+    return !(same_picture && same_slice && counted[3] > 0 && counted[7] == 0 && kinds[3] > 0 && kinds[4] > 0);
 }

@@ -54,6 +54,8 @@ struct olbvh_Grid {
     uint level;   // Level of the leaves, l.
     uint first_leaf; // Node index of the first leaf, n_ni.
     uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
+    uint slabs;   // Word of PO where the slabs of the leaves begin; 0: there are none.
+    uint pad[3];  // Unused.
 };
 
 // Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.
@@ -61,7 +63,7 @@ struct olbvh_SceneAddresses {
     uvec2 grid;       // Grid with the level of the leaves.
     uvec2 masks;      // Child masks.
     uvec2 co;         // Child offsets.
-    uvec2 po;         // Offsets of the leaves in `p`.
+    uvec2 po;         // Offsets of the leaves in `p`, and the slabs of the leaves.
     uvec2 p;          // Entries: ids of tetrahedra, and their quarters above them.
     uvec2 flags;      // Boundary flags.
     uvec2 cells;      // Vertex indices.
@@ -345,8 +347,8 @@ vec4 olbvh_barycentric(olbvh_Tet t, vec3 olbvh_p) {
 
 // The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.
 float olbvh_weighed(vec4 b, vec4 at_corners) {
-    precise vec3 beside = at_corners.xyz - at_corners.w;
-    precise float r = ((b.x * beside.x + b.y * beside.y) + b.z * beside.z) + at_corners.w;
+    precise vec3 olbvh_beside = at_corners.xyz - at_corners.w;
+    precise float r = ((b.x * olbvh_beside.x + b.y * olbvh_beside.y) + b.z * olbvh_beside.z) + at_corners.w;
     return r;
 }
 
@@ -405,10 +407,9 @@ uint olbvh_find_leaf(uint level, uvec3 finest) {
 }
 
 // The level of the largest cell around a finest-grid cell, given by its code, that no tetrahedron is near: a missing
-// node, or an octant of a leaf. 0 if there is none.
-uint olbvh_empty_level(uint level, uint code) {
-    uint node = 0u;
-    for (uint at = 1u; at <= min(level + 1u, olbvh_MAX_LEVEL); ++at) {
+// node, or an octant of a leaf. 0 if there is none; `node`, the node of level `from` around it, then becomes the leaf.
+uint olbvh_empty_level(uint level, uint code, uint from, inout uint node) {
+    for (uint at = from + 1u; at <= min(level + 1u, olbvh_MAX_LEVEL); ++at) {
         uint digit = code >> (3u * (olbvh_MAX_LEVEL - at)) & 7u, mask = olbvh_child_mask(node);
         if ((mask >> digit & 1u) == 0u) return at;
         if (at <= level) node = olbvh_child_of(node, mask, digit);
@@ -505,13 +506,18 @@ struct olbvh_Sought {
     uint quarters;      // quarters of its leaf's cell that contain it, packed as in an entry; 0: not tested
 };
 
+// How many finest cells a box grows by on every side so that it contains all points that its tetrahedron may own.
+uint olbvh_cells_beyond(float tolerance) { return 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0); }
+
+// Whether quarters and slabs leave room for a tolerance.
+bool olbvh_leaves_room(float tolerance) { return olbvh_cells_beyond(tolerance) == 1u; }
+
 // The point `at`, in the units of the mesh. A point with barycentric coordinates of at least -t lies outside of the
 // tetrahedron's box by at most 3 t times the size of the box.
 olbvh_Sought olbvh_sought_at(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     uvec3 cell = olbvh_quantize(g, at);
-    uint least = 1u + olbvh_whole_of(clamp(tolerance, 0.0, 1.0) * 4096.0);
-    uvec3 reach = olbvh_reach_of(g, least);
-    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, least > 1u ? 0u : olbvh_quarters_around(g, cell));
+    uvec3 reach = olbvh_reach_of(g, olbvh_cells_beyond(tolerance));
+    return olbvh_Sought(x, cell - min(cell, reach), cell + reach, olbvh_leaves_room(tolerance) ? olbvh_quarters_around(g, cell) : 0u);
 }
 
 // Whether a tetrahedron's quantized box is near enough for it to own the point. This reads one word per vertex, its
@@ -545,6 +551,72 @@ void olbvh_consider(inout olbvh_Best best, uint t, olbvh_Tet tet, olbvh_Weights 
     bool better = best.owner == olbvh_NONE || (w.in_box && !best.in_box) || (w.in_box == best.in_box && closer);
     if (better && olbvh_volume(tet) != 0.0) best = olbvh_Best(t, false, w.in_box, s);
 }
+// Points beside the mesh, as the slabs of the leaves tell. Needs tree.glsl.
+// Slabs: two parallel planes per leaf between which all tetrahedra of its list lie. Twin of src/reference/slabs.rs, which
+// explains them; the operations and their order are the same. Needs grid.glsl and tet.glsl.
+// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
+// src/reference/assign.rs.
+
+vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
+    precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
+    precise vec3 whole = g.extent.xyz * 0.5;
+    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
+}
+
+vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
+    precise vec3 a = vec3(2u * cell + 1u) * h;
+    precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
+    return b;
+}
+
+const uint olbvh_EVERYTHING = 0xff00u; // a slab that contains every point
+
+// The coordinates in a leaf's cell that slabs are given in.
+struct olbvh_SlabCell {
+    vec3 centre;
+    vec3 inverse;
+};
+
+// Reciprocals of the half sizes of a leaf's cell, 0 on axes that normalised coordinates are too coarse for.
+vec3 olbvh_slab_scale(olbvh_Grid g) {
+    vec3 h = olbvh_half_cell(g, g.level), r;
+    for (uint c = 0u; c < 3u; ++c) r[c] = g.extent[c] < olbvh_two_to(-30) ? 0.0 : olbvh_reciprocal(h[c]);
+    return r;
+}
+
+olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(olbvh_half_cell(g, g.level), cell), scale); }
+
+vec3 olbvh_place_in(olbvh_SlabCell cell, vec3 x) {
+    precise vec3 y = (x - cell.centre) * cell.inverse;
+    return y;
+}
+
+// The place of a plane or a point at distance d.
+uint olbvh_slab_place(float d) {
+    precise float at = d * 42.0 + 127.5;
+    return olbvh_whole_of(clamp(at, 0.0, 255.0));
+}
+
+// The normal of a slab, whose largest component is 1.
+vec3 olbvh_slab_normal(uint slab) {
+    float u = (float(slab >> 16 & 127u) - 64.0) * olbvh_two_to(-6), v = (float(slab >> 23 & 127u) - 64.0) * olbvh_two_to(-6);
+    uint axis = slab >> 30;
+    return axis == 0u ? vec3(1.0, u, v) : axis == 1u ? vec3(v, 1.0, u) : vec3(u, v, 1.0);
+}
+
+// On which side of a slab a point is: -1 below, 1 above, 0 within.
+int olbvh_side_of(uint slab, olbvh_SlabCell cell, vec3 x) {
+    uint at = olbvh_slab_place(olbvh_dot_product(olbvh_slab_normal(slab), olbvh_place_in(cell, x)));
+    return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
+}
+
+// On which side of its leaf's slab x is, in a cell of the finest grid that lies in this leaf. If it is not 0, no
+// tetrahedron owns x (for tolerances below 2^-12). `scale` is slab_scale(g).
+int olbvh_beside(olbvh_Grid g, vec3 scale, uint leaf, uvec3 finest, vec3 x) {
+    if (g.slabs == 0u) return 0;
+    uint slab = olbvh_po.at[g.slabs + (leaf - g.first_leaf)];
+    return olbvh_side_of(slab, olbvh_slab_cell(g, scale, finest >> (olbvh_MAX_LEVEL - g.level)), x);
+}
 
 // Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
 // one bit each. Most entries fail this test, and most of the others fail that of `near_of`. Each test is done for all
@@ -577,6 +649,14 @@ void olbvh_search(inout olbvh_Best best, uint begin, uint end, olbvh_Sought s) {
     }
 }
 
+// The leaf whose tetrahedra may own the point `at`, x in normalised coordinates; NONE if none can.
+uint olbvh_leaf_to_search(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
+    if (!olbvh_near_bounds(g, at)) return olbvh_NONE;
+    uvec3 finest = olbvh_quantize(g, at);
+    uint leaf = olbvh_find_leaf(g.level, finest);
+    return leaf == olbvh_NONE || (olbvh_leaves_room(tolerance) && olbvh_beside(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;
+}
+
 // The owner, once the whole list has been searched; NONE if there is none.
 uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
     if (best.owner == olbvh_NONE || best.inside) return best.owner;
@@ -585,20 +665,6 @@ uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
 // Point location by walking (SPEC 2.6). Twin of `walked` in src/reference/locate.rs. Needs owner_list.glsl, LISTS and
 // neighbours.
 
-// Centre and half size of a cell in normalised coordinates. Twin of `cell_centre` and `half_cell` in
-// src/reference/assign.rs.
-
-vec3 olbvh_half_cell(olbvh_Grid g, uint level) {
-    precise vec3 cell = g.extent.xyz * olbvh_two_to(-1 - int(level));
-    precise vec3 whole = g.extent.xyz * 0.5;
-    return vec3(g.inv.x == 0.0 ? whole.x : cell.x, g.inv.y == 0.0 ? whole.y : cell.y, g.inv.z == 0.0 ? whole.z : cell.z);
-}
-
-vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
-    precise vec3 a = vec3(2u * cell + 1u) * h;
-    precise vec3 b = floor(a * olbvh_two_to(42)) * olbvh_two_to(-42);
-    return b;
-}
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
 // and their order are the same. Needs candidates.glsl, cells and neighbours.
 const uint olbvh_STAR = 128u;    // most tetrahedra of a star; see corners.glsl for larger ones
@@ -782,9 +848,9 @@ bool olbvh_in_star(uint t) {
 // a place: there are as many as corners.glsl counts on.
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
-    uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
+    uvec4 olbvh_beside = olbvh_words(olbvh_neighbours.at[t]);
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
-        uint u = beside[f];
+        uint u = olbvh_beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
         ++olbvh_walked_tets;
         if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
@@ -836,23 +902,23 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b, out uint left) {
         ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
-        uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
+        uvec4 olbvh_beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
         uint face = olbvh_NONE;
         for (uint f = 0u; f < 4u; ++f) {
-            if (behind[f] >= 0.0 || beside[f] == from) continue;
+            if (behind[f] >= 0.0 || olbvh_beside[f] == from) continue;
             float at = olbvh_way_before(before[f], behind[f]);
             if (at < first) {
                 first = at;
                 face = f;
             }
         }
-        if (face == olbvh_NONE || beside[face] == olbvh_NONE) {
+        if (face == olbvh_NONE || olbvh_beside[face] == olbvh_NONE) {
             left = face;
             break;
         }
         from = t;
-        t = beside[face];
+        t = olbvh_beside[face];
     }
     return t;
 }
@@ -943,9 +1009,9 @@ void olbvh_open(uvec2 tree) {
 uint olbvh_locate(vec3 place, float tolerance, out vec4 weights_of_owner) {
     weights_of_owner = vec4(0.0);
     olbvh_Grid g = olbvh_grid.at[0];
-    uint leaf = olbvh_near_bounds(g, place) ? olbvh_find_leaf(g.level, olbvh_quantize(g, place)) : olbvh_NONE;
-    if (leaf == olbvh_NONE) return olbvh_NONE;
     vec3 x = olbvh_normalise(g, place);
+    uint leaf = olbvh_leaf_to_search(g, place, x, tolerance);
+    if (leaf == olbvh_NONE) return olbvh_NONE;
     uvec2 range = olbvh_entry_range(leaf);
     olbvh_Best best = olbvh_walked(g, leaf, range, place, x);
     if (!best.inside && !olbvh_walks_in(leaf, range)) olbvh_search(best, range.x, range.y, olbvh_sought_at(g, place, x, tolerance));
@@ -987,9 +1053,9 @@ uint olbvh_walk(uint from, vec3 start, vec3 end, out vec4 weights_of_owner, out 
 #endif
 uint olbvh_owners(vec3 place, out uint owners[OLBVH_OWNERS]) {
     olbvh_Grid g = olbvh_grid.at[0];
-    uint leaf = olbvh_near_bounds(g, place) ? olbvh_find_leaf(g.level, olbvh_quantize(g, place)) : olbvh_NONE;
-    if (leaf == olbvh_NONE) return 0u;
     vec3 x = olbvh_normalise(g, place);
+    uint leaf = olbvh_leaf_to_search(g, place, x, 0.0);
+    if (leaf == olbvh_NONE) return 0u;
     uvec2 range = olbvh_entry_range(leaf);
     bool by_walk = olbvh_walks_in(leaf, range);
     if (by_walk) {

@@ -126,6 +126,11 @@ typedef struct olbvh_build_options {
    */
   uint32_t fineness;
   /*
+   Not 0: leaves at the surface tell most points beside the mesh without a search, for 4 bytes per leaf and, in thin
+   bodies, up to a third of the time of a build. This pays for pictures and slices.
+   */
+  uint32_t slabs;
+  /*
    Maximum number of entries of the tree, which is made coarser until it fits; `olbvh_tree_build` counts those of
    `assign` 0 with full lists, which are more. 0: the usual capacity, 64 entries per tetrahedron and at least 2^20,
    or that of `olbvh_plan`.
@@ -746,8 +751,8 @@ typedef struct olbvh_picture_parts_data {
    */
   struct olbvh_buffer colors;
   /*
-   Three numbers of two words each, lower word first: samples taken, samples in the mesh, samples skipped. Then a
-   word: rays that need another round.
+   A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
+   samples skipped. Then a word: rays that need another round.
    */
   struct olbvh_buffer status;
 } olbvh_picture_parts_data;

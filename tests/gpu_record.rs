@@ -286,7 +286,7 @@ fn picture_goes_on(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], iso: bool) -> 
     let draw = |rounds: Rounds| {
         submit(gpu, "olbvh.test.round", |r| cmd_render(r, scene, &input, &memory, rounds)).unwrap();
         let colors: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 12 * 16)).unwrap();
-        (colors, RenderStatus { pad: 0, ..gpu.download::<RenderStatus>(&buffer, memory.status).unwrap()[0] })
+        (colors, RenderStatus { met: 0, ..gpu.download::<RenderStatus>(&buffer, memory.status).unwrap()[0] })
     };
     let (colors, status) = draw(Rounds::begin(0));
     assert_eq!((colors, status), (vec![[0.0; 4]; 12], RenderStatus { unfinished: 12, ..Default::default() }));

@@ -7,16 +7,18 @@
 #include "shared/tet.glsl"
 #include "shared/frame.glsl"
 #include "shared/rays.glsl"
-NO_SCALARS(4)
+NO_SCALARS(5)
 BUFFER16(0, readonly, Frame, frames)
-BUFFER16(1, readonly, RayState, states)
+BUFFER(1, readonly, RayState, states)
 BUFFER16(2, readonly, vec4, colors) // row by row
 BUFFER(3, writeonly, float, depths) // row by row
+BUFFER(4, readonly, RenderStatus, status)
 
 void main() {
     uint i = item_index();
+    if (i >= status.at[0].met) return;
     uvec2 size = uvec2(frames.at[0].plan.size[0], frames.at[0].plan.size[1]), pixel;
-    if (!pixel_of(i, size, pixel)) return;
+    if (!pixel_of(states.at[i].item, size, pixel)) return;
     uint place = pixel.y * size.x + pixel.x;
     ViewUniforms view = frames.at[0].view;
     if (colors.at[place].w < view.termination) return;

@@ -15,17 +15,18 @@ layout(constant_id = 2) const uint STACK = 8;
 layout(constant_id = 3) const uint PART = 0;
 layout(constant_id = 4) const uint ISO = 0;
 layout(constant_id = 5) const uint DEPTH = 0;
-ARGUMENTS(7 + STRUCTURE_BUFFERS)
+ARGUMENTS(8 + STRUCTURE_BUFFERS)
     uint items; // pixels in whole blocks
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 RECORDS(1, uvec4, cells)    // for the binary tree only
 RECORDS(2, vec4, vertices)  // for the binary tree only
 BUFFER16(3, readonly, Frame, frames)
-BUFFER16(4, READ_WRITE, RayState, states)
+BUFFER(4, READ_WRITE, RayState, states)
 BUFFER16(5, READ_WRITE, vec4, colors)
 BUFFER(6, readonly, float, depths) // row by row, as the colours
-STRUCTURE(7)
+BUFFER(7, READ_WRITE, RenderStatus, status)
+STRUCTURE(8)
 
 Grid g;
 ViewUniforms view;
@@ -190,14 +191,21 @@ RayState go_on(RayState state, RayState before, vec3 direction) {
     return state;
 }
 
+// Takes places in the march for the rays of this subgroup, of which some meet the mesh. They stay together, since rays
+// side by side read the same tetrahedra.
+uint place_in_march(bool is_ray) {
+    uint rays = subgroupBallotBitCount(subgroupBallot(is_ray)), first = 0u;
+    if (subgroupElect()) first = atomicAdd(status.at[0].met, rays);
+    return subgroupBroadcastFirst(first) + gl_SubgroupInvocationID;
+}
+
 void main() {
     uint i = item_index();
-    if (i >= items) return;
     view = frames.at[0].view;
     plan = frames.at[0].plan;
     uvec2 pixel, size = uvec2(plan.size[0], plan.size[1]);
-    RayState state = RayState(0u, 0u, 0u, NONE, SMALLEST_FLOAT, NONE, 0.0, 0u);
-    if (pixel_of(i, size, pixel)) {
+    RayState state = RayState(0u, 0u, 0u, NONE, SMALLEST_FLOAT, NONE, 0.0, 0u, i);
+    if (i < items && pixel_of(i, size, pixel)) {
         uint place = pixel.y * size.x + pixel.x;
         bool opaque = PART != 0u && colors.at[place].w >= view.termination;
         if (PART == 0u) colors.at[place] = vec4(0.0);
@@ -225,5 +233,11 @@ void main() {
         }
         if (PART != 0u) state = go_on(state, states.at[i], direction);
     }
-    states.at[i] = state;
+    // Between blocks of a mesh, every ray has a place of its own.
+    uint place = i;
+    if (PART == 0u) {
+        if (!subgroupAny(state.next < state.end)) return;
+        place = place_in_march(i < items);
+    }
+    if (i < items) states.at[place] = state;
 }

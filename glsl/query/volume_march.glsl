@@ -23,7 +23,7 @@ RECORDS(3, uvec4, neighbours)
 BUFFER(4, readonly, float, field)
 BUFFER(5, readonly, float, normals) // three per vertex
 BUFFER16(6, readonly, Frame, frames)
-BUFFER16(7, READ_WRITE, RayState, states)
+BUFFER(7, READ_WRITE, RayState, states)
 BUFFER16(8, READ_WRITE, vec4, colors) // premultiplied colour and opacity, row by row
 BUFFER(9, READ_WRITE, RenderStatus, status)
 BUFFER(10, readonly, float, depths) // row by row, as the colours
@@ -298,7 +298,8 @@ void main() {
     samples = found = skipped = 0u;
     plan = frames.at[0].plan;
     uvec2 pixel;
-    if (pixel_of(i, uvec2(plan.size[0], plan.size[1]), pixel) && states.at[i].next < states.at[i].end) {
+    bool met = i < status.at[0].met && states.at[i].next < states.at[i].end;
+    if (met && pixel_of(states.at[i].item, uvec2(plan.size[0], plan.size[1]), pixel)) {
         view = frames.at[0].view;
         Grid g = grid.at[0];
         state = states.at[i];

@@ -77,15 +77,16 @@ struct RayState {
     uint last;      // `NONE` if the last sample shows nothing. Otherwise, for iso-surfaces, bits of the value where the ray leaves its tetrahedron.
     float last_at;  // Distance of that place from the ray's origin in steps; of a ray that has become opaque, of the place where it did.
     uint check;     // Sample from which visibility is tested; the two top bits are flags of the best candidate.
+    uint item;      // Which ray it is: its place in blocks of 8×8 pixels, the rays of a block along a Z curve.
 };
 
 // Counters of a picture. Counters of 64 bits are two words, the low one first.
 struct RenderStatus {
+    uint met;        // Rays that march: those that may meet the mesh, and others beside them. First member, since bound by itself.
     uint samples[2]; // Samples taken.
     uint found[2];   // Samples in the mesh.
     uint skipped[2]; // Samples not taken, in nodes without anything visible.
     uint unfinished; // Rays that need another round.
-    uint pad;        // Unused.
 };
 
 // A node of the baseline's binary tree (Apetrei 2014). Internal node i splits the sorted tetrahedra after place i. In a

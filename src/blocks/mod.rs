@@ -21,7 +21,7 @@
 //!   abandoned and cut again.
 //! - The limit is enforced by [`Gpu::with_memory`], which counts every buffer, transfer buffers included.
 //! - The mesh itself is in host memory as a whole, with an additional 6 bytes per point and 4 per tetrahedron.
-//!   Rendering adds normals (12 bytes per point), rays (48 bytes each), and at the start neighbours (16 bytes per
+//!   Rendering adds normals (12 bytes per point), rays (52 bytes each), and at the start neighbours (16 bytes per
 //!   tetrahedron, and about three times that while they are matched).
 //! - The level may be coarser than requested, if one bit for each of its cells would take more than an eighth of the
 //!   memory, or if the largest tetrahedra would meet so many of them that no block with these fitted. It may be finer

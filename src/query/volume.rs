@@ -18,6 +18,7 @@ use super::{Rounds, Scene, cmd_visible, visible_bytes};
 use crate::build::{Capacity, MeshInput, check_field};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
+use crate::primitives::Count;
 use crate::grid::CellRange;
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeDepths, VolumeDepthsSpec, VolumeIntervals, VolumeIntervalsSpec,
@@ -117,7 +118,7 @@ pub struct Visibility {
     pub count: u32,
 }
 
-/// The picture and scratch memory: 48 bytes per pixel, and two bits per node of a tree whose nodes are skipped.
+/// The picture and scratch memory: 52 bytes per pixel, and two bits per node of a tree whose nodes are skipped.
 #[derive(Clone, Copy, Debug)]
 pub struct RenderMemory {
     /// Per pixel four floats: premultiplied colour and opacity. Row 0 is on top.
@@ -126,8 +127,10 @@ pub struct RenderMemory {
     pub status: BufferRef,
     /// [`ViewUniforms`], [`DrawUniforms`], the transfer function, and the top of the octree.
     pub frame: BufferRef,
-    /// [`RayState`] per ray, in blocks of 8×8 pixels, the rays of a block along a Z curve.
+    /// A [`RayState`] for each ray that may meet the mesh.
     pub rays: BufferRef,
+    /// Workgroups of a march.
+    groups: BufferRef,
     visible: Option<Visible>,
 }
 
@@ -160,6 +163,7 @@ impl RenderMemory {
             status: arena.take(size_of::<RenderStatus>() as u64)?,
             frame: arena.take((size_of::<ViewUniforms>() + size_of::<DrawUniforms>() + 16 * TABLE_SIZE + 4 * TOP_CELLS) as u64)?,
             rays: arena.take(size_of::<RayState>() as u64 * rays)?,
+            groups: arena.words(3)?,
             visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
         })
     }
@@ -239,8 +243,12 @@ fn cmd_render_in(
     input.check(&searched.mesh.input)?;
     let visible = visible(searched, input, memory)?;
     let unfinished = memory.status.part(offset_of!(RenderStatus, unfinished) as u64, 4);
+    let met = memory.status.part(0, 4);
+    let march = Count::device(rays, met);
+    let workgroup = r.gpu().target().query;
     if !rounds.resume {
-        r.fill(memory.status.part(0, offset_of!(RenderStatus, unfinished) as u64), 0);
+        r.fill(met, if cells.is_some() { rays } else { 0 });
+        r.fill(memory.status.part(4, offset_of!(RenderStatus, unfinished) as u64 - 4), 0);
         r.fill(unfinished, width * height);
         if !marked {
             cmd_marks(r, searched, input, visible)?;
@@ -251,14 +259,17 @@ fn cmd_render_in(
         // may jump across an iso-value between nodes of which none is visible. These places must be sampled whatever
         // the tree.
         cmd_intervals(r, searched, rays, input, cells.is_some(), memory, visible.filter(|_| !input.iso))?;
+        r.barrier("render.intervals → render.arguments");
+        march.arguments(r, workgroup, memory.groups)?;
     }
+    let groups = Groups::Indirect(memory.groups.part(0, 12));
     for round in 0..rounds.count {
         if round > 0 {
             r.barrier("render.march → render.clear");
         }
         r.fill(unfinished, 0);
         r.barrier("render.clear → render.march");
-        cmd_march(r, searched, rays, input, memory, visible)?;
+        cmd_march(r, searched, groups, input, memory, visible)?;
     }
     Ok(())
 }
@@ -339,6 +350,7 @@ fn cmd_intervals(
             states: memory.rays,
             colors: memory.colors,
             depths: depths,
+            status: memory.status,
             items: rays,
         }, { stack, part, iso, depth })
     })
@@ -347,7 +359,7 @@ fn cmd_intervals(
 fn cmd_march(
     r: &mut Recorder<'_>,
     searched: &Searched,
-    rays: u32,
+    groups: Groups,
     input: &RenderInput,
     memory: &RenderMemory,
     visible: Option<Visible>,
@@ -357,7 +369,6 @@ fn cmd_march(
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
     let (iso, skip, normals) = (u32::from(input.iso), u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
     let ((depth, depths), budget) = (input.depths(r), BUDGET);
-    let groups = Groups::Count(rays.div_ceil(r.gpu().target().query));
     r.stage("query.march", |r| {
         dispatch!(r, groups, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {
             cells: mesh.cells,
@@ -387,7 +398,7 @@ fn cmd_march(
 pub fn cmd_depths(r: &mut Recorder<'_>, input: &RenderInput, memory: &RenderMemory, depths: BufferRef) -> Result<()> {
     let rays = memory.rays_of(input.size)?;
     depths.check(4 * u64::from(input.size[0]) * u64::from(input.size[1]), "a depth buffer")?;
-    let arguments = VolumeDepths { frames: memory.frame, states: memory.rays, colors: memory.colors, depths };
+    let arguments = VolumeDepths { frames: memory.frame, states: memory.rays, colors: memory.colors, depths, status: memory.status };
     let workgroup = r.gpu().target().each;
     r.dispatch(&arguments, VolumeDepthsSpec { workgroup, ..Default::default() }, Groups::Count(rays.div_ceil(workgroup)))
 }

@@ -76,8 +76,8 @@ pub struct OlbvhPictureParts {
     pub bytes: u64,
     /// Four floats per pixel, upper row first: colour multiplied by its opacity, and opacity.
     pub colors: OlbvhBuffer,
-    /// Three numbers of two words each, lower word first: samples taken, samples in the mesh, samples skipped. Then a
-    /// word: rays that need another round.
+    /// A word for the kernels. Then three numbers of two words each, lower word first: samples taken, samples in the mesh,
+    /// samples skipped. Then a word: rays that need another round.
     pub status: OlbvhBuffer,
 }
 
