@@ -10,6 +10,7 @@ mod nearest;
 mod oracle;
 mod order;
 mod overlap;
+mod slabs;
 mod slice;
 mod slice_files;
 mod traverse;
