@@ -20,7 +20,8 @@
 //! # Ok(()) }
 //! ```
 //!
-//! For thin bodies and for rendering, see [`options::Fineness`]; for repeated calls, [`gpu::Gpu::with_pool`].
+//! For thin bodies and for rendering, see [`options::Fineness`] and [`options::BuildOptions::slabs`]; for repeated calls,
+//! [`gpu::Gpu::with_pool`].
 //!
 //! # In your own renderer
 //! [`gpu::Gpu::from_raw`] takes your instance, device and queue (types of [`ash`] and [`gpu_allocator`], exported

@@ -161,7 +161,8 @@ fn arrays(content: &[u32], tree: &TreeMemory, status: &BuildStatus) -> TreeArray
     let (nodes, internal) = (status.nodes, status.internal);
     let grid = one(content, tree.grid);
     let (p, quarters) = split_entries(words(tree.p, status.entries), &grid);
-    let (po, slabs) = split_slabs(words(tree.po, if tree.slabs { 2 * status.leaves + 1 } else { status.leaves + 1 }), status.leaves as usize);
+    let (po, slabs) =
+        split_slabs(words(tree.po, if tree.slabs { 2 * status.leaves + 1 } else { status.leaves + 1 }), status.leaves as usize);
     TreeArrays {
         assign: tree.assign,
         lists: tree.lists,

@@ -32,8 +32,9 @@ uint normal_bits(vec3 n) {
     vec3 a = abs(n);
     uint axis = a.x >= a.y && a.x >= a.z ? 0u : 2u - uint(a.y >= a.z);
     float x = axis == 0u ? n.x : axis == 1u ? n.y : n.z, y = axis == 0u ? n.y : axis == 1u ? n.z : n.x;
-    float z = axis == 0u ? n.z : axis == 1u ? n.x : n.y, r = reciprocal(x);
-    precise vec2 part = (vec2(y, z) * r) * 64.0 + 64.5;
+    float z = axis == 0u ? n.z : axis == 1u ? n.x : n.y;
+    float r = uintBitsToFloat(floatBitsToUint(reciprocal(x)) + (6u << 23u)); // 64 / x; drivers may fuse a product with 64
+    precise vec2 part = vec2(y, z) * r + 64.5;
     part = clamp(part, vec2(0.0), vec2(127.0));
     return axis << 30 | whole_of(part.y) << 23 | whole_of(part.x) << 16;
 }

@@ -86,7 +86,9 @@ impl BuildScratch {
         let kind = |o: &BuildOptions| (o.assign, o.lists, o.boxes, o.has_slabs(), o.capacity);
         let wrong = if tets > *room {
             format!("{tets} tetrahedra, in memory for {room}")
-        } else if kind(options) != kind(carved) || kind(options) != (tree.assign, tree.lists, tree.boxes.is_some(), tree.slabs, options.capacity) {
+        } else if kind(options) != kind(carved)
+            || kind(options) != (tree.assign, tree.lists, tree.boxes.is_some(), tree.slabs, options.capacity)
+        {
             "assign, lists, boxes, slabs or capacity other than those that tree and scratch were carved for".into()
         } else if *capacity != tree.capacity {
             "a tree and scratch that were carved for different capacities".into()

@@ -64,7 +64,14 @@ pub(crate) struct BuildCase {
 }
 
 pub(crate) fn check(gpu: &Gpu, case: &BuildCase, twin: &mut Twin, device: &DeviceMesh) -> Verdict {
-    let options = BuildOptions { alpha: case.alpha, assign: case.assign, lists: case.lists, boxes: case.boxes, slabs: true, ..BuildOptions::default() };
+    let options = BuildOptions {
+        alpha: case.alpha,
+        assign: case.assign,
+        lists: case.lists,
+        boxes: case.boxes,
+        slabs: true,
+        ..BuildOptions::default()
+    };
     if case.way == Way::Owned {
         return owned(gpu, device, &options, &Expected::new(twin, &options, Some(u32::MAX), u32::MAX, 10)?);
     }

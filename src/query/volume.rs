@@ -18,7 +18,6 @@ use super::{Rounds, Scene, cmd_visible, visible_bytes};
 use crate::build::{Capacity, MeshInput, check_field};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
-use crate::primitives::Count;
 use crate::grid::CellRange;
 use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeDepths, VolumeDepthsSpec, VolumeIntervals, VolumeIntervalsSpec,
@@ -26,6 +25,7 @@ use crate::kernels::{
 };
 use crate::layout::{DrawUniforms, RayState, RenderStatus, ViewUniforms};
 use crate::mesh::On;
+use crate::primitives::Count;
 use crate::render::{Plan, TABLE_SIZE};
 use std::mem::offset_of;
 
@@ -325,7 +325,11 @@ fn cmd_plan(
         last_cell,
     };
     let workgroup = r.gpu().target().each;
-    r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, Groups::Count((TABLE_SIZE.max(TOP_CELLS) as u32).div_ceil(workgroup)))
+    r.dispatch(
+        &arguments,
+        VolumePlanSpec { workgroup, ..Default::default() },
+        Groups::Count((TABLE_SIZE.max(TOP_CELLS) as u32).div_ceil(workgroup)),
+    )
 }
 
 fn cmd_intervals(

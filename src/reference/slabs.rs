@@ -194,8 +194,6 @@ pub fn slabs(
 ) -> Vec<u32> {
     let fit = Fit { mesh, topology, vertices, grid };
     let codes = &splits.codes[splits.codes.len() - flags.len()..];
-    let slab = |(i, &flag): (usize, &bool)| {
-        fit.slab(&primitives[splits.po[i] as usize..splits.po[i + 1] as usize], flag, codes[i])
-    };
+    let slab = |(i, &flag): (usize, &bool)| fit.slab(&primitives[splits.po[i] as usize..splits.po[i + 1] as usize], flag, codes[i]);
     flags.par_iter().enumerate().map(slab).collect()
 }

@@ -138,8 +138,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let rays: u64 = settings.size.into_iter().map(u64::from).product();
-    if options.fineness == Fineness::Pictures && 2 * rays < loaded.mesh.tets.len() as u64 {
-        options.fineness = Fineness::Points; // a second build over this many tetrahedra would take longer than it saves
+    if 2 * rays < loaded.mesh.tets.len() as u64 {
+        // Slabs and a second build over this many tetrahedra would take longer than they save.
+        options.slabs = false;
+        options.fineness = if options.fineness == Fineness::Pictures { Fineness::Points } else { options.fineness };
     }
     let field = args.field(&loaded.mesh, common)?;
     let expected = remark_on_iso(&settings.iso, &field, common);

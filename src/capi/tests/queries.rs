@@ -273,7 +273,9 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     assert!(read::<[f32; 4]>(device, picture_parts.colors, 37 * 30) == expected.colors);
     let opaque = expected.colors.iter().map(|color| color[3] >= plan.termination);
     assert!(read::<f32>(device, depths.all().into(), 37 * 30).into_iter().map(|depth| depth > 0.0).eq(opaque));
-    let [_, samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 8)[..] else { unreachable!() };
+    let [_, samples, _, found_samples, _, skipped, _, unfinished] = read::<u32>(device, picture_parts.status, 8)[..] else {
+        unreachable!()
+    };
     assert!(unfinished == 0 && samples >= found_samples && found_samples > 500 && skipped > 100, "{samples} {found_samples} {skipped}");
     assert_eq!(read::<u32>(device, slicing_parts.answers, 17 * 13 * 6), expected.answers);
     assert_eq!(read::<u32>(device, slicing_parts.values, 17 * 13 * 6), expected.sliced);
