@@ -347,8 +347,8 @@ vec4 olbvh_barycentric(olbvh_Tet t, vec3 olbvh_p) {
 
 // The value at barycentric coordinates, interpolated from the values at the corners; exact where these are equal.
 float olbvh_weighed(vec4 b, vec4 at_corners) {
-    precise vec3 olbvh_beside = at_corners.xyz - at_corners.w;
-    precise float r = ((b.x * olbvh_beside.x + b.y * olbvh_beside.y) + b.z * olbvh_beside.z) + at_corners.w;
+    precise vec3 beside = at_corners.xyz - at_corners.w;
+    precise float r = ((b.x * beside.x + b.y * beside.y) + b.z * beside.z) + at_corners.w;
     return r;
 }
 
@@ -586,7 +586,7 @@ vec3 olbvh_slab_scale(olbvh_Grid g) {
 
 olbvh_SlabCell olbvh_slab_cell(olbvh_Grid g, vec3 scale, uvec3 cell) { return olbvh_SlabCell(olbvh_cell_centre(olbvh_half_cell(g, g.level), cell), scale); }
 
-vec3 olbvh_place_in(olbvh_SlabCell cell, vec3 x) {
+vec3 olbvh_in_cell(olbvh_SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;
     return y;
 }
@@ -606,13 +606,13 @@ vec3 olbvh_slab_normal(uint slab) {
 
 // On which side of a slab a point is: -1 below, 1 above, 0 within.
 int olbvh_side_of(uint slab, olbvh_SlabCell cell, vec3 x) {
-    uint at = olbvh_slab_place(olbvh_dot_product(olbvh_slab_normal(slab), olbvh_place_in(cell, x)));
+    uint at = olbvh_slab_place(olbvh_dot_product(olbvh_slab_normal(slab), olbvh_in_cell(cell, x)));
     return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
 }
 
 // On which side of its leaf's slab x is, in a cell of the finest grid that lies in this leaf. If it is not 0, no
 // tetrahedron owns x (for tolerances below 2^-12). `scale` is slab_scale(g).
-int olbvh_beside(olbvh_Grid g, vec3 scale, uint leaf, uvec3 finest, vec3 x) {
+int olbvh_side_of_slab(olbvh_Grid g, vec3 scale, uint leaf, uvec3 finest, vec3 x) {
     if (g.slabs == 0u) return 0;
     uint slab = olbvh_po.at[g.slabs + (leaf - g.first_leaf)];
     return olbvh_side_of(slab, olbvh_slab_cell(g, scale, finest >> (olbvh_MAX_LEVEL - g.level)), x);
@@ -654,7 +654,7 @@ uint olbvh_leaf_to_search(olbvh_Grid g, vec3 at, vec3 x, float tolerance) {
     if (!olbvh_near_bounds(g, at)) return olbvh_NONE;
     uvec3 finest = olbvh_quantize(g, at);
     uint leaf = olbvh_find_leaf(g.level, finest);
-    return leaf == olbvh_NONE || (olbvh_leaves_room(tolerance) && olbvh_beside(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;
+    return leaf == olbvh_NONE || (olbvh_leaves_room(tolerance) && olbvh_side_of_slab(g, olbvh_slab_scale(g), leaf, finest, x) != 0) ? olbvh_NONE : leaf;
 }
 
 // The owner, once the whole list has been searched; NONE if there is none.
@@ -848,9 +848,9 @@ bool olbvh_in_star(uint t) {
 // a place: there are as many as corners.glsl counts on.
 void olbvh_grow_star(uint t, olbvh_Tet tet, olbvh_Weights w, vec3 x) {
     vec4 own = olbvh_own_weights(w, tet);
-    uvec4 olbvh_beside = olbvh_words(olbvh_neighbours.at[t]);
+    uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
     [[dont_unroll]] for (uint f = 0u; f < 4u; ++f) { // every iteration contains a whole containment test
-        uint u = olbvh_beside[f];
+        uint u = beside[f];
         if (own[f] > w.margin || u == olbvh_NONE || olbvh_star_size == olbvh_STAR || olbvh_in_star(u)) continue;
         ++olbvh_walked_tets;
         if (olbvh_near(olbvh_weights(olbvh_load_tet(olbvh_words(olbvh_cells.at[u])), x))) olbvh_star[olbvh_star_size++] = u;
@@ -902,23 +902,23 @@ uint olbvh_walk_leg(uint t, vec3 a, vec3 b, out uint left) {
         ++olbvh_walked_tets;
         olbvh_Tet tet = olbvh_load_tet(olbvh_words(olbvh_cells.at[t]));
         vec4 before = olbvh_own_weights(olbvh_weights(tet, a), tet), behind = olbvh_own_weights(olbvh_weights(tet, b), tet);
-        uvec4 olbvh_beside = olbvh_words(olbvh_neighbours.at[t]);
+        uvec4 beside = olbvh_words(olbvh_neighbours.at[t]);
         float first = 3.40282347e38;
         uint face = olbvh_NONE;
         for (uint f = 0u; f < 4u; ++f) {
-            if (behind[f] >= 0.0 || olbvh_beside[f] == from) continue;
+            if (behind[f] >= 0.0 || beside[f] == from) continue;
             float at = olbvh_way_before(before[f], behind[f]);
             if (at < first) {
                 first = at;
                 face = f;
             }
         }
-        if (face == olbvh_NONE || olbvh_beside[face] == olbvh_NONE) {
+        if (face == olbvh_NONE || beside[face] == olbvh_NONE) {
             left = face;
             break;
         }
         from = t;
-        t = olbvh_beside[face];
+        t = beside[face];
     }
     return t;
 }

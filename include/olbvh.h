@@ -126,8 +126,8 @@ typedef struct olbvh_build_options {
    */
   uint32_t fineness;
   /*
-   Not 0: leaves at the surface tell most points beside the mesh without a search, for 4 bytes per leaf and, in thin
-   bodies, up to a third of the time of a build. This pays for pictures and slices.
+   Not 0: leaves at the surface tell most points beside the mesh without a search, for 4 bytes per leaf and up to a
+   third more time of a build. This pays for pictures and slices of thin bodies.
    */
   uint32_t slabs;
   /*

@@ -105,8 +105,8 @@ pub struct BuildOptions {
     /// Whether to store a box per node (24 bytes each). Otherwise boxes follow from the grid.
     pub boxes: bool,
     /// Whether the leaves at the surface get slabs ([`crate::reference::slabs`]), which tell most points beside the mesh
-    /// without a search. They take 4 bytes per leaf and, in thin bodies, up to a third of the time of a build. They pay
-    /// for pictures and slices, which ask for many such points. There are none with [`Lists::All`].
+    /// without a search. They take 4 bytes per leaf, and a build of thin bodies up to a third longer. They pay for pictures
+    /// and slices, which ask for many such points. There are none with [`Lists::All`].
     pub slabs: bool,
     /// Most entries the tree may have; the tree gets coarser until it fits. `Planes` and `Exact` are limited by the
     /// entry count of `Aabb`, which bounds theirs and is known without their tests. `None`: [`usual_capacity`].

@@ -257,7 +257,7 @@ fn check(binding: Binding) {
     let bits = |numbers: &[f32]| numbers.iter().map(|x| x.to_bits()).collect::<Vec<_>>();
     let field = gpu.upload("olbvh.test.field", &values).unwrap();
     for lists in [Lists::All, Lists::Boundary] {
-        let tree = Tree::build(&gpu, &device, &BuildOptions { lists, ..BuildOptions::default() }).unwrap();
+        let tree = Tree::build(&gpu, &device, &BuildOptions { lists, slabs: true, ..BuildOptions::default() }).unwrap();
         let view = device.view();
         let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())));
         let found = run::<9>(&gpu, ANSWERS, &scene, level, &points);

@@ -80,7 +80,7 @@ vec2 range_of(Grid g, vec3 v[4], SlabCell cell, vec3 n) {
     float vol = abs(orient(v[0], v[1], v[2], v[3]));
     if (vol <= 4.0 * rounding) {
         precise vec3 lo = box.lo - beyond, hi = box.hi + beyond;
-        vec3 a = place_in(cell, lo), b = place_in(cell, hi);
+        vec3 a = in_cell(cell, lo), b = in_cell(cell, hi);
         precise vec3 from = n * a, to = n * b;
         vec3 lower = min(from, to), upper = max(from, to);
         precise float least = (lower.x + lower.y) + lower.z, most = (upper.x + upper.y) + upper.z;
@@ -89,7 +89,7 @@ vec2 range_of(Grid g, vec3 v[4], SlabCell cell, vec3 n) {
     float least = 3.40282347e38, most = -3.40282347e38;
     vec3 far = vec3(0.0);
     for (uint k = 0u; k < 4u; ++k) {
-        vec3 y = place_in(cell, v[k]);
+        vec3 y = in_cell(cell, v[k]);
         float d = dot_product(n, y);
         least = min(least, d);
         most = max(most, d);

@@ -43,7 +43,7 @@ void main() {
             located = uint(part == 0u);
             vec3 place = normalise(g, x);
             Sought sought = sought_at(g, x, place, 0.0);
-            uvec2 range = beside(g, slab_scale(g), leaf, finest, place) != 0 ? uvec2(0u) : entry_range(leaf);
+            uvec2 range = side_of_slab(g, slab_scale(g), leaf, finest, place) != 0 ? uvec2(0u) : entry_range(leaf);
             uint begin = min(range.y, range.x + part * PART_LENGTH), end = min(range.y, begin + PART_LENGTH);
             bool inside = false;
             for (; begin < end && !inside; begin += 32u) {

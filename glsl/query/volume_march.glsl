@@ -256,11 +256,11 @@ void pass_empty(Grid g, inout uint work, out uint leaf) {
         uint level = (leaf & MISSING) != 0u ? leaf & ~MISSING : empty_level(g.level, code, top_level, leaf);
         bool in_leaf = level == 0u;
         vec3 scale = frames.at[0].plan.slab_scale.xyz;
-        int side = in_leaf ? beside(g, scale, leaf, finest, normalise(g, at)) : 0;
+        int side = in_leaf ? side_of_slab(g, scale, leaf, finest, normalise(g, at)) : 0;
         if (in_leaf && side == 0) return;
         uint end = SKIP != 0u ? min(state.end, state.check) : state.end;
         uint last = sample_behind(g, origin, direction, inverse_direction, state.next, end, finest, in_leaf ? g.level : level) - 1u;
-        if (in_leaf && beside(g, scale, leaf, finest, normalise(g, sample_at(view, origin, direction, last))) != side) last = state.next;
+        if (in_leaf && side_of_slab(g, scale, leaf, finest, normalise(g, sample_at(view, origin, direction, last))) != side) last = state.next;
         samples += last - state.next;
         state.next = last;
         pass_by();

@@ -3,7 +3,7 @@
 
 #include "shared/boundary_node.glsl"
 #include "shared/candidates.glsl"
-#include "shared/beside.glsl"
+#include "shared/leaf_slab.glsl"
 
 // Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
 // one bit each. Most entries fail this test, and most of the others fail that of `near_of`. Each test is done for all
@@ -41,7 +41,7 @@ uint leaf_to_search(Grid g, vec3 at, vec3 x, float tolerance) {
     if (!near_bounds(g, at)) return NONE;
     uvec3 finest = quantize(g, at);
     uint leaf = find_leaf(g.level, finest);
-    return leaf == NONE || (leaves_room(tolerance) && beside(g, slab_scale(g), leaf, finest, x) != 0) ? NONE : leaf;
+    return leaf == NONE || (leaves_room(tolerance) && side_of_slab(g, slab_scale(g), leaf, finest, x) != 0) ? NONE : leaf;
 }
 
 // The owner, once the whole list has been searched; NONE if there is none.

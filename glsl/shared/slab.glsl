@@ -19,7 +19,7 @@ vec3 slab_scale(Grid g) {
 
 SlabCell slab_cell(Grid g, vec3 scale, uvec3 cell) { return SlabCell(cell_centre(half_cell(g, g.level), cell), scale); }
 
-vec3 place_in(SlabCell cell, vec3 x) {
+vec3 in_cell(SlabCell cell, vec3 x) {
     precise vec3 y = (x - cell.centre) * cell.inverse;
     return y;
 }
@@ -39,6 +39,6 @@ vec3 slab_normal(uint slab) {
 
 // On which side of a slab a point is: -1 below, 1 above, 0 within.
 int side_of(uint slab, SlabCell cell, vec3 x) {
-    uint at = slab_place(dot_product(slab_normal(slab), place_in(cell, x)));
+    uint at = slab_place(dot_product(slab_normal(slab), in_cell(cell, x)));
     return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
 }

@@ -115,8 +115,8 @@ pub struct OlbvhBuildOptions {
     /// Whether leaves become finer than that. 0: no. 1: yes where lists are long, which suits location of points,
     /// slices and overlap. 2: as fine as suits pictures. A recorded build ignores this.
     pub fineness: u32,
-    /// Not 0: leaves at the surface tell most points beside the mesh without a search, for 4 bytes per leaf and, in thin
-    /// bodies, up to a third of the time of a build. This pays for pictures and slices.
+    /// Not 0: leaves at the surface tell most points beside the mesh without a search, for 4 bytes per leaf and up to a
+    /// third more time of a build. This pays for pictures and slices of thin bodies.
     pub slabs: u32,
     /// Maximum number of entries of the tree, which is made coarser until it fits; `olbvh_tree_build` counts those of
     /// `assign` 0 with full lists, which are more. 0: the usual capacity, 64 entries per tetrahedron and at least 2^20,

@@ -25,7 +25,7 @@ pub const ALL_OCTANTS: u32 = 0xff;
 
 /// On an axis with a smaller extent than this in normalised coordinates, a finest cell is less than four steps of the
 /// coordinates wide.
-const COARSE: f32 = two_to(-30);
+pub(super) const COARSE: f32 = two_to(-30);
 
 /// The bits of an entry's word that are its tetrahedron's id; quarters or halves stand above them. All bits if entries
 /// have no quarters: in the paper's lists, and in meshes that need the bits for their ids.

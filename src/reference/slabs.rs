@@ -23,6 +23,7 @@
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;
+use super::quarters::COARSE;
 use super::splits::Splits;
 use super::tet::{Bounds, FACES, Vec3, abs, cross, dot, orient, sub};
 use super::vertices::Vertices;
@@ -42,9 +43,6 @@ const LOOKED_AT: usize = 16;
 /// Bits for the place of a face among these.
 const PLACES: u32 = 4 * LOOKED_AT as u32 - 1;
 
-/// On an axis with a smaller extent than this in normalised coordinates, slabs are not tilted.
-const COARSE: f32 = two_to(-30);
-
 /// The coordinates in a leaf's cell that slabs are given in.
 #[derive(Clone, Copy, Debug)]
 pub struct SlabCell {
@@ -61,13 +59,13 @@ impl SlabCell {
     }
 
     /// A point in normalised coordinates.
-    fn place(&self, x: Vec3) -> Vec3 {
+    fn in_cell(&self, x: Vec3) -> Vec3 {
         per_axis(|c| (x[c] - self.centre[c]) * self.inverse[c])
     }
 
     /// Whether x lies outside of this leaf's slab, so that no tetrahedron owns it.
     pub fn is_outside(&self, slab: u32, x: Vec3) -> bool {
-        let at = place(dot(normal(slab), self.place(x)));
+        let at = place(dot(normal(slab), self.in_cell(x)));
         at < (slab & 255) || at > (slab >> 8 & 255)
     }
 }
@@ -162,12 +160,12 @@ impl Fit<'_> {
         let rounding = ((size[0] * size[1]) * size[2]) * two_to(-18);
         let volume = orient(a, b, c, d).abs();
         if volume <= 4.0 * rounding {
-            let (a, b) = (cell.place(sub(lo, beyond)), cell.place(per_axis(|c| hi[c] + beyond[c])));
+            let (a, b) = (cell.in_cell(sub(lo, beyond)), cell.in_cell(per_axis(|c| hi[c] + beyond[c])));
             let side = |of: fn(f32, f32) -> f32| per_axis(|c| of(n[c] * a[c], n[c] * b[c]));
             let ([x, y, z], [p, q, r]) = (side(f32::min), side(f32::max));
             return enlarged((x + y) + z, (p + q) + r, dot(abs(n), per_axis(|c| a[c].abs().max(b[c].abs()))), 0.0);
         }
-        let y = v.map(|v| cell.place(v));
+        let y = v.map(|v| cell.in_cell(v));
         let d = y.map(|y| dot(n, y));
         let far = dot(abs(n), per_axis(|k| y.iter().fold(0.0, |far: f32, y| far.max(y[k].abs()))));
         let (least, most) = (d[0].min(d[1]).min(d[2].min(d[3])), d[0].max(d[1]).max(d[2].max(d[3])));

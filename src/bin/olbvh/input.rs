@@ -128,11 +128,11 @@ fn bytes(text: &str) -> Result<u64, String> {
 
 impl TreeArgs {
     /// The checked options of a build for queries. Leaves are as fine as suits the queries, unless the arguments say
-    /// how fine they should be; they have slabs if many queries lie beside the mesh.
-    pub fn suited(&self, fineness: Fineness, slabs: bool) -> Outcome<BuildOptions> {
+    /// how fine they should be.
+    pub fn suited(&self, fineness: Fineness) -> Outcome<BuildOptions> {
         let options = self.options()?;
         let by_default = options.alpha == 0.0 && options.level.is_none() && options.lists == Lists::Boundary && options.budget.is_none();
-        Ok(BuildOptions { fineness: if by_default { fineness } else { Fineness::Alpha }, slabs, ..options })
+        Ok(BuildOptions { fineness: if by_default { fineness } else { Fineness::Alpha }, ..options })
     }
 
     /// The checked options of a build.

@@ -106,7 +106,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
-    let options = args.tree.suited(Fineness::Points, false)?;
+    let options = args.tree.suited(Fineness::Points)?;
     let engine = engine::open(common)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;

@@ -83,7 +83,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
 impl Args {
     /// The checked options of both trees.
     fn options(&self, format: OutputFormat) -> Outcome<BuildOptions> {
-        let options = self.tree.suited(Fineness::Points, false)?;
+        let options = self.tree.suited(Fineness::Points)?;
         if !self.pairs {
             return Ok(options);
         }

@@ -12,7 +12,7 @@ use olbvh::blocks::{Picture, RenderRequest};
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
-use olbvh::options::Fineness;
+use olbvh::options::{BuildOptions, Fineness};
 use olbvh::render::camera::{CameraSpec, HELP};
 use olbvh::render::clip;
 use olbvh::render::maps::MAPS;
@@ -130,7 +130,7 @@ struct Iso(Vec<f32>);
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
-    let mut options = args.tree.suited(Fineness::Pictures, true)?;
+    let mut options = BuildOptions { slabs: true, ..args.tree.suited(Fineness::Pictures)? };
     let legend = args.legend()?;
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;

@@ -11,7 +11,7 @@ use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, SliceRequest};
 use olbvh::formats::{OutputFormat, printable};
 use olbvh::mesh::{Bounds, Field, On, valid_grid};
-use olbvh::options::Fineness;
+use olbvh::options::{BuildOptions, Fineness};
 use olbvh::render::TransferFunction;
 use olbvh::render::transfer::DEFAULT_MAP;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally, VoxelGrid};
@@ -107,7 +107,7 @@ const FORMATS: [OutputFormat; 4] = [OutputFormat::Npy, OutputFormat::Vti, Output
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let format = args.format()?;
     let colors = input::transfer(args.tf.as_deref().unwrap_or(DEFAULT_MAP))?;
-    let options = args.tree.suited(Fineness::Points, true)?;
+    let options = BuildOptions { slabs: true, ..args.tree.suited(Fineness::Points)? };
     let engine = engine::open(common)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;

@@ -72,6 +72,8 @@ fn a_stated_limit_gives_the_deepest_tree_that_fits() {
     let fine = OlbvhBuildOptions { level: 6, ..olbvh_default_build_options() };
     let level = |capacity: u32| status(gpu, &mesh, 0, OlbvhBuildOptions { capacity, ..fine }).level;
     assert_eq!([level(1 << 20), level(3 << 20)], [5, 6]);
+    let bytes = |slabs: u32| made(|out| olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { slabs, ..fine }), out)).memory;
+    assert!(bytes(1) > bytes(0), "slabs take memory");
     let memory = |budget: u64| made(|out| olbvh_plan_measure(gpu, &plan(&mesh, 0, OlbvhBuildOptions { budget, ..fine }), out)).memory;
     assert!(memory(1 << 30) == memory(1 << 40) && memory(1 << 40) < 1 << 24);
     // Fewer entries than the root may list.
