@@ -1,7 +1,9 @@
 //! Compiles every kernel of `glsl/` in its three forms, reflects it, and generates its Rust side into `OUT_DIR`:
 //! `kernels.rs` (argument structs, specialization constants, access per buffer, SPIR-V), `layout.rs` (shared structs),
-//! and `olbvh.glsl` for the shaders of other programs.
+//! `constants.rs`, and `olbvh.glsl` for the shaders of other programs.
 
+#[path = "build/constants.rs"]
+mod constants;
 #[path = "build/export.rs"]
 mod export;
 #[path = "build/reflect.rs"]
@@ -52,6 +54,7 @@ fn generate(out: &Path) -> Result<(), String> {
         compile(FOREIGN, "foreign.comp", form, false)?;
     }
     write(&out.join("olbvh.glsl"), &export::export(Path::new(GLSL))?)?;
+    write(&out.join("constants.rs"), &constants::source(Path::new(GLSL))?)?;
     write(&out.join("layout.rs"), &layout_source()?)
 }
 

@@ -89,7 +89,7 @@ uint olbvh_LISTS;
 
 // Quantization and Morton codes (SPEC 2.1). Twin of src/grid.rs; the operations and their order are the same.
 
-const uint olbvh_MAX_LEVEL = 10u;
+const uint olbvh_MAX_LEVEL = 10u; // Level of the finest grid, and number of bits per axis of its 32-bit Morton codes.
 
 float olbvh_two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 
@@ -444,7 +444,7 @@ uvec3 olbvh_vertex_cell(uint v) { return olbvh_unpack_cell(floatBitsToUint(olbvh
 olbvh_Tet olbvh_load_tet(uvec4 ids) { return olbvh_make_tet(ids, olbvh_vertex(ids.x), olbvh_vertex(ids.y), olbvh_vertex(ids.z), olbvh_vertex(ids.w)); }
 // The quarters of its leaf's cell that an entry is near, one bit each, axis by axis, in the top bits of its word in P;
 // or the halves, where ids leave fewer bits. Twin of src/reference/quarters.rs, which explains them. Needs grid.glsl.
-const uint olbvh_ALL_OCTANTS = 0xffu;
+const uint olbvh_ALL_OCTANTS = 0xffu; // The mask of all octants.
 
 uint olbvh_id_bits(olbvh_Grid g) { return uint(bitCount(g.ids)); }
 
@@ -569,7 +569,7 @@ vec3 olbvh_cell_centre(vec3 h, uvec3 cell) {
     return b;
 }
 
-const uint olbvh_EVERYTHING = 0xff00u; // a slab that contains every point
+const uint olbvh_EVERYTHING = 0xff00u; // A slab that contains every point.
 
 // The coordinates in a leaf's cell that slabs are given in.
 struct olbvh_SlabCell {
@@ -667,15 +667,20 @@ uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
 
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
 // and their order are the same. Needs candidates.glsl, cells and neighbours.
-const uint olbvh_STAR = 128u;    // most tetrahedra of a star; see corners.glsl for larger ones
-const uint olbvh_STEPS = 512u;   // most steps of part 1
-const uint olbvh_HINTED = 16u;   // most steps of a stride from a hint
-const uint olbvh_STRIDE = 64u;   // most steps of a stride through a leaf
-const uint olbvh_LEG = 1024u;    // most steps along one segment
-const uint olbvh_DETOURS = 8u;   // points of the cell to walk by, the first its centre
-const uint olbvh_ARRIVALS = 2u;  // stars that part 1 searches
-const uint olbvh_ROUND = olbvh_STAR;   // most steps of part 1 after the first one
-const float olbvh_GAP = -7.62939453125e-6; // -2^-17
+const uint olbvh_STAR = 128u;   // Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see corners.glsl.
+const uint olbvh_STEPS = 512u;  // Most steps of part 1.
+const uint olbvh_HINTED = 16u;  // Most steps of a stride from a hint.
+const uint olbvh_STRIDE = 64u;  // Most steps of a stride through a leaf.
+const uint olbvh_LEG = 1024u;   // Most steps along one segment.
+const uint olbvh_DETOURS = 8u;  // Points of the cell to go by in parts 2 and 3; the first one is the centre.
+const uint olbvh_ARRIVALS = 2u; // Stars that part 1 searches.
+// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to
+// its star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if there
+// is one.
+const uint olbvh_ROUND = olbvh_STAR;
+// -2^-17. With a smallest barycentric coordinate of at least this, x lies in a gap between tetrahedra that is due to
+// rounding, and the nearest tetrahedron owns it.
+const float olbvh_GAP = -7.62939453125e-6;
 
 // Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
 // vertices and neighbours.

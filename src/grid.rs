@@ -3,7 +3,10 @@
 //! Every operation here is an integer operation or a correctly rounded subtraction, multiplication or floor, in the
 //! same order as in the kernels, so results are equal bit for bit on every device.
 
+use crate::layout::constants::check_cells::LIMIT;
+
 pub use crate::layout::Grid;
+pub use crate::layout::constants::grid::MAX_LEVEL;
 
 /// 2^n for |n| ≤ 126.
 pub(crate) const fn two_to(n: i32) -> f32 {
@@ -16,11 +19,9 @@ pub(crate) fn per_axis<T>(mut of: impl FnMut(usize) -> T) -> [T; 3] {
     [of(0), of(1), of(2)]
 }
 
-/// Level of the finest grid, which is also the number of bits per axis of its 32-bit Morton codes.
-pub const MAX_LEVEL: u32 = 10;
 /// Coordinates of this magnitude and beyond count as infinite, so that differences and scales stay in the range of
 /// normal numbers.
-pub const COORDINATE_LIMIT: f32 = two_to(125);
+pub const COORDINATE_LIMIT: f32 = f32::from_bits(LIMIT);
 /// An axis whose extent is shorter than this (2^-103) is flat.
 pub const MIN_EXTENT: f32 = two_to(-103);
 /// Normalised coordinates are multiples of 2^-42 and below 2^41, so that products of three differences neither overflow

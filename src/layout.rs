@@ -1,9 +1,15 @@
-//! Structs shared by host and device, and how their words are read. The structs are generated from `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection.
+//! Structs and constants shared by host and device, and how their words are read. The structs are generated from
+//! `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection, the constants from all files of `glsl`.
 
 #![allow(clippy::doc_markdown)]
 
-/// No tetrahedron: no neighbour, no owner.
-pub const NONE: u32 = u32::MAX;
+pub use constants::kernel::NONE;
+
+/// The constants of the kernels.
+#[allow(dead_code, clippy::unreadable_literal, clippy::excessive_precision)] // as GLSL writes them, and all of them
+pub(crate) mod constants {
+    include!(concat!(env!("OUT_DIR"), "/constants.rs"));
+}
 
 /// A 64-bit number from the two words of a struct, the lower word first.
 pub(crate) const fn wide([low, high]: [u32; 2]) -> u64 {

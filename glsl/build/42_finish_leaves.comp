@@ -27,8 +27,8 @@ BUFFER(10, READ_WRITE, uint, masks) // zeroed; one byte per node
 #include "shared/quarters.glsl"
 #include "shared/vertices.glsl"
 
-const uint MAX_TOUCH_TESTS = 16u;
-const uint MAX_LIST_FOR_OCTANTS = 16384u;
+const uint MAX_TOUCH_TESTS = 16u; // Entries of a leaf without boundary tetrahedra that are tested for touching its cell.
+const uint MAX_LIST_FOR_OCTANTS = 16384u; // Leaves with longer lists get a mask of all octants.
 
 // Whether one of the first MAX_TOUCH_TESTS tetrahedra of a leaf touches its cell.
 bool touched(Grid g, uint begin, uint end, uint code) {

@@ -23,7 +23,7 @@ BUFFER(8, READ_WRITE, uint, ranges)
 #include "shared/cells.glsl"
 #include "shared/children.glsl"
 
-const uint SPAN = 4u;
+const uint SPAN = 4u; // Most nodes along an axis to which a tetrahedron adds its values.
 
 bool is_finite(uint bits) { return (bits & 0x7f800000u) != 0x7f800000u; }
 

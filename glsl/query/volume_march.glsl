@@ -36,8 +36,8 @@ DrawUniforms plan;
 #include "shared/skip.glsl"
 #include "shared/held.glsl"
 
-const uint WALK = 6u;   // steps of a walk across faces before the structure is searched
-const uint BURST = 32u; // passes along walks before rays that wait for the structure are served
+const uint WALK = 6u;   // Most steps of a walk across faces before the structure is searched.
+const uint BURST = 32u; // Passes along walks before rays that wait for the structure are served.
 
 // The ray, and its state.
 vec3 origin, direction, inverse_direction, halfway;

@@ -1,7 +1,7 @@
 // Vertices of so many tetrahedra that a star could not hold them (SPEC 2.3). The tetrahedra of such a crowded vertex
 // count as boundary, so it lies in leaves with whole lists, and no walk ends there. Twin of src/reference/corners.rs,
 // which explains the bounds; the operations and their order are the same. Needs grid.glsl and tet.glsl.
-const uint MOST_THIN = 46u; // thin corners at a vertex that is not crowded
+const uint MOST_THIN = 46u; // Most thin corners at a vertex that is not crowded.
 
 float squared_length(vec3 a, vec3 b, int e) {
     precise vec3 edge = ceil(abs(b - a) * two_to(20 - e)) * two_to(-20);

@@ -1,8 +1,8 @@
 // A picture as its kernels read it: the host's view, what the device computes from it, the transfer function, and the
 // top of the octree.
 
-const uint TABLE = 1024u; // entries of the transfer function
-const uint TOP_LEVEL = 4u; // level of the octree from which samples descend, unless leaves are higher
+const uint TABLE = 1024u; // Entries of the transfer function.
+const uint TOP_LEVEL = 4u; // Level of the octree from which samples descend, unless leaves are higher.
 const uint MISSING = 0x80000000u;
 
 struct Frame {

@@ -1,6 +1,6 @@
 // Quantization and Morton codes (SPEC 2.1). Twin of src/grid.rs; the operations and their order are the same.
 
-const uint MAX_LEVEL = 10u;
+const uint MAX_LEVEL = 10u; // Level of the finest grid, and number of bits per axis of its 32-bit Morton codes.
 
 float two_to(int n) { return uintBitsToFloat(uint(n + 127) << 23); }
 

@@ -39,7 +39,7 @@
 
 #include "shared/records.glsl"
 
-const uint NONE = 0xffffffffu;
+const uint NONE = 0xffffffffu; // No tetrahedron: no neighbour, no owner.
 
 #ifndef OLBVH_RAY_TRACING // ray tracing launches have no workgroups
 layout(constant_id = 0) const uint WORKGROUP = 64; // invocations per workgroup

@@ -1,6 +1,6 @@
 // The quarters of its leaf's cell that an entry is near, one bit each, axis by axis, in the top bits of its word in P;
 // or the halves, where ids leave fewer bits. Twin of src/reference/quarters.rs, which explains them. Needs grid.glsl.
-const uint ALL_OCTANTS = 0xffu;
+const uint ALL_OCTANTS = 0xffu; // The mask of all octants.
 
 uint id_bits(Grid g) { return uint(bitCount(g.ids)); }
 

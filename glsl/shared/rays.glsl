@@ -31,8 +31,8 @@ void make_ray(ViewUniforms view, uvec2 pixel, out vec3 origin, out vec3 directio
     direction = d;
 }
 
-const float MOST = 1e30;   // larger divisors of a depth count as infinite, so that their reciprocals are normal
-const float LEAST = 1e-20; // smaller components of a direction count as this, so that reciprocals are finite
+const float MOST = 1e30;   // Larger divisors of a depth count as infinite, so that their reciprocals are normal.
+const float LEAST = 1e-20; // Smaller components of a ray's direction count as this, so that reciprocals are finite.
 
 vec3 inverse_of(vec3 direction) {
     vec3 r;

@@ -2,7 +2,7 @@
 // explains them; the operations and their order are the same. Needs grid.glsl and tet.glsl.
 #include "shared/centre.glsl"
 
-const uint EVERYTHING = 0xff00u; // a slab that contains every point
+const uint EVERYTHING = 0xff00u; // A slab that contains every point.
 
 // The coordinates in a leaf's cell that slabs are given in.
 struct SlabCell {

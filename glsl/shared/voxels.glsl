@@ -1,7 +1,7 @@
 // Voxels of a stack of layers. Twin of src/slicing. Needs grid.glsl.
 const uint SLICE_PENDING = 0xfffffffeu; // the centre lies in no tetrahedron, and the box has not been tested yet
 const uint NAN = 0x7fc00000u; // value of an empty voxel
-const uint SLICE_TOUCHED = 0x80000000u; // added to the owner of a voxel that is only touched
+const uint SLICE_TOUCHED = 0x80000000u; // Added to the owner of a voxel that is only touched.
 
 // Row number i of the band: its number within its layer, and the layer.
 uvec2 voxel_row(SliceUniforms plan, uint i) {

@@ -1,14 +1,19 @@
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
 // and their order are the same. Needs candidates.glsl, cells and neighbours.
-const uint STAR = 128u;    // most tetrahedra of a star; see corners.glsl for larger ones
-const uint STEPS = 512u;   // most steps of part 1
-const uint HINTED = 16u;   // most steps of a stride from a hint
-const uint STRIDE = 64u;   // most steps of a stride through a leaf
-const uint LEG = 1024u;    // most steps along one segment
-const uint DETOURS = 8u;   // points of the cell to walk by, the first its centre
-const uint ARRIVALS = 2u;  // stars that part 1 searches
-const uint ROUND = STAR;   // most steps of part 1 after the first one
-const float GAP = -7.62939453125e-6; // -2^-17
+const uint STAR = 128u;   // Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see corners.glsl.
+const uint STEPS = 512u;  // Most steps of part 1.
+const uint HINTED = 16u;  // Most steps of a stride from a hint.
+const uint STRIDE = 64u;  // Most steps of a stride through a leaf.
+const uint LEG = 1024u;   // Most steps along one segment.
+const uint DETOURS = 8u;  // Points of the cell to go by in parts 2 and 3; the first one is the centre.
+const uint ARRIVALS = 2u; // Stars that part 1 searches.
+// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to
+// its star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if there
+// is one.
+const uint ROUND = STAR;
+// -2^-17. With a smallest barycentric coordinate of at least this, x lies in a gap between tetrahedra that is due to
+// rounding, and the nearest tetrahedron owns it.
+const float GAP = -7.62939453125e-6;
 
 #include "shared/stride.glsl"
 

@@ -9,13 +9,10 @@
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
 use crate::gpu::{AccelerationStructure, Arena, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
-use crate::grid::two_to;
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
+use crate::layout::constants::locate_by_ray::SCALE;
 use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput, numbered};
-
-/// Factor from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
-const SCALE: f32 = two_to(-40);
 
 /// The way in which rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

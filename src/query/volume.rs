@@ -23,6 +23,7 @@ use crate::kernels::{
     LbvhIntervals, LbvhIntervalsSpec, LbvhMarch, LbvhMarchSpec, VolumeDepths, VolumeDepthsSpec, VolumeIntervals, VolumeIntervalsSpec,
     VolumeMarch, VolumeMarchSpec, VolumePlan, VolumePlanSpec,
 };
+use crate::layout::constants::frame::TOP_LEVEL;
 use crate::layout::{DrawUniforms, RayState, RenderStatus, ViewUniforms};
 use crate::mesh::On;
 use crate::primitives::Count;
@@ -33,8 +34,8 @@ use std::mem::offset_of;
 const BUDGET: u32 = 1024;
 /// Nodes on the short stack of the traversal.
 const STACK: u32 = 8;
-/// Cells of `TOP_LEVEL` in `glsl/shared/frame.glsl`.
-const TOP_CELLS: usize = 1 << (3 * 4);
+/// Cells of [`TOP_LEVEL`].
+const TOP_CELLS: usize = 1 << (3 * TOP_LEVEL);
 /// Side, in pixels, of the square blocks that a picture is drawn in.
 const BLOCK: u32 = 8;
 

@@ -19,8 +19,7 @@ use crate::mesh::Mesh;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Most thin corners at a vertex that is not crowded.
-pub const MOST_THIN: u32 = 46;
+pub use crate::layout::constants::corners::MOST_THIN;
 
 /// Whether the corner at each vertex, in ascending index, is thin.
 pub fn thin_corners(tet: &Tet) -> [bool; 4] {

@@ -10,6 +10,7 @@ use super::tet::sub;
 use super::vertices::Vertices;
 use crate::grid::{Box6, Grid, canonical, two_to, unmorton};
 use crate::layout::bit;
+use crate::layout::constants::finish_leaves::{MAX_LIST_FOR_OCTANTS, MAX_TOUCH_TESTS};
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
@@ -37,9 +38,6 @@ pub fn cell_side(grid: &Grid, c: usize, level: u32, k: u32) -> f32 {
     }
 }
 
-/// Number of entries of a leaf without boundary tetrahedra that are tested for touching its cell.
-pub const MAX_TOUCH_TESTS: usize = 16;
-
 /// Boundary flag of a leaf. It is 0 only if the cell lies entirely within the mesh (SPEC 2.3). It is set if the leaf
 /// lists a boundary tetrahedron. It is also set if none of the first [`MAX_TOUCH_TESTS`] tetrahedra touches the cell:
 /// the bounding box of an inner tetrahedron can reach out of the mesh into cells where no boundary tetrahedron is
@@ -55,18 +53,15 @@ pub fn flag(listed: &[u32], code: u32, lists: Lists, mesh: &Mesh, topology: &Top
     let centre = cell_centre(half, unmorton(code));
     let axes = [[half[0], 0.0, 0.0], [0.0, half[1], 0.0], [0.0, 0.0, half[2]]];
     let touches = |&p: &u32| box_touches(&vertices.tet(mesh.tets[p as usize]).v.map(|v| sub(v, centre)), &axes, [0.0; 3]);
-    !listed.is_empty() && !listed.iter().take(MAX_TOUCH_TESTS).any(touches)
+    !listed.is_empty() && !listed.iter().take(MAX_TOUCH_TESTS as usize).any(touches)
 }
-
-/// Leaves with longer lists than this get a mask of all octants.
-pub const MAX_LIST_FOR_OCTANTS: usize = 16_384;
 
 /// The mask of a leaf with entries `listed`. Bit d says that one of the entries is near the octant of its cell with the
 /// 3-bit Morton digit d. In the other octants no point has an owner (for tolerances below 2^-12). The mask has all
 /// octants if the leaf has no boundary tetrahedra, if its list is long, or if entries have no quarters; it is 0 without
 /// entries.
 pub fn octants(listed: Range<usize>, boundary: bool, quarters: &[u16], grid: &Grid) -> u32 {
-    if !boundary || quarters.is_empty() || listed.len() > MAX_LIST_FOR_OCTANTS {
+    if !boundary || quarters.is_empty() || listed.len() > MAX_LIST_FOR_OCTANTS as usize {
         return if listed.is_empty() { 0 } else { ALL_OCTANTS };
     }
     listed.fold(0, |mask, i| mask | octants_near(grid, quarters[i].into()))

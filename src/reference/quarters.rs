@@ -20,8 +20,7 @@ use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
 
-/// The mask of all octants.
-pub const ALL_OCTANTS: u32 = 0xff;
+pub use crate::layout::constants::quarters::ALL_OCTANTS;
 
 /// On an axis with a smaller extent than this in normalised coordinates, a finest cell is less than four steps of the
 /// coordinates wide.

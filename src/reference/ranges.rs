@@ -17,8 +17,7 @@ use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU32, Ordering::Relaxed};
 
-/// Most nodes along an axis to which a tetrahedron adds its values.
-pub const SPAN: u32 = 4;
+pub use crate::layout::constants::scatter_ranges::SPAN;
 
 /// An integer key that sorts like the float.
 fn ordered(x: f32) -> u32 {

@@ -29,19 +29,11 @@ use super::tet::{Bounds, FACES, Vec3, abs, cross, dot, orient, sub};
 use super::vertices::Vertices;
 use crate::grid::{Grid, per_axis, reciprocal, two_to, unmorton};
 use crate::layout::NONE;
+use crate::layout::constants::fit_slabs::{LOOKED_AT, MAX_LIST_FOR_SLAB, PLACES};
 use crate::mesh::Mesh;
 use rayon::prelude::*;
 
-/// A slab that contains every point.
-pub const EVERYTHING: u32 = 255 << 8;
-
-/// Leaves with longer lists than this have no slab.
-pub const MAX_LIST_FOR_SLAB: usize = 16_384;
-
-/// Tetrahedra of a list whose faces may give the normal.
-const LOOKED_AT: usize = 16;
-/// Bits for the place of a face among these.
-const PLACES: u32 = 4 * LOOKED_AT as u32 - 1;
+pub use crate::layout::constants::slab::EVERYTHING;
 
 /// The coordinates in a leaf's cell that slabs are given in.
 #[derive(Clone, Copy, Debug)]
@@ -112,7 +104,7 @@ pub(super) struct Fit<'a> {
 impl Fit<'_> {
     /// The slab of a leaf with this list, boundary flag and Morton code.
     pub(super) fn slab(&self, listed: &[u32], boundary: bool, code: u32) -> u32 {
-        if !boundary || listed.len() > MAX_LIST_FOR_SLAB {
+        if !boundary || listed.len() > MAX_LIST_FOR_SLAB as usize {
             return EVERYTHING;
         }
         let cell = SlabCell::new(self.grid, unmorton(code));
@@ -129,7 +121,7 @@ impl Fit<'_> {
     /// The normal of the largest boundary face of the first listed tetrahedra.
     fn largest_face(&self, listed: &[u32], cell: &SlabCell) -> Option<Vec3> {
         let (mut largest, mut normal) = (PLACES, None);
-        for (i, &t) in listed.iter().take(LOOKED_AT).enumerate() {
+        for (i, &t) in listed.iter().take(LOOKED_AT as usize).enumerate() {
             let v = self.corners(t);
             for (f, [a, b, c]) in FACES.into_iter().enumerate() {
                 if self.topology.neighbours[t as usize][f] != NONE {

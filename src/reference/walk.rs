@@ -20,27 +20,13 @@ use super::candidates::Best;
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::grid::{per_axis, reciprocal, two_to};
 use crate::layout::NONE;
+use crate::layout::constants::walk::{self as constants, GAP, ROUND};
 use crate::mesh::{Field, Mesh, On};
 
+pub use crate::layout::constants::walk::{DETOURS, HINTED, LEG, STEPS, STRIDE};
+
 /// Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see [`super::corners`].
-pub const STAR: usize = 128;
-/// Most steps of part 1.
-pub const STEPS: u32 = 512;
-/// Most steps of a stride from a hint.
-pub const HINTED: u32 = 16;
-/// Most steps of a stride through a leaf.
-pub const STRIDE: u32 = 64;
-/// Most steps along one segment.
-pub const LEG: u32 = 1024;
-/// Points of the cell to go by in parts 2 and 3; the first one is the centre.
-pub const DETOURS: u32 = 8;
-/// Most steps of part 1 after a star without an owner. Some tetrahedra round an edge may be too far from x to belong to
-/// its star, which then falls into parts; so the walk goes on until it comes to the tetrahedron that contains x, if
-/// there is one.
-const ROUND: u32 = STAR as u32;
-/// With a smallest barycentric coordinate of at least this (−2^-17), x lies in a gap between tetrahedra that is due to
-/// rounding, and the nearest tetrahedron owns it.
-const GAP: f32 = -two_to(-17);
+pub const STAR: usize = constants::STAR as usize;
 
 /// The cell of a leaf in normalised coordinates.
 #[derive(Clone, Copy, Debug)]

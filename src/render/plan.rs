@@ -12,12 +12,13 @@ use super::{
 };
 use crate::error::{Error, Result};
 use crate::grid::{canonical, reciprocal, two_to};
+use crate::layout::constants::frame::TABLE;
 use crate::layout::{Grid, ViewUniforms};
 use crate::mesh::{Bounds, Field, Mesh, On};
 use glam::DVec3;
 
 /// Entries of the sampled transfer function.
-pub const TABLE_SIZE: usize = 1024;
+pub const TABLE_SIZE: usize = TABLE as usize;
 /// Smallest step as a part of the diagonal, which keeps sample numbers exact in single precision.
 const MIN_STEP: f64 = 1.0 / 65_536.0;
 /// Largest distance of the eye, in diagonals: rays start near the mesh, but where is known to 2^-53 of that distance.

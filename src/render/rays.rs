@@ -2,17 +2,14 @@
 
 use super::inverse_sqrt;
 use crate::grid::reciprocal;
+use crate::layout::constants::rays::{self as constants, MOST};
 use glam::DVec3;
 
-/// Smaller components of a ray's direction count as this, so that reciprocals are finite.
-pub const LEAST: f32 = 1e-20;
-
-/// Larger divisors of a depth count as infinite, so that their reciprocals are normal.
-const MOST: f32 = 1e30;
+pub use crate::layout::constants::rays::LEAST;
 
 /// Limit on the sample numbers of a ray: beyond it `k + ½` is no longer exact in single precision. The kernels store
 /// flags from bit 30 on.
-pub const MAX_SAMPLES: u32 = 1 << 23;
+pub const MAX_SAMPLES: u32 = constants::MAX_SAMPLES as u32;
 
 /// The ray of each pixel, as six vectors, and what values of a depth buffer mean on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -6,6 +6,7 @@ use crate::build::Tree;
 use crate::error::Result;
 use crate::gpu::{Arena, Buffer, Gpu};
 use crate::grid::CellRange;
+use crate::layout::constants::voxels::SLICE_TOUCHED;
 use crate::layout::{Grid, RunState, SliceStatus};
 use crate::mesh::On;
 use crate::query::searched::Searched;
@@ -15,8 +16,6 @@ use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHE
 /// Bytes of device memory per voxel of a band, including transfers but not runs, and a fixed reserve.
 const PER_VOXEL: u64 = 40;
 const RESERVE: u64 = 1 << 14;
-/// Added to the owner of a touched voxel; see `glsl/shared/voxels.glsl`.
-const TOUCHED_BIT: u32 = 1 << 31;
 
 /// Numbers of voxels, and what slicing a stack cost.
 #[derive(Clone, Copy, Debug, Default)]
@@ -108,10 +107,10 @@ impl<'a> Slicing<'a> {
         };
         let kind = |a: u32| match a {
             u32::MAX => EMPTY,
-            a if a & TOUCHED_BIT != 0 => TOUCHED,
+            a if a & SLICE_TOUCHED != 0 => TOUCHED,
             _ => INSIDE,
         };
-        let owner = |a: u32| if a == u32::MAX { a } else { a & !TOUCHED_BIT };
+        let owner = |a: u32| if a == u32::MAX { a } else { a & !SLICE_TOUCHED };
         let kinds = answers.iter().map(|&a| kind(a)).collect();
         Ok(Band { rows, values, kinds, owners: answers.into_iter().map(owner).collect() })
     }

@@ -3,12 +3,10 @@
 use super::Drawing;
 use super::skip::{Skips, inverse_of};
 use crate::grid::{canonical, per_axis, reciprocal};
+use crate::layout::constants::volume_march::WALK;
 use crate::reference::tet::Sides;
 use crate::reference::walk::{Stand, way_before, weighed};
 use crate::render::{Lighting, Plan};
-
-/// Most tetrahedra of a walk across faces before the tree is searched.
-const WALK: u32 = 6;
 
 /// Marches rays, one after the other.
 pub struct Marcher<'a> {
