@@ -23,7 +23,7 @@ fn check(gpu: &Gpu, name: &str, mesh: &Mesh, trees: &[(f32, Assign)], settings: 
     ];
     let mut touched = 0;
     for &(alpha, assign) in trees {
-        let options = BuildOptions { alpha, assign, ..BuildOptions::default() };
+        let options = BuildOptions { alpha, assign, slabs: true, ..BuildOptions::default() };
         let tree = Tree::build(gpu, &device, &options).unwrap();
         let host = build(mesh, &topology, &options).unwrap();
         let three = |v: [f32; 4]| [v[0], v[1], v[2]];
@@ -92,6 +92,29 @@ fn by_address() {
     assert!(touched > 1000, "{touched}");
     let messages = gpu.validation_messages();
     assert!(messages.is_empty(), "{messages:#?}");
+}
+
+/// Voxels so small that most of those beside the mesh lie in a few leaves, whose octants and slabs decide about them.
+#[test]
+fn voxels_smaller_than_leaves() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/bracket_50k.vtu");
+    let mesh = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap().mesh;
+    let side = |c: usize, of: fn(f32, f32) -> f32| f64::from(mesh.points.iter().map(|p| p[c]).reduce(of).unwrap()) + mesh.origin[c];
+    let through = |plane: Plane, part: f64, width: u32| {
+        let (lo, hi) = match plane {
+            Plane::Axis(c) => (side(c, f32::min), side(c, f32::max)),
+            Plane::Normal(_) => (0.0, 40.0),
+        };
+        SliceSettings { plane, at: Some(lo + part * (hi - lo)), layers: 2, size: [width, 0], ..SliceSettings::default() }
+    };
+    let planes = [Plane::Axis(0), Plane::Axis(1), Plane::Axis(2), Plane::Normal([0.3, -0.2, 1.0])];
+    let settings: Vec<_> = planes
+        .iter()
+        .flat_map(|&plane| [(0.08, 40), (0.31, 75), (0.5, 150), (0.77, 400)].map(|(part, width)| through(plane, part, width)))
+        .collect();
+    let touched = check(&gpu, "bracket_50k", &mesh, &[(0.0, Assign::Planes), (1.0, Assign::Exact)], &settings);
+    assert!(touched > 10_000, "{touched}");
 }
 
 #[test]

@@ -67,7 +67,7 @@ bool largest_face(Grid g, uint first, uint last, SlabCell cell, out uint bits) {
 
 // A range of distances, enlarged by `by` and for the rounding of distances whose summands amount to `far`.
 vec2 enlarged(float least, float most, float far, float by) {
-    precise float more = by + (far * two_to(-20) + two_to(-10));
+    precise float more = by + (far * two_to(-16) + two_to(-10));
     precise vec2 r = vec2(least - more, most + more);
     return r;
 }

@@ -99,21 +99,38 @@ bool is_still_empty(Grid g, vec3 at) {
     return reached_cells(g, at, plan.reach.xyz, lo, hi) && within_empty(lo, hi);
 }
 
-// Whether nothing can touch the voxel at `at`, whose centre lies in no tetrahedron: it lies outside of the bounds, or
-// in one empty octree cell.
-bool is_empty(Grid g, vec3 at) {
+// Whether the voxel at x, which meets the finest-grid cells [lo, hi], meets few leaves, and is beside their slabs.
+bool is_beside_slabs(Grid g, vec3 x, uvec3 lo, uvec3 hi) {
+    uint shift = MAX_LEVEL - g.level;
+    uvec3 first = lo >> shift, last = hi >> shift;
+    if (g.slabs == 0u || any(greaterThan(last - first, uvec3(1u)))) return false;
+    vec3 scale = slab_scale(g), h[3] = vec3[3](plan.half0.xyz, plan.half1.xyz, plan.half2.xyz);
+    for (uvec3 cell = first; cell.z <= last.z;) {
+        uint leaf = find_node(0u, 0u, g.level, morton(cell));
+        bool near = leaf != NONE && is_boundary_node(leaf);
+        if (near && !is_box_beside(leaf_slab(g, leaf), slab_cell(g, scale, cell), x, h)) return false;
+        bool row_ends = cell.x == last.x, layer_ends = row_ends && cell.y == last.y;
+        cell = uvec3(row_ends ? first.x : cell.x + 1u, layer_ends ? first.y : cell.y + uint(row_ends), cell.z + uint(layer_ends));
+    }
+    return true;
+}
+
+// Whether nothing can touch the voxel at `at`, x in normalised coordinates, whose centre lies in no tetrahedron: it lies
+// outside of the bounds, in one empty octree cell, or beside the slabs of its leaves.
+bool is_empty(Grid g, vec3 at, vec3 x) {
     uvec3 lo, hi;
     if (!reached_cells(g, at, plan.reach.xyz, lo, hi)) return true;
     uvec3 cell = quantize(g, at);
     uint leaf = 0u, level = empty_level(g.level, morton(cell), 0u, leaf), shift = MAX_LEVEL - level;
-    if (level == 0u) return false;
-    empty_lo = cell >> shift << shift;
-    empty_hi = empty_lo + (1u << shift) - 1u;
-    return within_empty(lo, hi);
+    if (level > 0u) {
+        empty_lo = cell >> shift << shift;
+        empty_hi = empty_lo + (1u << shift) - 1u;
+    }
+    return (level > 0u && within_empty(lo, hi)) || is_beside_slabs(g, x, lo, hi);
 }
 #else
 bool is_still_empty(Grid g, vec3 at) { return false; }
-bool is_empty(Grid g, vec3 at) { return false; }
+bool is_empty(Grid g, vec3 at, vec3 x) { return false; }
 #endif
 
 bool is_ours(Grid g, vec3 at) { return PART == 0u || in_part(plan.first_cell, plan.last_cell, quantize(g, at)); }
@@ -191,7 +208,7 @@ void main() {
                 settle_inside(sides_of(stand, x));
             } else {
                 state.hint = NONE;
-                if (is_empty(g, at)) settle(NONE, uintBitsToFloat(NAN));
+                if (is_empty(g, at, x)) settle(NONE, uintBitsToFloat(NAN));
                 else wait();
             }
         }

@@ -121,12 +121,14 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
     hi = min(hi, unpack_cell(plans.at[0].last_cell));
     if (any(greaterThan(lo, hi))) return true;
     leaf_level = g.level;
+    vec3 scale = slab_scale(g);
     LeafWalk at = walk_from(g.level, state.code);
     uint leaf = WALK_PAUSED;
     for (uint work = 0u; work < budget;) {
         leaf = next_leaf(at, g.level, work, budget);
         if (leaf >= WALK_PAUSED) break;
         uvec2 range = entry_range(leaf);
+        if (g.slabs != 0u && is_box_beside(leaf_slab(g, leaf), slab_cell(g, scale, unmorton(at.code)), x, h)) range.x = range.y;
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
         Sought s = sought_in(g, at.code);
         for (uint e = from; e < to; e += 32u) {

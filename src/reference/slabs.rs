@@ -1,7 +1,6 @@
 //! Slabs: for each leaf that the surface of the mesh may pass through, two parallel planes between which all
-//! tetrahedra of its list lie, as far as they can own a point of the leaf's cell. The surface is nearly flat in most
-//! leaves, so for most points beside the mesh the slab proves in a few operations what otherwise takes a search of the
-//! whole list. Twin of `glsl/shared/slab.glsl` and `glsl/build/43_fit_slabs`.
+//! tetrahedra of its list lie. The surface is nearly flat in most leaves, so for most points and voxels beside the mesh the
+//! slab proves in a few operations what otherwise takes a search of the whole list. Twin of `glsl/shared/slab.glsl` and `glsl/build/43_fit_slabs`.
 //!
 //! **Coordinates.** `y = (x − centre)·inverse` runs from −1 to 1 across the leaf's cell; it is 0 on axes that normalised
 //! coordinates are too coarse for.
@@ -19,7 +18,11 @@
 //! volume of the tetrahedron's box, enlarged by two finest cells, within which its points must lie, and V six times its
 //! volume. Then barycentric coordinates are at least −e with e = t + E/(V − E), so the distance of the point is beyond
 //! those of the vertices by at most 3e times their range. If V ≤ 4E, the enlarged box is taken instead of the vertices.
-//! Distances themselves are off by less than 2^-20 of their summands, and 2^-10 is room to spare.
+//! Distances themselves are off by less than 2^-20 of their summands.
+//!
+//! **Boxes.** A box counts as touching a tetrahedron that is up to about 2^-19 of the size of both away
+//! ([`super::separate`]). So a range is enlarged by 2^-16 of its summands, that of a box by as much of itself, and 2^-10 is
+//! room to spare.
 
 use super::assign::{cell_centre, half_cell};
 use super::boundary::Topology;
@@ -59,6 +62,16 @@ impl SlabCell {
     pub fn is_outside(&self, slab: u32, x: Vec3) -> bool {
         let at = place(dot(normal(slab), self.in_cell(x)));
         at < (slab & 255) || at > (slab >> 8 & 255)
+    }
+
+    /// Whether the box with centre x and these half axes lies outside of this leaf's slab, so that no tetrahedron of its list
+    /// touches it as [`super::separate::box_touches`] tells.
+    pub fn is_box_outside(&self, slab: u32, x: Vec3, half: &[Vec3; 3]) -> bool {
+        let n = normal(slab);
+        let [a, b, c] = half.map(|h| dot(n, per_axis(|k| h[k] * self.inverse[k])).abs());
+        let (reach, d) = ((a + b) + c, dot(n, self.in_cell(x)));
+        let more = reach + reach * two_to(-16);
+        place(d + more) < (slab & 255) || place(d - more) > (slab >> 8 & 255)
     }
 }
 
@@ -168,7 +181,7 @@ impl Fit<'_> {
 
 /// A range of distances, enlarged by `by` and for the rounding of distances whose summands amount to `far`.
 fn enlarged(least: f32, most: f32, far: f32, by: f32) -> [f32; 2] {
-    let more = by + (far * two_to(-20) + two_to(-10));
+    let more = by + (far * two_to(-16) + two_to(-10));
     [least - more, most + more]
 }
 

@@ -5,9 +5,11 @@ use olbvh::grid::{MAX_LEVEL, morton, unmorton};
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{graded, kuhn_jittered, shell, slivers};
 use olbvh::options::{BuildOptions, Lists};
+use olbvh::reference::assign::{cell_centre, half_cell};
 use olbvh::reference::brute;
-use olbvh::reference::build::build;
+use olbvh::reference::build::{Construction, build, construct};
 use olbvh::reference::locate::{Locator, place};
+use olbvh::reference::separate::{box_touches, touch_slack};
 use olbvh::reference::slabs::{EVERYTHING, SlabCell};
 use olbvh::reference::vertices::Vertices;
 use rayon::prelude::*;
@@ -80,6 +82,56 @@ fn most_points_beside_thin_walls_need_no_search() {
         told += u32::from(SlabCell::new(&grid, leaf_cell).is_outside(slab, x));
     }
     assert!(beside > 500 && 10 * told > 6 * beside, "{told} of {beside}");
+}
+
+/// Three unit vectors that are perpendicular to each other: those of the grid, or turned by a random quaternion.
+fn turned_axes(random: &mut Random) -> [[f32; 3]; 3] {
+    let [x, y, z, w] = if random.next() < 0.3 { [0.0, 0.0, 0.0, 1.0] } else { [0; 4].map(|_| random.next() - 0.5) };
+    let turn = glam::Quat::from_xyzw(x, y, z, w + 1e-3).normalize();
+    [glam::Vec3::X, glam::Vec3::Y, glam::Vec3::Z].map(|axis| (turn * axis).to_array())
+}
+
+/// Boxes of any direction, from a hundredth of a leaf to several leaves large.
+#[test]
+fn boxes_beside_slabs_are_not_touched() {
+    let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/flow_sphere_50k.vtu");
+    let loaded = olbvh::formats::load(&file, &olbvh::formats::LoadOptions::default()).unwrap();
+    let made = [("slivers", slivers(3)), ("graded", graded(4)), ("shell", shell(9)), ("jittered", kuhn_jittered([5; 3], 0.3, 7))];
+    let made = made.into_iter().map(|(name, mesh)| (name.to_owned(), mesh.unwrap())).chain([("flow_sphere".into(), loaded.mesh)]);
+    let meshes = cases().unwrap().into_iter().map(|case| (case.name.to_string(), case.mesh)).chain(made);
+    let (mut tried, mut told, mut random) = (0, 0, Random(11));
+    for (name, mesh) in meshes.filter(|(_, mesh)| !mesh.tets.is_empty()) {
+        let (mesh, topology) = prepared(mesh);
+        let vertices = Vertices::new(&mesh, &topology.grid);
+        for level in [2, 5] {
+            let options = BuildOptions { slabs: true, ..BuildOptions::default() };
+            let Construction { codes, tree } = construct(&mesh, &topology, &vertices, level, &options).unwrap();
+            let (first, half) = (tree.internal_nodes(), half_cell(&tree.grid, tree.grid.level));
+            for leaf in
+                tree.leaves().filter(|leaf| tree.slabs[(leaf - first) as usize] != EVERYTHING).step_by(1 + tree.leaves().len() / 100)
+            {
+                let i = (leaf - first) as usize;
+                let (slab, cell) = (tree.slabs[i], unmorton(codes[tree.po[i] as usize]));
+                let centre = cell_centre(half, cell);
+                for _ in 0..20 {
+                    let size = 0.01 * 500f32.powf(random.next());
+                    let axes = turned_axes(&mut random).map(|axis| [0, 1, 2].map(|c| axis[c] * size * half[c]));
+                    let x = [0, 1, 2].map(|c| centre[c] + (3.0 * random.next() - 1.5) * half[c]);
+                    tried += 1;
+                    if !SlabCell::new(&tree.grid, cell).is_box_outside(slab, x, &axes) {
+                        continue;
+                    }
+                    told += 1;
+                    for &t in tree.primitives(leaf) {
+                        let v = mesh.tets[t as usize].map(|id| [0, 1, 2].map(|c| vertices.normalised[id as usize][c] - x[c]));
+                        let touches = box_touches(&v, &axes, touch_slack(&v, &axes));
+                        assert!(!touches, "{name} level {level} leaf {leaf} tetrahedron {t} at {x:?} {axes:?}");
+                    }
+                }
+            }
+        }
+    }
+    assert!(told > 5_000 && told < tried, "{told} of {tried}");
 }
 
 #[test]
