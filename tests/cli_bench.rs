@@ -92,7 +92,7 @@ fn a_tiny_mesh_is_measured() {
     for mesh in report["meshes"].as_array().unwrap() {
         let structures = mesh["structures"].as_array().unwrap();
         let kinds = strings(&mesh["structures"], "kind");
-        assert_eq!(kinds.iter().filter(|&&k| k == "olbvh").count(), 12);
+        assert_eq!(kinds.iter().filter(|&&k| k == "olbvh").count(), 13);
         assert!(kinds.contains(&"lbvh"));
         assert!(["ray_query", "ray_pipeline"].iter().all(|way| kinds.contains(way) == has(way)), "{kinds:?}");
         let lbvh = structures.iter().find(|s| s["kind"] == "lbvh").unwrap();

@@ -12,7 +12,7 @@ pub(super) const GRID: &str = "#e3e3e8";
 pub(super) const INK: &str = "#22252b";
 
 /// The colour of a structure: one hue per α, lighter for stronger assignments, darkest for lists at the boundary only;
-/// grey and violet for the baselines.
+/// red for the program's tree, grey and violet for the baselines.
 pub(super) fn color(s: &StructureReport) -> &'static str {
     let octrees = [
         ["#2d65ad", "#6a9ad3", "#acc9ea", "#123663"],
@@ -22,6 +22,7 @@ pub(super) fn color(s: &StructureReport) -> &'static str {
     let place = if s.lists == Some("boundary") { Some(3) } else { ["aabb", "planes", "exact"].iter().position(|&a| Some(a) == s.assign) };
     match (s.alpha.and_then(|alpha| octrees.get(usize::from(alpha))), place) {
         (Some(shades), Some(place)) => shades[place],
+        _ if s.kind == "olbvh" => "#b3395b",
         _ if s.kind == "lbvh" => "#6b6f76",
         _ => "#7a3fa0",
     }

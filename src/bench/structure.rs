@@ -5,7 +5,7 @@ use crate::baseline::{Lbvh, RayMethod, Rays};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
 use crate::gpu::{Gpu, StageTime};
-use crate::options::{Assign, BuildOptions, Lists, TOLERANCE};
+use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use crate::query::{self, LocateMethod, LocateOptions, Located, MOST_TRAVERSED, Overlapped, SILENT};
 
 /// A kind of structure.
@@ -20,6 +20,8 @@ pub enum Kind {
         /// Which leaves list all of their tetrahedra; in the paper every one does.
         lists: Lists,
     },
+    /// The octree as the program builds it for pictures: leaves as fine as suits these, with slabs.
+    Fine,
     /// The binary tree of the paper's comparison.
     Lbvh,
     /// The device's ray-tracing acceleration structure over the faces.
@@ -32,7 +34,23 @@ impl Kind {
         let [aabb, planes, exact] = Assign::EVERY.map(|assign| (assign, Lists::All));
         let choices = [aabb, planes, exact, (Assign::default(), Lists::Boundary)];
         let octrees = (0..3).flat_map(|alpha| choices.map(|(assign, lists)| Self::Octree { alpha, assign, lists }));
-        octrees.chain([Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
+        octrees.chain([Self::Fine, Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
+    }
+
+    /// The options of the construction; `None` for other structures than octrees.
+    fn options(self) -> Option<BuildOptions> {
+        match self {
+            Self::Octree { alpha, assign, lists } => {
+                Some(BuildOptions { alpha: f32::from(alpha), assign, lists, ..BuildOptions::default() })
+            }
+            Self::Fine => Some(BuildOptions { fineness: Fineness::Pictures, slabs: true, ..BuildOptions::default() }),
+            Self::Lbvh | Self::Rays(_) => None,
+        }
+    }
+
+    /// How tetrahedra are assigned to the leaves of an octree, and which leaves list all of theirs.
+    pub(super) fn lists(self) -> Option<(Assign, Lists)> {
+        self.options().map(|options| (options.assign, options.lists))
     }
 
     /// Whether the structure can find the overlap of two meshes.
@@ -46,6 +64,7 @@ impl std::fmt::Display for Kind {
         match self {
             Self::Octree { alpha, assign, lists: Lists::All } => write!(f, "OLBVH α={alpha} {assign}"),
             Self::Octree { alpha, lists, .. } => write!(f, "OLBVH α={alpha} lists {lists}"),
+            Self::Fine => f.write_str("OLBVH fine, slabs"),
             Self::Lbvh => f.write_str("LBVH"),
             Self::Rays(RayMethod::Query) => f.write_str("ray query"),
             Self::Rays(RayMethod::Pipeline) => f.write_str("ray pipeline"),
@@ -64,8 +83,8 @@ impl Structure {
     /// Builds a structure; `None` if the device lacks a required feature.
     pub(super) fn build(gpu: &Gpu, mesh: &DeviceMesh, kind: Kind) -> Result<Option<Self>> {
         Ok(match kind {
-            Kind::Octree { alpha, assign, lists } => {
-                let options = BuildOptions { alpha: f32::from(alpha), assign, lists, ..BuildOptions::default() };
+            Kind::Octree { .. } | Kind::Fine => {
+                let options = kind.options().unwrap_or_default();
                 Some(Self::Octree(Tree::build(gpu, mesh, &options)?))
             }
             Kind::Lbvh => Some(Self::Lbvh(Lbvh::build(gpu, mesh)?)),

@@ -121,10 +121,8 @@ impl StructureReport {
     }
 
     pub(super) fn new(kind: Kind, structure: &Structure, lost: Option<Lost>) -> Self {
-        let (alpha, assign, lists) = match kind {
-            Kind::Octree { alpha, assign, lists } => (Some(alpha), Some(assign.name()), Some(lists.name())),
-            _ => (None, None, None),
-        };
+        let alpha = if let Kind::Octree { alpha, .. } = kind { Some(alpha) } else { None };
+        let (assign, lists) = kind.lists().map(|(assign, lists)| (assign.name(), lists.name())).unzip();
         let plain = |total, arrays| MemoryFigures { total, arrays, paper: None, before_compaction: None, scratch: None };
         let (name, memory, status) = match structure {
             Structure::Octree(tree) => {

@@ -28,7 +28,7 @@ impl Suite {
         let plain = |kind: &Kind| match kind {
             Kind::Octree { alpha, assign, lists } => *alpha == 0 && (*assign == Assign::Aabb || *lists == Lists::Boundary),
             Kind::Lbvh => true,
-            Kind::Rays(_) => false,
+            Kind::Fine | Kind::Rays(_) => false,
         };
         let all = Kind::all();
         if self == Self::Scaling { all.into_iter().filter(plain).collect() } else { all }

@@ -24,6 +24,7 @@
 //! | `build.count_splits` | codes 4 n, the table of runs, its scan |
 //! | `build.splits` | codes 4 n, the table of runs, PO 4 L, CO 4 I, cleared flags and masks N / 8 + N |
 //! | `build.leaves` | P 4 n, PO and codes 8 L, masks L, boxes 24 L; quarters, if any: 12 n, cells 16 t, vertices 16 p |
+//! | `build.slabs` | P 4 n, PO and codes 8 L, flags N / 8, slabs 4 L; of cells, neighbours and vertices those at the surface, not counted |
 //! | `build.levels` | CO 4 I, PO and codes 8 L, masks I, boxes 24 N |
 //!
 //! A scan reads its values twice and writes them once: 12 bytes per value. "Digits" is the table of digit counts of the
@@ -76,6 +77,7 @@ pub(super) fn traffic(mesh: &DeviceMesh, tree: &Tree, target: &Target) -> Vec<(&
         ("build.count_splits", 4 * n + (4 + SCAN) * runs),
         ("build.splits", 4 * n + 4 * runs + 4 * leaves + 4 * internal + nodes / 8 + nodes),
         ("build.leaves", 4 * n + 9 * leaves + boxes(leaves) + quarters),
+        ("build.slabs", if options.has_slabs() { 4 * n + nodes / 8 + 12 * leaves } else { 0 }),
         ("build.levels", 4 * internal + 8 * leaves + internal + boxes(nodes)),
     ];
     stages.into_iter().filter(|(_, bytes)| *bytes > 0).collect()

@@ -73,6 +73,7 @@ fn near(subject: &Subject<'_>, tet: u32, point: [f32; 3]) -> bool {
 /// a point.
 pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers: &Answers) -> Result<Option<Lost>> {
     let wrong = |what: String| Err(Error::Mismatch(format!("{kind}: {what}")));
+    let walks = kind.lists().is_some_and(|(_, lists)| lists == Lists::Boundary);
     let mut lost = Lost { points: 0, of: 0 };
     for ((_, points), (expected, found)) in subject.points.iter().zip(first.owners.iter().zip(&answers.owners)) {
         lost.of += expected.iter().filter(|&&owner| owner != u32::MAX).count() as u64;
@@ -83,9 +84,9 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
             match kind {
                 Kind::Rays(_) if found == u32::MAX => lost.points += u64::from(holding[0]),
                 // Where tetrahedra overlap, walks may end in another one.
-                Kind::Rays(_) | Kind::Octree { lists: Lists::Boundary, .. } if holding[1] => {}
+                _ if (matches!(kind, Kind::Rays(_)) || walks) && holding[1] => {}
                 // A point that lies outside by less than the tolerance may be found from one leaf and not from another.
-                Kind::Octree { .. } | Kind::Lbvh if outside => {}
+                Kind::Octree { .. } | Kind::Fine | Kind::Lbvh if outside => {}
                 _ => return wrong(format!("point {point:?} lies in cell {expected}, not {found}")),
             }
         }
@@ -98,7 +99,6 @@ pub(super) fn check(subject: &Subject<'_>, kind: Kind, first: &Answers, answers:
         }
     }
     if let (Some((kinds, expected)), Some((found_kinds, found))) = (&first.voxels, &answers.voxels) {
-        let walks = matches!(kind, Kind::Octree { lists: Lists::Boundary, .. });
         let same = |i: usize| expected[i] == found[i] || (walks && kinds[i] == INSIDE && holds(subject, found[i], subject.centre(i)));
         if kinds != found_kinds || !(0..kinds.len()).all(same) {
             return wrong("the voxels of the slice differ".into());
