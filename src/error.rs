@@ -1,6 +1,7 @@
 //! The error type of the crate.
 
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 
 /// Result of every fallible call of this crate.
 pub type Result<T, E = Error> = std::result::Result<T, E>;
@@ -76,13 +77,27 @@ pub enum Error {
         message: String,
     },
     /// Reading or writing failed.
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), reason(path, source))]
     Io {
         /// The file.
         path: PathBuf,
         /// The error of the operating system.
-        source: std::io::Error,
+        source: io::Error,
     },
+}
+
+/// What an error of the operating system means for a path, and what to do about it.
+fn reason(path: &Path, error: &io::Error) -> String {
+    let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match (error.kind(), folder) {
+        (io::ErrorKind::NotFound, Some(folder)) if !folder.is_dir() => {
+            format!("there is no folder {}; correct the path, or make the folder", folder.display())
+        }
+        (io::ErrorKind::NotFound, _) => "there is no such file; correct its name or folder".into(),
+        (io::ErrorKind::PermissionDenied, _) => "this user may not read or write it; change its permissions, or take another path".into(),
+        (io::ErrorKind::StorageFull, _) => "there is no room left on its disk; make room, or take another path".into(),
+        _ => error.to_string(),
+    }
 }
 
 impl Error {

@@ -147,7 +147,9 @@ fn fields_go_from_one_mesh_to_another() {
     let table = std::fs::read_to_string(folder.path().join("out.csv")).unwrap();
     assert!(table.lines().nth(1).unwrap().starts_with("2,2,2,") && table.lines().count() == 10, "{table}");
     let message = fails(folder.path(), 3, &["locate", "from.vtu", "missing.vtu", "-o", "out.vtu", "--device", "cpu"]);
-    assert!(message.contains("missing.vtu"), "{message}");
+    assert!(message.contains("missing.vtu: there is no such file; correct its name or folder"), "{message}");
+    let message = fails(folder.path(), 3, &["locate", "from.vtu", "nowhere/in.vtu", "-o", "out.vtu", "--device", "cpu"]);
+    assert!(message.contains("nowhere/in.vtu: there is no folder nowhere; correct the path, or make the folder"), "{message}");
 }
 
 /// Points outside get what is closest, with the distance, if they ask for it.

@@ -28,7 +28,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("glsl", &["build", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing"]),
     ("blocks", &["build", "error", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
-    ("baseline", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "primitives", "query", "reference", "render", "slicing"]),
+    ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "primitives", "query", "reference", "render", "slicing"]),
     ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
     ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing"]),

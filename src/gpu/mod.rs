@@ -24,6 +24,7 @@ mod ray_functions;
 mod ray_pipeline;
 mod recorder;
 mod requirements;
+mod submission;
 mod submit;
 
 pub use acceleration::AccelerationStructure;

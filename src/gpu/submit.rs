@@ -3,9 +3,10 @@
 use super::buffer_ref::BufferRef;
 use super::context::Gpu;
 use super::failed;
-use super::kept::{READ_BACK, Submission, TIMESTAMPS};
+use super::kept::{Objects, TIMESTAMPS};
 use super::memory::Buffer;
 use super::recorder::Recorder;
+use super::submission::{READ_BACK, Submission};
 use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
@@ -74,7 +75,7 @@ impl Gpu {
     /// A recorder for the command buffer of a submission.
     fn begin(&self, submission: &Submission<'_>, label: &'static str) -> Result<Recorder<'_>> {
         let (device, timed) = (self.device(), self.timestamp_bits() > 0);
-        let (commands, _, queries) = submission.handles();
+        let Objects { commands, queries, .. } = submission.objects();
         super::debug::name(self.debug_device(), commands, label);
         // SAFETY: objects of this device, which no other submission uses.
         unsafe {
@@ -91,7 +92,7 @@ impl Gpu {
     fn execute(&self, mut submission: Submission<'_>, recorder: &Recorder<'_>, label: &str) -> Result<StageTimes> {
         recorder.finish()?;
         let device = self.device();
-        let (commands, fence, queries) = submission.handles();
+        let Objects { commands, fence, queries, .. } = submission.objects();
         // SAFETY: objects of this device, which no other submission uses; the queue is locked during the submission.
         unsafe {
             // Makes the results visible to the host, and to the submissions that follow.

@@ -10,11 +10,12 @@ use super::tet::sub;
 use super::vertices::Vertices;
 use crate::grid::{Box6, Grid, canonical, two_to, unmorton};
 use crate::layout::bit;
-use crate::layout::constants::finish_leaves::{MAX_LIST_FOR_OCTANTS, MAX_TOUCH_TESTS};
 use crate::mesh::Mesh;
 use crate::options::Lists;
 use rayon::prelude::*;
 use std::ops::Range;
+
+pub use crate::layout::constants::finish_leaves::{MAX_LIST_FOR_OCTANTS, MAX_TOUCH_TESTS};
 
 /// The box of the cell with Morton code `code` at `level`, in the units of the mesh. On each axis it reaches from
 /// `lo + extent·(k·2^-l)` to `lo + extent·((k+1)·2^-l)`, without denormals, where `extent = hi − lo`. The upper side of

@@ -128,7 +128,11 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     }
     let destination = destination(path);
     if !folder(&destination).is_dir() {
-        return Err(Failure::Failed(format!("{}: there is no folder {}", path.display(), folder(&destination).display())));
+        return Err(Failure::Failed(format!(
+            "{}: there is no folder {}; correct the path, or make the folder",
+            path.display(),
+            folder(&destination).display()
+        )));
     }
     begin(path);
     drop(OutputFile::create(path)?); // better refused now than after the work
