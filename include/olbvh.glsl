@@ -610,12 +610,23 @@ int olbvh_side_of(uint slab, olbvh_SlabCell cell, vec3 x) {
     return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
 }
 
+// Whether the box with centre x and half axes h is beside a slab, so that no tetrahedron of the list touches it.
+bool olbvh_is_box_beside(uint slab, olbvh_SlabCell cell, vec3 x, vec3 h[3]) {
+    vec3 n = olbvh_slab_normal(slab);
+    precise vec3 a = h[0] * cell.inverse, b = h[1] * cell.inverse, c = h[2] * cell.inverse;
+    precise float reach = (abs(olbvh_dot_product(n, a)) + abs(olbvh_dot_product(n, b))) + abs(olbvh_dot_product(n, c));
+    float d = olbvh_dot_product(n, olbvh_in_cell(cell, x));
+    precise float more = reach + reach * olbvh_two_to(-16), lo = d - more, hi = d + more;
+    return olbvh_slab_place(hi) < (slab & 255u) || olbvh_slab_place(lo) > (slab >> 8 & 255u);
+}
+
+// The slab of a leaf, if there are slabs.
+uint olbvh_leaf_slab(olbvh_Grid g, uint leaf) { return olbvh_po.at[g.slabs + (leaf - g.first_leaf)]; }
+
 // On which side of its leaf's slab x is, in a cell of the finest grid that lies in this leaf. If it is not 0, no
 // tetrahedron owns x (for tolerances below 2^-12). `scale` is slab_scale(g).
 int olbvh_side_of_slab(olbvh_Grid g, vec3 scale, uint leaf, uvec3 finest, vec3 x) {
-    if (g.slabs == 0u) return 0;
-    uint slab = olbvh_po.at[g.slabs + (leaf - g.first_leaf)];
-    return olbvh_side_of(slab, olbvh_slab_cell(g, scale, finest >> (olbvh_MAX_LEVEL - g.level)), x);
+    return g.slabs == 0u ? 0 : olbvh_side_of(olbvh_leaf_slab(g, leaf), olbvh_slab_cell(g, scale, finest >> (olbvh_MAX_LEVEL - g.level)), x);
 }
 
 // Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,
