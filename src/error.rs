@@ -86,8 +86,11 @@ pub enum Error {
     },
 }
 
-/// What an error of the operating system means for a path, and what to do about it.
+/// What an error of reading or writing means for a path, and what to do about it.
 fn reason(path: &Path, error: &io::Error) -> String {
+    if error.raw_os_error().is_none() {
+        return error.to_string(); // one of this crate, which says more
+    }
     let folder = path.parent().filter(|folder| !folder.as_os_str().is_empty());
     match (error.kind(), folder) {
         (io::ErrorKind::NotFound, Some(folder)) if !folder.is_dir() => {
