@@ -42,19 +42,20 @@ fn main() {
 }
 
 fn generate(out: &Path) -> Result<(), String> {
-    let mut kernels = Vec::new();
-    find_kernels(Path::new(GLSL), &mut kernels)?;
-    kernels.sort();
-    let interfaces = on_all_cores(kernels.len(), |i| reflect_kernel(&kernels[i]))?;
+    let mut files = Vec::new();
+    find_files(Path::new(GLSL), &mut files)?;
+    files.sort();
+    let kernels: Vec<&PathBuf> = files.iter().filter(|path| stage_of(path).is_some()).collect();
+    let interfaces = on_all_cores(kernels.len(), |i| reflect_kernel(kernels[i]))?;
     // From the last one on, since those of queries take longest.
     let [count, forms] = [kernels.len(), FORMS.len()];
-    on_all_cores(count * forms, |i| compile_kernel(&kernels[count - 1 - i / forms], &FORMS[i % forms], out))?;
+    on_all_cores(count * forms, |i| compile_kernel(kernels[count - 1 - i / forms], &FORMS[i % forms], out))?;
     write(&out.join("kernels.rs"), &kernels_source(&interfaces))?;
     for form in [&ADDRESS, &DESCRIPTOR] {
         compile(FOREIGN, "foreign.comp", form, false)?;
     }
     write(&out.join("olbvh.glsl"), &export::export(Path::new(GLSL))?)?;
-    write(&out.join("constants.rs"), &constants::source(Path::new(GLSL))?)?;
+    write(&out.join("constants.rs"), &constants::source(&files)?)?;
     write(&out.join("layout.rs"), &layout_source()?)
 }
 
@@ -74,12 +75,12 @@ fn on_all_cores<T: Send>(count: usize, job: impl Fn(usize) -> Result<T, String> 
     done.into_inner().unwrap_or_else(PoisonError::into_inner).into_values().collect()
 }
 
-fn find_kernels(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
+fn find_files(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), String> {
     let entries = fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     for path in entries.filter_map(Result::ok).map(|e| e.path()) {
         if path.is_dir() {
-            find_kernels(&path, found)?;
-        } else if stage_of(&path).is_some() {
+            find_files(&path, found)?;
+        } else {
             found.push(path);
         }
     }

@@ -22,7 +22,7 @@ fn flatten(folder: &Path, name: &str, seen: &mut BTreeSet<String>, out: &mut Str
     Ok(())
 }
 
-fn is_word(c: char) -> bool {
+pub fn is_word(c: char) -> bool {
     c.is_alphanumeric() || c == '_'
 }
 

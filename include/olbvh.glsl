@@ -610,16 +610,6 @@ int olbvh_side_of(uint slab, olbvh_SlabCell cell, vec3 x) {
     return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
 }
 
-// Whether the box with centre x and half axes h is beside a slab, so that no tetrahedron of the list touches it.
-bool olbvh_is_box_beside(uint slab, olbvh_SlabCell cell, vec3 x, vec3 h[3]) {
-    vec3 n = olbvh_slab_normal(slab);
-    precise vec3 a = h[0] * cell.inverse, b = h[1] * cell.inverse, c = h[2] * cell.inverse;
-    precise float reach = (abs(olbvh_dot_product(n, a)) + abs(olbvh_dot_product(n, b))) + abs(olbvh_dot_product(n, c));
-    float d = olbvh_dot_product(n, olbvh_in_cell(cell, x));
-    precise float more = reach + reach * olbvh_two_to(-16), lo = d - more, hi = d + more;
-    return olbvh_slab_place(hi) < (slab & 255u) || olbvh_slab_place(lo) > (slab >> 8 & 255u);
-}
-
 // The slab of a leaf, if there are slabs.
 uint olbvh_leaf_slab(olbvh_Grid g, uint leaf) { return olbvh_po.at[g.slabs + (leaf - g.first_leaf)]; }
 

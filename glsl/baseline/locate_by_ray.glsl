@@ -21,7 +21,8 @@ BUFFER16(7, writeonly, vec4, barycentrics)
 #include "shared/points.glsl"
 
 const vec3 WAY = vec3(0.36, 0.48, 0.8); // of unit length, and in no plane of a regular grid
-const float SCALE = 9.094947017729282379150390625e-13; // 2^-40, from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
+// 2^-40, from normalised coordinates to those of the scene, [0, 2), where the device's arithmetic cannot overflow.
+const float SCALE = 9.094947017729282379150390625e-13;
 
 // The first face that the ray meets, or NONE, and whether the ray meets its front.
 uvec2 first_face(vec3 origin, float most);

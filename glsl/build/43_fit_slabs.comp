@@ -18,8 +18,8 @@ RECORDS(8, uvec4, neighbours)
 #include "shared/vertices.glsl"
 #include "shared/slab.glsl"
 
-const uint MAX_LIST_FOR_SLAB = 16384u;   // Leaves with longer lists have no slab.
-const uint LOOKED_AT = 16u;             // Tetrahedra of a list whose faces may give the normal.
+const uint MAX_LIST_FOR_SLAB = 16384u; // Leaves with longer lists have no slab.
+const uint LOOKED_AT = 16u; // Tetrahedra of a list whose faces may give the normal.
 const uint PLACES = 4u * LOOKED_AT - 1u; // Bits for the place of a face among these.
 
 // The corners of a tetrahedron in the caller's order.

@@ -87,6 +87,7 @@ void settle_inside(Sides sides) {
 
 #ifndef BINARY_TREE
 #include "shared/cell_range.glsl"
+#include "shared/box_slab.glsl"
 
 // The finest-grid cells of the empty octree cell around the last voxel that was outside; none at first.
 uvec3 empty_lo = uvec3(1u), empty_hi = uvec3(0u);
@@ -108,7 +109,7 @@ bool is_beside_slabs(Grid g, vec3 x, uvec3 lo, uvec3 hi) {
     for (uvec3 cell = first; cell.z <= last.z;) {
         uint leaf = find_node(0u, 0u, g.level, morton(cell));
         bool near = leaf != NONE && is_boundary_node(leaf);
-        if (near && !is_box_beside(leaf_slab(g, leaf), slab_cell(g, scale, cell), x, h)) return false;
+        if (near && !is_box_outside(leaf_slab(g, leaf), slab_cell(g, scale, cell), x, h)) return false;
         bool row_ends = cell.x == last.x, layer_ends = row_ends && cell.y == last.y;
         cell = uvec3(row_ends ? first.x : cell.x + 1u, layer_ends ? first.y : cell.y + uint(row_ends), cell.z + uint(layer_ends));
     }

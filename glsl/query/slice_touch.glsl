@@ -81,6 +81,7 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
 #else
 #include "shared/tree.glsl"
 #include "shared/owner_list.glsl"
+#include "shared/box_slab.glsl"
 
 bool walk_ended = false;
 uvec3 lo, hi;
@@ -128,7 +129,8 @@ bool measure_all(Grid g, vec3 centre, vec3 reach) {
         leaf = next_leaf(at, g.level, work, budget);
         if (leaf >= WALK_PAUSED) break;
         uvec2 range = entry_range(leaf);
-        if (g.slabs != 0u && is_box_beside(leaf_slab(g, leaf), slab_cell(g, scale, unmorton(at.code)), x, h)) range.x = range.y;
+        // Then nothing of the list has been tested before.
+        if (g.slabs != 0u && is_box_outside(leaf_slab(g, leaf), slab_cell(g, scale, unmorton(at.code)), x, h)) range.x = range.y;
         uint from = range.x + state.entry, to = min(range.y, from + max(budget - min(work, budget), 1u));
         Sought s = sought_in(g, at.code);
         for (uint e = from; e < to; e += 32u) {

@@ -42,13 +42,3 @@ int side_of(uint slab, SlabCell cell, vec3 x) {
     uint at = slab_place(dot_product(slab_normal(slab), in_cell(cell, x)));
     return at < (slab & 255u) ? -1 : at > (slab >> 8 & 255u) ? 1 : 0;
 }
-
-// Whether the box with centre x and half axes h is beside a slab, so that no tetrahedron of the list touches it.
-bool is_box_beside(uint slab, SlabCell cell, vec3 x, vec3 h[3]) {
-    vec3 n = slab_normal(slab);
-    precise vec3 a = h[0] * cell.inverse, b = h[1] * cell.inverse, c = h[2] * cell.inverse;
-    precise float reach = (abs(dot_product(n, a)) + abs(dot_product(n, b))) + abs(dot_product(n, c));
-    float d = dot_product(n, in_cell(cell, x));
-    precise float more = reach + reach * two_to(-16), lo = d - more, hi = d + more;
-    return slab_place(hi) < (slab & 255u) || slab_place(lo) > (slab >> 8 & 255u);
-}

@@ -37,20 +37,13 @@ impl Kind {
         octrees.chain([Self::Fine, Self::Lbvh]).chain(RayMethod::ALL.map(Self::Rays)).collect()
     }
 
-    /// The options of the construction; `None` for other structures than octrees.
-    fn options(self) -> Option<BuildOptions> {
-        match self {
-            Self::Octree { alpha, assign, lists } => {
-                Some(BuildOptions { alpha: f32::from(alpha), assign, lists, ..BuildOptions::default() })
-            }
-            Self::Fine => Some(BuildOptions { fineness: Fineness::Pictures, slabs: true, ..BuildOptions::default() }),
-            Self::Lbvh | Self::Rays(_) => None,
-        }
-    }
-
     /// How tetrahedra are assigned to the leaves of an octree, and which leaves list all of theirs.
     pub(super) fn lists(self) -> Option<(Assign, Lists)> {
-        self.options().map(|options| (options.assign, options.lists))
+        match self {
+            Self::Octree { assign, lists, .. } => Some((assign, lists)),
+            Self::Fine => Some((Assign::default(), Lists::default())),
+            Self::Lbvh | Self::Rays(_) => None,
+        }
     }
 
     /// Whether the structure can find the overlap of two meshes.
@@ -82,11 +75,12 @@ pub(super) enum Structure {
 impl Structure {
     /// Builds a structure; `None` if the device lacks a required feature.
     pub(super) fn build(gpu: &Gpu, mesh: &DeviceMesh, kind: Kind) -> Result<Option<Self>> {
+        let octree = |options: BuildOptions| Tree::build(gpu, mesh, &options).map(Self::Octree);
         Ok(match kind {
-            Kind::Octree { .. } | Kind::Fine => {
-                let options = kind.options().unwrap_or_default();
-                Some(Self::Octree(Tree::build(gpu, mesh, &options)?))
+            Kind::Octree { alpha, assign, lists } => {
+                Some(octree(BuildOptions { alpha: f32::from(alpha), assign, lists, ..BuildOptions::default() })?)
             }
+            Kind::Fine => Some(octree(BuildOptions { fineness: Fineness::Pictures, slabs: true, ..BuildOptions::default() })?),
             Kind::Lbvh => Some(Self::Lbvh(Lbvh::build(gpu, mesh)?)),
             Kind::Rays(method) => Rays::build(gpu, mesh, method)?.map(Self::Rays),
         })

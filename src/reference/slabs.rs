@@ -1,6 +1,7 @@
 //! Slabs: for each leaf that the surface of the mesh may pass through, two parallel planes between which all
-//! tetrahedra of its list lie. The surface is nearly flat in most leaves, so for most points and voxels beside the mesh the
-//! slab proves in a few operations what otherwise takes a search of the whole list. Twin of `glsl/shared/slab.glsl` and `glsl/build/43_fit_slabs`.
+//! tetrahedra of its list lie. The surface is nearly flat in most leaves, so for most points and voxels beside the mesh
+//! the slab proves in a few operations what otherwise takes a search of the whole list. Twin of
+//! `glsl/shared/{slab,box_slab}.glsl` and `glsl/build/43_fit_slabs`.
 //!
 //! **Coordinates.** `y = (x − centre)·inverse` runs from −1 to 1 across the leaf's cell; it is 0 on axes that normalised
 //! coordinates are too coarse for.
