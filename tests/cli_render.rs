@@ -22,6 +22,8 @@ fn render_writes_a_picture_and_its_figures() {
     assert_eq!(info, (40, 30));
     let names: Vec<_> = std::fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(names, ["a.png"], "nothing else is left");
+    let same = json(folder.path(), &[RENDER, &["--camera", result["camera"].as_str().unwrap()]].concat());
+    assert_eq!([&same["samples"], &same["found_samples"]], [&result["samples"], &result["found_samples"]], "its camera draws it again");
 }
 
 /// Width of a picture, and the four bytes of each of its pixels.

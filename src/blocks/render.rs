@@ -8,11 +8,11 @@ use super::{InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, u
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
-use crate::mesh::{Field, Mesh, On};
+use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Plan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
+use crate::render::{Camera, Plan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::slice::from_ref;
@@ -42,6 +42,10 @@ pub struct Picture {
     pub rendered: Rendered,
     /// The plan that it was rendered with.
     pub plan: Plan,
+    /// The camera that sees it, in coordinates of the mesh.
+    pub camera: Camera,
+    /// The bounds of the mesh.
+    pub bounds: Bounds,
     /// The field's values at the ends of the transfer function.
     pub range: [f32; 2],
 }
@@ -86,8 +90,8 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
     }
     let Job { stats, took, .. } = job;
     let rendered = Rendered { colors: rays.colors, stats };
-    let Prepared { plan, range, .. } = prepared;
-    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, plan, range }))
+    let Prepared { plan, camera, bounds, range, .. } = prepared;
+    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, plan, camera, bounds, range }))
 }
 
 fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
@@ -96,11 +100,11 @@ fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>
     let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
     let is_valid = |t| bad.binary_search(&t).is_err();
     let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
-    let Prepared { plan, normals, range, .. } = Prepared::new(settings, asked.mesh, &valid, field)?;
+    let Prepared { plan, camera, bounds, normals, range } = Prepared::new(settings, asked.mesh, &valid, field)?;
     drop(neighbours);
     let normals = (!normals.is_empty()).then_some(normals.as_slice());
     let rendered = query::render(tree, &plan, (&field.values, field.on), normals, report)?;
-    Ok(Picture { rendered, plan, range })
+    Ok(Picture { rendered, plan, camera, bounds, range })
 }
 
 /// The state of rendering a picture in blocks.

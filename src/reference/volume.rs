@@ -118,9 +118,9 @@ impl<'a> Drawing<'a> {
         &self.prepared.plan
     }
 
-    /// The values at the ends of the transfer function.
-    pub fn range(&self) -> [f32; 2] {
-        self.prepared.range
+    /// What the plan and the light were made of.
+    pub fn prepared(&self) -> &Prepared {
+        &self.prepared
     }
 }
 

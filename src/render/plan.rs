@@ -312,6 +312,8 @@ pub struct Prepared {
     pub plan: Plan,
     /// The camera, framed around the mesh's vertices.
     pub camera: Camera,
+    /// The bounds of the mesh.
+    pub bounds: Bounds,
     /// A normal per point of the mesh; empty without shading.
     pub normals: Vec<[f32; 3]>,
     /// The values at the ends of the transfer function.
@@ -330,7 +332,7 @@ impl Prepared {
         let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
         let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
         let range = settings.range.unwrap_or([0.0, 1.0]);
-        Ok(Self { plan, camera, normals: settings.normals(mesh, valid, field), range })
+        Ok(Self { plan, camera, bounds: valid.bounds, normals: settings.normals(mesh, valid, field), range })
     }
 }
 

@@ -11,7 +11,7 @@ use crate::text::{grouped, in_blocks, milliseconds, single};
 use olbvh::blocks::{Picture, RenderRequest};
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
-use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
+use olbvh::mesh::{Field, Mesh, On};
 use olbvh::options::{BuildOptions, Fineness};
 use olbvh::render::camera::{CameraSpec, HELP};
 use olbvh::render::clip;
@@ -33,7 +33,7 @@ Examples:
   olbvh render bracket.vtu -o bent.png --warp displacement=300       the deformed shape, 300 times as bent as it is
   olbvh render bracket.vtu -o near.png --camera eye=120,-80,60,target=40,30,20,fov=25
 
-By default, the camera sees the whole mesh. An opacity, of --opacity or a transfer function, is that of a layer as thick as 1/100 of the diagonal of \
+By default, the camera sees the whole mesh; --json tells where it stands, in words for --camera. An opacity, of --opacity or a transfer function, is that of a layer as thick as 1/100 of the diagonal of \
 the mesh's bounds. The picture depends little on --step and, where cells of the mesh do not overlap each other, not at all on --alpha, --level, \
 --lists, --assign, --memory and --budget. Octree nodes in which the opacity is 0 everywhere are skipped, so pictures that show few of the values are \
 drawn fast.";
@@ -157,7 +157,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "rendering");
     let asked = RenderRequest { mesh: &loaded.mesh, options, field: &field, settings: &settings };
     let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
-    let Picture { mut rendered, plan, range: [lo, hi] } = picture;
+    let Picture { mut rendered, plan, camera, bounds, range: [lo, hi] } = picture;
     let (mut pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
@@ -174,7 +174,6 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         common.remark(format_args!("the picture is empty: {why}"));
     }
     if args.bounds {
-        let bounds = Bounds::from(&valid_grid(&loaded.mesh));
         bounding_box::draw(&mut rendered.colors, &plan, &bounds, args.supersample);
         pixels = plan.pixels(&rendered.colors, args.supersample);
     }
@@ -191,7 +190,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let json = json!({
         "file": args.output.display().to_string(), "width": width, "height": height, "supersample": args.supersample,
         "field": field.name, "range": [single(lo), single(hi)], "iso": settings.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
-        "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
+        "camera": camera.text(&bounds, loaded.mesh.origin), "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
         "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
         "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
         "seconds": seconds, "device": engine.name(),

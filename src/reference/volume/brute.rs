@@ -18,7 +18,7 @@ struct Cell {
 /// Draws what [`super::render`] should draw for `settings`, in time proportional to samples × tetrahedra, as straight
 /// RGBA. The transfer function of `settings` must have opacities. Only size, clips and light are taken from the scene's plan.
 pub fn brute_force(scene: &Drawing<'_>, settings: &RenderSettings, bounds: &Bounds) -> Vec<u8> {
-    let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.range(), &scene.prepared.camera);
+    let (cells, plan, range, camera) = (cells(scene), scene.plan(), scene.prepared.range, &scene.prepared.camera);
     let [width, height] = plan.size.map(f64::from);
     let diagonal = bounds.diagonal();
     let step = settings.step.unwrap_or(diagonal / 512.0);

@@ -99,6 +99,23 @@ impl std::str::FromStr for CameraSpec {
     }
 }
 
+impl Camera {
+    /// The text of a [`CameraSpec`] that gives this camera again, for a mesh with these bounds, whose coordinates are
+    /// relative to `origin`. It looks at the point of the view's axis that is nearest to the middle of the bounds, or,
+    /// with its back to them, at one as far away.
+    pub fn text(&self, bounds: &Bounds, origin: [f64; 3]) -> String {
+        let corners = bounds.corners();
+        let depth = ((corners[0] + corners[7]) * 0.5 - self.eye).dot(self.forward).abs().max(bounds.diagonal() * 0.5);
+        let vector = |v: DVec3| v.to_array().map(|x| x.to_string()).join(",");
+        let eye = self.eye + DVec3::from_array(origin);
+        let projection = match self.projection {
+            Projection::Perspective(degrees) => format!("fov={degrees}"),
+            Projection::Orthographic(height) => format!("ortho={height}"),
+        };
+        format!("eye={},target={},up={},{projection}", vector(eye), vector(eye + self.forward * depth), vector(self.up))
+    }
+}
+
 /// A finite number.
 fn number(text: &str) -> Option<f64> {
     text.trim().parse::<f64>().ok().filter(|v| v.is_finite())

@@ -38,6 +38,23 @@ fn parallel_views_from_an_eye_hold_the_whole_mesh() {
     }
 }
 
+/// A camera's text gives it again, also far from 0, with its back to the mesh, and relative to an origin.
+#[test]
+fn a_camera_has_a_text() {
+    let far = Bounds { lo: [-1e6, 2e6, 0.0], hi: [-1e6 + 9.0, 2e6 + 4.0, 1.5] };
+    for bounds in [BOX, far] {
+        for text in ["iso", "bottom,ortho,zoom=3", "azimuth=200,elevation=-35,fov=80", "up=1,0,0", "eye=5,1,1,target=9,-9,3,zoom=2"] {
+            let camera = text.parse::<CameraSpec>().unwrap().resolve(&bounds, [5e5, -7.25, 0.0], 1.3).unwrap();
+            let told = camera.text(&bounds, [5e5, -7.25, 0.0]);
+            let again = told.parse::<CameraSpec>().unwrap().resolve(&bounds, [5e5, -7.25, 0.0], 0.7).unwrap();
+            assert_eq!(again.projection, camera.projection, "{told}");
+            assert!((again.eye - camera.eye).length() < 1e-9, "{told}: {} {}", again.eye, camera.eye);
+            let pairs = [(again.forward, camera.forward), (again.right, camera.right), (again.up, camera.up)];
+            assert!(pairs.iter().all(|(a, b)| (*a - *b).length() < 1e-9), "{told}: {pairs:?}");
+        }
+    }
+}
+
 /// A mesh with y up is seen as the mesh with z up that it is otherwise equal to, from every side.
 #[test]
 fn views_turn_with_up() {

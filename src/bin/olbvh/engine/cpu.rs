@@ -14,6 +14,7 @@ use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Drawing};
+use olbvh::render::Prepared;
 use olbvh::slicing::{BAND_VOXELS, Tally, bands};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
@@ -107,7 +108,8 @@ impl Engine for Cpu {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
             let volume::Picture { colors, stats, .. } = volume::render(&scene, report);
-            Ok(Picture { rendered: Rendered { colors, stats }, plan: scene.plan().clone(), range: scene.range() })
+            let Prepared { plan, camera, bounds, range, .. } = scene.prepared().clone();
+            Ok(Picture { rendered: Rendered { colors, stats }, plan, camera, bounds, range })
         })
     }
 
