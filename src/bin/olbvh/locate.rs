@@ -88,22 +88,9 @@ pub struct Args {
     memory: MemoryArgs,
 }
 
-/// What the summary at the end reports.
-struct Done {
-    found: usize,
-    /// Points outside that have a place of the surface instead.
-    beside: usize,
-    took: InBlocks,
-}
-
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
-    if !(0.0..=1.0).contains(&args.tolerance) {
-        return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", args.tolerance)));
-    }
-    if args.within.is_some_and(|within| within.is_nan() || within < 0.0) {
-        return Err(Failure::Usage("--within: a distance of 0 or more is needed".into()));
-    }
+    args.check()?;
     let formats: &[_] = if args.all { &[OutputFormat::Csv, OutputFormat::Npy, OutputFormat::Json] } else { &Located::FORMATS };
     let output = ResultOutput::announce(&args.output, formats, &[&args.mesh, &args.points], common)?;
     let options = args.tree.suited(Fineness::Points)?;
@@ -111,83 +98,131 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
     let mesh = &loaded.mesh;
-    let fields: Vec<&Field> = if args.all {
-        Vec::new()
-    } else if args.all_fields && output.format == OutputFormat::Vtu {
-        without_lengths(&mesh.fields)
-    } else if args.all_fields {
-        mesh.fields.iter().collect()
-    } else if args.field.is_empty() {
-        input::field(mesh, None)?.into_iter().collect()
-    } else {
-        args.field.iter().map(|name| input::field_named(mesh, name)).collect::<Outcome<_>>()?
-    };
-    let points = if args.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&args.points) };
-    let mut points = points.map_err(Failure::input)?;
-    if points.is_empty() {
-        common.remark(format_args!("{}: no points in it", args.points.display()));
-    }
-    let of = if output.format == OutputFormat::Vtu && !args.all { probed(&args.points, points.len(), common) } else { None };
-    if let Some(Mesh { points: all, origin, .. }) = &of {
-        // Those in the middle of cells are not in the file.
-        points.extend(all[points.len()..].iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + origin[c])));
-    }
+    let fields = args.fields(mesh, output.format)?;
+    let (points, of) = args.points(output.format, common)?;
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
     let method = if args.coherent { LocateMethod::Descent } else { LocateMethod::Suited };
     let asked = LocateRequest { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.set(done, total);
-    let start = Instant::now();
-    let mut seconds;
-    let done = if args.all {
-        let (owners, took) = engine.locate_all(&asked, args.memory.memory, &report)?.into_parts();
-        seconds = start.elapsed().as_secs_f64();
-        Done { found: every_owner(&output, mesh, &owners)?, beside: 0, took }
+    let (start, memory) = (Instant::now(), args.memory.memory);
+    let (found, beside, took, seconds) = if args.all {
+        let (owners, took) = engine.locate_all(&asked, memory, &report)?.into_parts();
+        let seconds = start.elapsed().as_secs_f64();
+        (write_every_owner(&output, mesh, &owners)?, 0, took, seconds)
     } else {
-        let (mut located, took) = engine.locate(&asked, args.memory.memory, &report)?.into_parts();
-        let found = located.owners.iter().filter(|&&tet| tet != u32::MAX).count();
-        let distances =
-            args.within.map(|within| beside(&*engine, &asked, &mut located, within, args.memory.memory, &report)).transpose()?;
+        let (mut located, took) = engine.locate(&asked, memory, &report)?.into_parts();
+        let found = with_owner(&located);
+        let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, memory, &report)).transpose()?;
         let values = columns(mesh, &fields, args.all_fields, &located, distances);
-        seconds = start.elapsed().as_secs_f64();
+        let seconds = start.elapsed().as_secs_f64();
         let owner: Vec<u32> = located.owners.iter().map(|&tet| if tet == u32::MAX { tet } else { mesh.cell_id(tet) }).collect();
-        write_located(
-            output.path(),
-            &Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values },
-        )?;
-        Done { found, beside: located.owners.iter().filter(|&&tet| tet != u32::MAX).count() - found, took }
+        let written = Located { points: &points, of: of.as_ref(), owner: &owner, bary: &located.barycentrics, values: &values };
+        write_located(output.path(), &written)?;
+        (found, with_owner(&located) - found, took, seconds)
     };
     drop(progress);
-    let took = done.took;
-    if done.found + done.beside == 0 && !points.is_empty() {
-        let (grid, [x, y, z]) = (valid_grid(mesh), mesh.origin);
-        let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
-        let Bounds { lo, hi } = Bounds::from(&grid);
-        common.remark(format_args!("no point lies in the mesh, which reaches from {} to {}", corner(lo), corner(hi)));
+    if found + beside == 0 && !points.is_empty() {
+        remark_on_bounds(mesh, common);
     }
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
-    seconds -= took.build_seconds;
-    let per_second = if seconds > 0.0 { points.len() as f64 / seconds } else { 0.0 };
-    let json = json!({
-        "file": args.output.display().to_string(), "points": points.len(), "found": done.found, "beside": done.beside, "seconds": seconds,
-        "points_per_second": per_second, "field": fields.first().map(|f| &f.name), "fields": fields.iter().map(|f| &f.name).collect::<Vec<_>>(), "tolerance": single(args.tolerance),
-        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
-        "device": engine.name(),
-    });
-    // With few points, most of the time passes before the first one, so no rate is printed.
-    let rate = if points.len() < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };
-    let near = args.within.map_or(String::new(), |within| format!(", {} more at most {within} away", grouped(done.beside as u64)));
-    let text = format!(
-        "{}: {}, {} of them in the mesh{near}; {} on {}{rate}{}\n",
-        args.output.display(),
-        counted(points.len() as u64, "point"),
-        grouped(done.found as u64),
-        milliseconds(seconds * 1e3),
-        engine.name(),
-        in_blocks(&took)
-    );
-    output.finish(common, &json, &text)
+    let seconds = seconds - took.build_seconds;
+    Done { points: points.len(), found, beside, fields, took, seconds, device: engine.name() }.report(args, output, common)
+}
+
+impl Args {
+    /// Checks numbers.
+    fn check(&self) -> Outcome {
+        if !(0.0..=1.0).contains(&self.tolerance) {
+            return Err(Failure::Usage(format!("--tolerance {}: a number from 0 to 1 is needed", self.tolerance)));
+        }
+        if self.within.is_some_and(|within| within.is_nan() || within < 0.0) {
+            return Err(Failure::Usage("--within: a distance of 0 or more is needed".into()));
+        }
+        Ok(())
+    }
+
+    /// The fields to interpolate.
+    fn fields<'a>(&self, mesh: &'a Mesh, format: OutputFormat) -> Outcome<Vec<&'a Field>> {
+        Ok(if self.all {
+            Vec::new()
+        } else if self.all_fields && format == OutputFormat::Vtu {
+            without_lengths(&mesh.fields)
+        } else if self.all_fields {
+            mesh.fields.iter().collect()
+        } else if self.field.is_empty() {
+            input::field(mesh, None)?.into_iter().collect()
+        } else {
+            self.field.iter().map(|name| input::field_named(mesh, name)).collect::<Outcome<_>>()?
+        })
+    }
+
+    /// The points and, if a mesh is to be written with results at its points, the mesh that they are those of.
+    fn points(&self, format: OutputFormat, common: &Common) -> Outcome<(Vec<[f64; 3]>, Option<Mesh>)> {
+        let points = if self.points == Path::new("-") { read_points(std::io::stdin()) } else { load_points(&self.points) };
+        let mut points = points.map_err(Failure::input)?;
+        if points.is_empty() {
+            common.remark(format_args!("{}: no points in it", self.points.display()));
+        }
+        let of = if format == OutputFormat::Vtu && !self.all { probed(&self.points, points.len(), common) } else { None };
+        if let Some(Mesh { points: all, origin, .. }) = &of {
+            // Those in the middle of cells are not in the file.
+            points.extend(all[points.len()..].iter().map(|p| [0, 1, 2].map(|c| f64::from(p[c]) + origin[c])));
+        }
+        Ok((points, of))
+    }
+}
+
+/// Points that were located.
+struct Done<'a> {
+    points: usize,
+    found: usize,
+    /// Points outside that have a place of the surface instead.
+    beside: usize,
+    fields: Vec<&'a Field>,
+    took: InBlocks,
+    seconds: f64,
+    device: String,
+}
+
+impl Done<'_> {
+    /// Prints the summary.
+    fn report(&self, args: &Args, output: ResultOutput, common: &Common) -> Outcome {
+        let Self { points, found, beside, fields, took, seconds, device } = self;
+        let per_second = if *seconds > 0.0 { *points as f64 / seconds } else { 0.0 };
+        let names: Vec<_> = fields.iter().map(|f| &f.name).collect();
+        let json = json!({
+            "file": args.output.display().to_string(), "points": points, "found": found, "beside": beside, "seconds": seconds,
+            "points_per_second": per_second, "field": names.first(), "fields": names, "tolerance": single(args.tolerance),
+            "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
+            "device": device,
+        });
+        // With few points, most of the time passes before the first one, so no rate is printed.
+        let rate = if *points < 1000 { String::new() } else { format!(", {} points a second", grouped(per_second as u64)) };
+        let near = args.within.map_or(String::new(), |within| format!(", {} more at most {within} away", grouped(*beside as u64)));
+        let text = format!(
+            "{}: {}, {} of them in the mesh{near}; {} on {device}{rate}{}\n",
+            args.output.display(),
+            counted(*points as u64, "point"),
+            grouped(*found as u64),
+            milliseconds(seconds * 1e3),
+            in_blocks(took)
+        );
+        output.finish(common, &json, &text)
+    }
+}
+
+/// Number of points that have an owner.
+fn with_owner(located: &query::Located) -> usize {
+    located.owners.iter().filter(|&&tet| tet != u32::MAX).count()
+}
+
+/// Remarks on points of which none lies in the mesh.
+fn remark_on_bounds(mesh: &Mesh, common: &Common) {
+    let (Bounds { lo, hi }, [x, y, z]) = (Bounds::from(&valid_grid(mesh)), mesh.origin);
+    let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
+    common.remark(format_args!("no point lies in the mesh, which reaches from {} to {}", corner(lo), corner(hi)));
 }
 
 /// The mesh whose points were located, if it has volume cells.
@@ -205,7 +240,7 @@ fn probed(path: &Path, points: usize, common: &Common) -> Option<Mesh> {
 
 /// Gives points without an owner the closest place of the surface within a distance. Returns the distance of every point,
 /// 0 in the mesh, NaN if nothing is so near.
-fn beside(
+fn move_beside(
     engine: &dyn Engine,
     asked: &LocateRequest<'_>,
     located: &mut query::Located,
@@ -251,7 +286,7 @@ fn columns(mesh: &Mesh, fields: &[&Field], named: bool, located: &query::Located
 }
 
 /// Writes every owner of every point as rows (point, cell); returns how many points have an owner.
-fn every_owner(output: &ResultOutput, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
+fn write_every_owner(output: &ResultOutput, mesh: &Mesh, owners: &[Vec<u32>]) -> Outcome<usize> {
     let cells = |tets: &Vec<u32>| {
         let mut cells: Vec<u32> = tets.iter().map(|&tet| mesh.cell_id(tet)).collect();
         cells.sort_unstable();

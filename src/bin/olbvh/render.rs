@@ -8,7 +8,7 @@ use crate::input::{self, MemoryArgs, TreeArgs, WarpArgs};
 use crate::legend::{Explained, Legend};
 use crate::output::{Progress, ResultOutput};
 use crate::text::{grouped, in_blocks, milliseconds, single};
-use olbvh::blocks::{Picture, RenderRequest};
+use olbvh::blocks::{InBlocks, Picture, RenderRequest};
 use olbvh::error::{Error, Result};
 use olbvh::formats::{OutputFormat, printable, write_png};
 use olbvh::mesh::{Field, Mesh, On};
@@ -127,89 +127,99 @@ struct Opacity(Vec<(f32, f32)>);
 #[derive(Clone)]
 struct Iso(Vec<f32>);
 
+/// Opacities below this do not change a pixel of 8 bits.
+const FAINT: f32 = 1.0 / 510.0;
+
 /// Runs the subcommand.
 pub fn run(args: &Args, common: &Common) -> Outcome {
     let output = ResultOutput::announce(&args.output, &[OutputFormat::Png], &[&args.mesh], common)?;
-    let mut options = BuildOptions { slabs: true, ..args.tree.suited(Fineness::Pictures)? };
+    let options = args.tree.suited(Fineness::Pictures)?;
     let legend = args.legend()?;
     let mut settings = args.settings(legend.as_ref())?;
     settings.check()?;
     let engine = engine::open(common)?;
     let mut loaded = args.tree.mesh(&args.mesh, common)?;
     args.warp.apply(&mut loaded.mesh, common)?;
-    let rays: u64 = settings.size.into_iter().map(u64::from).product();
-    if 2 * rays < loaded.mesh.tets.len() as u64 {
-        // Slabs and a second build over this many tetrahedra would take longer than they save.
-        options.slabs = false;
-        options.fineness = if options.fineness == Fineness::Pictures { Fineness::Points } else { options.fineness };
-    }
-    let field = args.field(&loaded.mesh, common)?;
-    let expected = remark_on_iso(&settings.iso, &field, common);
-    if let (Some([lo, hi]), Some([least, most])) = (settings.range.or(settings.transfer.range()), field.range())
-        && (most < lo || least > hi)
-    {
-        let name = printable(&field.name);
-        common.remark(format_args!("values of {name} go from {least} to {most}, none of them within the range {lo} to {hi} that is shown"));
-    }
-    let suited = suited_step(&loaded.mesh.points, &loaded.mesh.tets);
+    let mesh = &loaded.mesh;
+    let options = suited_to_picture(options, settings.size, mesh);
+    let field = args.field(mesh, common)?;
+    let expects_something = remark_on_iso(&settings.iso, &field, common);
+    remark_on_range(settings.range.or(settings.transfer.range()), &field, common);
+    let suited = suited_step(&mesh.points, &mesh.tets);
     settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
-    let asked = RenderRequest { mesh: &loaded.mesh, options, field: &field, settings: &settings };
-    let (picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
-    let Picture { mut rendered, plan, camera, bounds, range: [lo, hi] } = picture;
-    let (mut pixels, stats, step) = (plan.pixels(&rendered.colors, args.supersample), rendered.stats, plan.step);
+    let asked = RenderRequest { mesh, options, field: &field, settings: &settings };
+    let (mut picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
-    let [width, height] = settings.size.map(|rays| rays / args.supersample);
-    let behind = |y: usize| settings.background.pixel([0.0; 4], y as u32, height);
-    if expected && pixels.chunks(4 * width as usize).enumerate().all(|(y, row)| row.chunks(4).all(|pixel| pixel == behind(y))) {
-        let why = if field.range().is_none() {
-            format!("{} has no value", printable(&field.name))
-        } else if stats.found_samples == 0 && loaded.report.flat == loaded.report.tetrahedra {
-            "all cells are flat".into()
-        } else {
-            "the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)".into()
-        };
-        common.remark(format_args!("the picture is empty: {why}"));
+    if expects_something && picture.rendered.colors.iter().all(|color| color[3] < FAINT) {
+        let no_volume = picture.rendered.stats.found_samples == 0 && loaded.report.flat == loaded.report.tetrahedra;
+        remark_on_emptiness(&field, no_volume, common);
     }
-    if args.bounds {
-        bounding_box::draw(&mut rendered.colors, &plan, &bounds, args.supersample);
-        pixels = plan.pixels(&rendered.colors, args.supersample);
-    }
-    if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(step)) {
+    if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(picture.plan.step)) {
         common.remark(format_args!(
-            "the mesh is about {thickness:.1e} thick, the step is {step:.1e}: the picture may show rings, or miss parts; --step sets it"
+            "the mesh is about {thickness:.1e} thick, the step is {:.1e}: the picture may show rings, or miss parts; --step sets it",
+            picture.plan.step
         ));
     }
+    if args.bounds {
+        bounding_box::draw(&mut picture.rendered.colors, &picture.plan, &picture.bounds, args.supersample);
+    }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
-    let explained = Explained { field: &printable(&field.name), range: [lo, hi], plan: &plan };
-    let pixels = legend.map(|legend| legend.beside(&pixels, &explained)).unwrap_or(pixels);
-    let [width, height] = args.size;
-    write_png(output.path(), width, height, &pixels)?;
-    let json = json!({
-        "file": args.output.display().to_string(), "width": width, "height": height, "supersample": args.supersample,
-        "field": field.name, "range": [single(lo), single(hi)], "iso": settings.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
-        "camera": camera.text(&bounds, loaded.mesh.origin), "step": single(step), "samples": stats.samples, "skipped_samples": stats.skipped_samples, "found_samples": stats.found_samples,
-        "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms, "march_ms": stats.march_ms,
-        "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak, "bad_cells": took.bad_cells[0],
-        "seconds": seconds, "device": engine.name(),
-    });
-    let text = format!(
-        "{}: {} from {lo} to {hi}, {width}x{height} pixels{}, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {}{}\n",
-        args.output.display(),
-        printable(&field.name),
-        if args.supersample > 1 { format!(" of {0}x{0} rays", args.supersample) } else { String::new() },
-        single(step),
-        grouped(stats.samples),
-        grouped(stats.found_samples),
-        grouped(stats.skipped_samples),
-        milliseconds(stats.interval_ms),
-        milliseconds(stats.march_ms),
-        engine.name(),
-        in_blocks(&took)
-    );
-    output.finish(common, &json, &text)
+    args.write(&picture, &field, legend, &output)?;
+    let camera = picture.camera.text(&picture.bounds, mesh.origin);
+    Done { picture, camera, field, took, seconds, device: engine.name() }.report(args, output, common)
+}
+
+/// Options of a tree for a picture of this size. Slabs and a second build over more than two tetrahedra per ray would take
+/// longer than they save.
+fn suited_to_picture(options: BuildOptions, size: [u32; 2], mesh: &Mesh) -> BuildOptions {
+    let rays: u64 = size.into_iter().map(u64::from).product();
+    let slabs = 2 * rays >= mesh.tets.len() as u64;
+    let fineness = if options.fineness == Fineness::Pictures && !slabs { Fineness::Points } else { options.fineness };
+    BuildOptions { slabs, fineness, ..options }
+}
+
+/// A picture that was drawn.
+struct Done {
+    picture: Picture,
+    /// Its camera, as `--camera` takes it.
+    camera: String,
+    field: Field,
+    took: InBlocks,
+    seconds: f64,
+    device: String,
+}
+
+impl Done {
+    /// Prints the summary.
+    fn report(&self, args: &Args, output: ResultOutput, common: &Common) -> Outcome {
+        let Self { picture: Picture { rendered, plan, range: [lo, hi], .. }, camera, field, took, seconds, device } = self;
+        let (stats, [width, height], n) = (rendered.stats, args.size, args.supersample);
+        let json = json!({
+            "file": args.output.display().to_string(), "width": width, "height": height, "supersample": n,
+            "field": field.name, "range": [single(*lo), single(*hi)], "iso": plan.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
+            "camera": camera, "step": single(plan.step), "samples": stats.samples, "skipped_samples": stats.skipped_samples,
+            "found_samples": stats.found_samples, "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms,
+            "march_ms": stats.march_ms, "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak,
+            "bad_cells": took.bad_cells[0], "seconds": seconds, "device": device,
+        });
+        let text = format!(
+            "{}: {} from {lo} to {hi}, {width}x{height} pixels{}, step {}\n{} samples, {} in the mesh, {} skipped; ray intervals {}, marching {} on {device}{}\n",
+            args.output.display(),
+            printable(&field.name),
+            if n > 1 { format!(" of {n}x{n} rays") } else { String::new() },
+            single(plan.step),
+            grouped(stats.samples),
+            grouped(stats.found_samples),
+            grouped(stats.skipped_samples),
+            milliseconds(stats.interval_ms),
+            milliseconds(stats.march_ms),
+            in_blocks(took)
+        );
+        output.finish(common, &json, &text)
+    }
 }
 
 impl Args {
@@ -256,6 +266,15 @@ impl Args {
         })
     }
 
+    /// Writes the picture, with its legend.
+    fn write(&self, picture: &Picture, field: &Field, legend: Option<Legend>, output: &ResultOutput) -> Outcome {
+        let pixels = picture.plan.pixels(&picture.rendered.colors, self.supersample);
+        let explained = Explained { field: &printable(&field.name), range: picture.range, plan: &picture.plan };
+        let pixels = legend.map(|legend| legend.beside(&pixels, &explained)).unwrap_or(pixels);
+        let [width, height] = self.size;
+        Ok(write_png(output.path(), width, height, &pixels)?)
+    }
+
     /// The field to draw. A mesh without fields is coloured by height, so that there is something to see.
     fn field(&self, mesh: &Mesh, common: &Common) -> Outcome<Field> {
         if let Some(field) = input::field(mesh, self.field.as_deref())? {
@@ -264,6 +283,28 @@ impl Args {
         common.remark("the mesh has no fields; drawing the height z");
         Ok(Field { name: "z".into(), on: On::Points, values: mesh.points.iter().map(|p| p[2]).collect() })
     }
+}
+
+/// Remarks on a range in which the field has no values.
+fn remark_on_range(range: Option<[f32; 2]>, field: &Field, common: &Common) {
+    if let (Some([lo, hi]), Some([least, most])) = (range, field.range())
+        && (most < lo || least > hi)
+    {
+        let name = printable(&field.name);
+        common.remark(format_args!("values of {name} go from {least} to {most}, none of them within the range {lo} to {hi} that is shown"));
+    }
+}
+
+/// Remarks on a picture in which nothing is to be seen.
+fn remark_on_emptiness(field: &Field, no_volume: bool, common: &Common) {
+    let why = if field.range().is_none() {
+        format!("{} has no value", printable(&field.name))
+    } else if no_volume {
+        "all cells are flat".into()
+    } else {
+        "the camera (--camera, --clip) does not see the mesh, or only what is transparent (--opacity)".into()
+    };
+    common.remark(format_args!("the picture is empty: {why}"));
 }
 
 /// Remarks on iso-values that show nothing, or little. Returns whether something may be seen.
