@@ -104,8 +104,9 @@ fn reason(path: &Path, error: &io::Error) -> String {
 }
 
 impl Error {
-    /// Whether the error is a lack of memory or capacity, so that a smaller request may succeed.
-    pub(crate) fn is_lack_of_room(&self) -> bool {
+    /// Whether the error is a lack of memory or capacity, so that a smaller request may succeed: a coarser tree, or the
+    /// same work in blocks ([`crate::blocks`]).
+    pub fn is_lack_of_room(&self) -> bool {
         // Any Vulkan call may run out of memory, not only an allocation.
         let full = matches!(self, Self::Vulkan { result: ash::vk::Result::ERROR_OUT_OF_DEVICE_MEMORY, .. });
         full || matches!(self, Self::Memory { .. } | Self::TooLarge(_))

@@ -40,6 +40,7 @@
 //! small α, or `Lists::Boundary`.
 
 use crate::build::{MeshView, TreeMemory};
+use crate::error::Result;
 use crate::gpu::BufferRef;
 pub use crate::layout::SceneAddresses;
 use crate::options::Lists;
@@ -60,14 +61,18 @@ impl SceneBuffers {
     pub const COUNT: usize = 11;
 
     /// The arrays of a mesh and its tree, and optionally a field with one float per point.
-    pub fn new(mesh: &MeshView, tree: &TreeMemory, field: Option<BufferRef>) -> Self {
+    ///
+    /// # Errors
+    /// [`crate::Error::Invalid`] for a field with fewer floats.
+    pub fn new(mesh: &MeshView, tree: &TreeMemory, field: Option<BufferRef>) -> Result<Self> {
+        field.map_or(Ok(()), |field| field.check(4 * u64::from(mesh.input.points), "a field"))?;
         let TreeMemory { grid, masks, co, po, p, flags, lists, .. } = *tree;
         let (cells, vertices, neighbours) = (mesh.input.cells, mesh.arrays.vertices, mesh.arrays.neighbours);
-        Self {
+        Ok(Self {
             arrays: [grid, masks, co, po, p, flags, cells, vertices, neighbours, field.unwrap_or(grid)],
             lists,
             has_field: field.is_some(),
-        }
+        })
     }
 
     /// The content of the buffer whose address identifies the tree.

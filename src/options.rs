@@ -102,7 +102,8 @@ pub struct BuildOptions {
     pub assign: Assign,
     /// The tetrahedra that a leaf lists.
     pub lists: Lists,
-    /// Whether to store a box per node (24 bytes each). Otherwise boxes follow from the grid.
+    /// Whether to store a box per node (24 bytes each), as the paper does. No query of this crate reads them, as boxes follow
+    /// from the grid: they are for those who download the tree ([`crate::build::Tree::download`]).
     pub boxes: bool,
     /// Whether the leaves at the surface get slabs ([`crate::reference::slabs`]), which tell most points beside the mesh
     /// without a search. They take 4 bytes per leaf, and a build of thin bodies up to a third longer. They pay for pictures

@@ -259,7 +259,7 @@ fn check(binding: Binding) {
     for lists in [Lists::All, Lists::Boundary] {
         let tree = Tree::build(&gpu, &device, &BuildOptions { lists, slabs: true, ..BuildOptions::default() }).unwrap();
         let view = device.view();
-        let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())));
+        let (level, scene) = (tree.grid().level, SceneBuffers::new(&view, tree.memory(), Some(field.all())).unwrap());
         let found = run::<9>(&gpu, ANSWERS, &scene, level, &points);
         let options = LocateOptions::default();
         let expected = locate(&tree, &points, Some((&values, On::Points)), &options, SILENT).unwrap();
@@ -280,7 +280,7 @@ fn check(binding: Binding) {
             assert!(lists == Lists::Boundary || met <= owner, "{what}: the traversal has missed a leaf");
         }
         assert!(expected.owners.iter().filter(|o| **o == u32::MAX).count() > 100);
-        let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None), level, &mesh.points);
+        let without = run::<9>(&gpu, ANSWERS, &SceneBuffers::new(&view, tree.memory(), None).unwrap(), level, &mesh.points);
         assert!(without.iter().all(|found| found[2..4].iter().all(|&bits| f32::from_bits(bits).is_nan())), "values without a field");
         check_walks(&mesh, &device, &points, &expected, &run::<5>(&gpu, WALKS, &scene, level, &points));
         let nearest = [0, 1, 3].map(|stack| run::<2>(&gpu, &format!("#define OLBVH_STACK {stack}\n{NEAREST}"), &scene, level, &points));

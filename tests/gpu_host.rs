@@ -23,7 +23,9 @@ use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{LocateOptions, SILENT, locate};
 use std::ffi::c_char;
-use std::sync::{Arc, Barrier, Mutex, OnceLock};
+use std::panic::AssertUnwindSafe;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Barrier, Mutex, OnceLock, PoisonError};
 use submit::submit;
 
 fn owners(gpu: &Gpu, mesh: &Mesh) -> Vec<u32> {
@@ -67,7 +69,8 @@ fn a_hosts_device_allocator_and_cache_are_used_and_left() {
 /// A queue of a host that does what it should not: it passes the queue on twice.
 struct Twice(Arc<Mutex<vk::Queue>>);
 
-impl HostQueue for Twice {
+// SAFETY: the lock is held.
+unsafe impl HostQueue for Twice {
     fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
         let queue = self.0.lock().unwrap();
         submit(*queue);
@@ -83,6 +86,39 @@ fn commands_are_submitted_once() {
     let gpu = unsafe { Gpu::from_raw(HostDevice { queue: Some(queue), ..host.lend() }, &GpuOptions::default()) }.unwrap();
     let mesh = kuhn_jittered([3; 3], 0.3, 1).unwrap();
     assert!(owners(&gpu, &mesh).iter().all(|&o| o != u32::MAX));
+}
+
+/// A queue whose lock panics, once, when it has passed the queue on.
+struct Panics(Arc<Mutex<vk::Queue>>, AtomicBool);
+
+// SAFETY: the lock is held.
+unsafe impl HostQueue for Panics {
+    fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
+        let queue = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        submit(*queue);
+        assert!(!self.1.swap(false, Ordering::Relaxed), "the host's lock fails");
+    }
+}
+
+/// What a submission uses is freed only when it has been executed, also if the call unwinds.
+#[test]
+fn a_host_that_panics_frees_nothing_in_use() {
+    let host = Host::new();
+    let queue = Arc::new(Panics(host.queue(), AtomicBool::new(false)));
+    // SAFETY: as above.
+    let gpu = unsafe { Gpu::from_raw(HostDevice { queue: Some(queue.clone()), ..host.lend() }, &GpuOptions::default()) }.unwrap();
+    let words = vec![7u32; 1 << 20];
+    let buffer = gpu.upload("olbvh.test.words", &words).unwrap();
+    queue.1.store(true, Ordering::Relaxed);
+    let copied = std::panic::catch_unwind(AssertUnwindSafe(|| {
+        let to = gpu.buffer("olbvh.test.copy", buffer.size()).unwrap();
+        submit(&gpu, "olbvh.test.copy", |r| {
+            r.copy(buffer.all(), to.all());
+            Ok(())
+        })
+    }));
+    assert!(copied.is_err(), "the panic reaches the caller");
+    assert_eq!(gpu.download::<u32>(&buffer, buffer.all()).unwrap(), words, "the device works on");
 }
 
 #[test]

@@ -77,7 +77,7 @@ impl Body {
             let positions = host.filled("positions", &mesh.points, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
             let memory = device_buffer("tree", bytes.memory)?;
             let scene = plan.place(gpu, positions.part(), cells.part(), memory.part(), scratch.part())?;
-            let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, Some(values.part()));
+            let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, Some(values.part()))?;
             let tree = host.filled("addresses", &[buffers.addresses()], USAGE)?;
             let set = sets.map(|(pool, layout)| descriptor_set(host, pool, layout, &buffers.list(tree.part()))).transpose()?;
             Ok(Deformed { positions, tree, set, memory, scene })

@@ -87,7 +87,8 @@ impl Capacity {
     }
 }
 
-/// The arrays of a tree in device memory (SPEC 2.5), parts of one range.
+/// The arrays of a tree in device memory (SPEC 2.5): parts of one range in memory of a host; in a [`super::Tree`], `p` has a
+/// buffer of its own.
 #[derive(Clone, Copy, Debug)]
 pub struct TreeMemory {
     /// The assignment of tetrahedra to grid cells.

@@ -43,6 +43,18 @@ pub struct MeshInput {
     pub tets: u32,
 }
 
+impl MeshInput {
+    /// Rejects sizes that shaders cannot number, and parts that are too small.
+    pub(super) fn check(&self) -> Result<()> {
+        check_tets(self.tets)?;
+        check_points("positions", self.points, self.stride)?;
+        if let Some(others) = self.points.checked_sub(1) {
+            self.positions.check(4 * (u64::from(self.stride) * u64::from(others) + 3), "positions")?;
+        }
+        self.cells.check(16 * u64::from(self.tets), "cells")
+    }
+}
+
 /// The results of stage 0 for a mesh: parts of one range of memory, needed as long as trees and queries use the mesh.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct MeshArrays {
@@ -187,12 +199,7 @@ pub(super) struct Stage0<'a> {
 
 impl<'a> Stage0<'a> {
     pub fn new(input: &'a MeshInput, arrays: &'a MeshArrays, scratch: &'a MeshScratch) -> Result<Self> {
-        check_tets(input.tets)?;
-        check_points("positions", input.points, input.stride)?;
-        if let Some(others) = input.points.checked_sub(1) {
-            input.positions.check(4 * (u64::from(input.stride) * u64::from(others) + 3), "positions")?;
-        }
-        input.cells.check(16 * u64::from(input.tets), "cells")?;
+        input.check()?;
         arrays.vertices.check(16 * u64::from(input.points), "the mesh's vertices")?;
         arrays.neighbours.check(16 * u64::from(input.tets), "the mesh's neighbours")?;
         Ok(Self { input, arrays, scratch })

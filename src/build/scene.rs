@@ -1,7 +1,9 @@
 //! A mesh and its tree in memory of a host, which rebuilds them as often as it likes.
 
-use super::{BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, cmd_build, cmd_move_mesh, cmd_prepare_mesh};
-use crate::error::{Error, Result};
+use super::{
+    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, check_points, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
+};
+use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Gpu, Recorder};
 use crate::options::BuildOptions;
 
@@ -54,6 +56,7 @@ impl ScenePlan {
     /// # Errors
     /// [`Error::Invalid`] for options or a capacity out of their limits, [`Error::TooLarge`] for too many tetrahedra.
     pub fn bytes(&self, gpu: &Gpu) -> Result<SceneBytes> {
+        self.check()?;
         Ok(SceneBytes { memory: Arena::measure(|a| self.memory(a))?, scratch: Arena::measure(|a| self.scratch(gpu, a))? })
     }
 
@@ -64,18 +67,20 @@ impl ScenePlan {
     /// As [`ScenePlan::bytes`], and [`Error::Invalid`] for parts that are too small.
     pub fn place(&self, gpu: &Gpu, positions: BufferRef, cells: BufferRef, memory: BufferRef, scratch: BufferRef) -> Result<PlacedScene> {
         let Self { points, stride, tets, options, .. } = *self;
-        let needed = [u64::from(stride) * u64::from(points.saturating_sub(1)) + 3, 4 * u64::from(tets)].map(|n| n.saturating_mul(4));
-        if positions.size() < needed[0] || cells.size() < needed[1] {
-            let [these, those] = [positions, cells].map(BufferRef::size);
-            return Err(Error::Invalid(format!(
-                "{these} bytes of positions and {those} of cells; the plan has {} and {}",
-                needed[0], needed[1]
-            )));
-        }
+        self.check()?;
+        let input = MeshInput { positions, stride, points, cells, tets };
+        input.check()?;
         let (arrays, tree) = self.memory(&mut Arena::new(memory))?;
         let (mesh_scratch, build_scratch) = self.scratch(gpu, &mut Arena::new(scratch))?;
-        let mesh = MeshView { input: MeshInput { positions, stride, points, cells, tets }, arrays };
+        let mesh = MeshView { input, arrays };
         Ok(PlacedScene { mesh, tree, options, mesh_scratch, build_scratch })
+    }
+
+    /// Rejects options and strides that [`PlacedScene::cmd_build`] would reject.
+    fn check(&self) -> Result<()> {
+        self.options.alpha_fixed()?;
+        self.options.checked_level()?;
+        check_points("positions", self.points, self.stride)
     }
 
     fn memory(&self, arena: &mut Arena) -> Result<(MeshArrays, TreeMemory)> {

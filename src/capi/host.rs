@@ -134,7 +134,8 @@ unsafe impl Send for LentQueue {}
 // host's functions see `OlbvhHostDevice`.
 unsafe impl Sync for LentQueue {}
 
-impl HostQueue for LentQueue {
+// SAFETY: the host's lock is held.
+unsafe impl HostQueue for LentQueue {
     fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
         let [lock, unlock] = self.lock;
         let _held = HostLock::take(lock, unlock, self.argument);

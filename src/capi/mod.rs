@@ -366,7 +366,7 @@ pub extern "C" fn olbvh_tree_build(mesh: *const OlbvhMesh, options: *const Olbvh
         let device = &mesh.device;
         let gpu = device.gpu();
         let tree = Tree::build(gpu, device, &options)?;
-        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&device.view(), tree.memory(), None).addresses()])?;
+        let addresses = gpu.upload("olbvh.tree.addresses", &[SceneBuffers::new(&device.view(), tree.memory(), None)?.addresses()])?;
         give(out, OlbvhTree { mesh, tree, addresses })
     })
 }

@@ -13,7 +13,7 @@ use super::queue::HostQueue;
 use super::ray_functions::Acceleration;
 use super::requirements::{DeviceReport, INTEL};
 use crate::error::{Error, Result};
-use crate::kernels::{ALL, DeviceClass, Target};
+use crate::kernels::{DeviceClass, MOST_BUFFERS, Target};
 use ash::vk;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -94,9 +94,9 @@ impl Gpu {
         // SAFETY: the handle is one of this instance.
         let vk::PhysicalDeviceProperties { limits, pipeline_cache_uuid, .. } =
             unsafe { instance.get_physical_device_properties(*physical) };
-        let (buffers, bound) = (ALL.iter().map(|k| k.buffers.len()).max().unwrap_or(0), limits.max_per_stage_descriptor_storage_buffers);
-        if binding == Binding::Descriptors && buffers > bound as usize {
-            let text = format!("{} binds {bound} storage buffers to a shader; kernels need {buffers}, or buffer addresses", report.name);
+        let bound = limits.max_per_stage_descriptor_storage_buffers;
+        if binding == Binding::Descriptors && MOST_BUFFERS > bound as usize {
+            let text = format!("{} binds {bound} storage buffers to a shader; kernels need {MOST_BUFFERS}, or buffer addresses", report.name);
             return Err(Error::NoDevice(text));
         }
         if requirements.sizes_vary() && !requirements.subgroup_size_control {

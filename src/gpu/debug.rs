@@ -4,6 +4,9 @@ use ash::vk;
 use std::ffi::{CString, c_void};
 use std::sync::Mutex;
 
+/// Most messages that are kept; more are only logged.
+const MOST_MESSAGES: usize = 1000;
+
 /// Messages of the validation layers, in order of arrival.
 pub(crate) type Messages = Mutex<Vec<String>>;
 
@@ -32,7 +35,9 @@ unsafe extern "system" fn collect(
     }
     let text = format!("{severity:?}: {text}");
     log::warn!("{text}");
-    if let Ok(mut messages) = messages.lock() {
+    if let Ok(mut messages) = messages.lock()
+        && messages.len() < MOST_MESSAGES
+    {
         messages.push(text);
     }
     vk::FALSE
@@ -55,7 +60,9 @@ impl DebugUtils {
 
 /// Names an object for debuggers and validation messages, if the device has debug-utils.
 pub(crate) fn name<T: vk::Handle>(device: Option<&ash::ext::debug_utils::Device>, object: T, name: &str) {
-    if let (Some(device), Ok(name)) = (device, CString::new(name)) {
+    if let Some(device) = device
+        && let Ok(name) = CString::new(name)
+    {
         let info = vk::DebugUtilsObjectNameInfoEXT::default().object_handle(object).object_name(&name);
         // SAFETY: the object belongs to this device and is alive.
         let _ = unsafe { device.set_debug_utils_object_name(&info) };

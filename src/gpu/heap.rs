@@ -7,7 +7,7 @@ use crate::error::{Error, Result};
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 use gpu_allocator::vulkan::{Allocation, AllocationCreateDesc, AllocationScheme, Allocator, AllocatorCreateDesc};
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Addresses of buffers are multiples of this even if the device requires less: kernels load 16 bytes in one access.
 const LEAST_ALIGNMENT: u64 = 16;
@@ -84,7 +84,8 @@ impl Memory {
         claim(requirements.size)?;
         let allocation_scheme = AllocationScheme::GpuAllocatorManaged;
         let description = AllocationCreateDesc { name, requirements, location: kind.location, linear: true, allocation_scheme };
-        let mut allocator = heap.allocator.lock().map_err(|_| error("the allocator's lock is poisoned".into()))?;
+        // A panic of the host elsewhere leaves the allocator as it was between two calls.
+        let mut allocator = heap.allocator.lock().unwrap_or_else(PoisonError::into_inner);
         let promised = heap.largest_allocation;
         let beyond = if size > promised { format!("; the device promises {promised} bytes at once, no more") } else { String::new() };
         let allocation = allocator.allocate(&description).map_err(|e| error(format!("{e}{beyond}")))?;
@@ -130,8 +131,8 @@ impl Drop for Memory {
         // whoever records for themselves keeps memory until then (`Recorder::new`). The device outlives all memory (see
         // `Gpu` and `Inner`).
         unsafe { self.heap.device.destroy_buffer(self.handle, None) };
-        if let (Some(allocation), Ok(mut allocator)) = (self.allocation.take(), self.heap.allocator.lock())
-            && let Err(e) = allocator.free(allocation)
+        if let Some(allocation) = self.allocation.take()
+            && let Err(e) = self.heap.allocator.lock().unwrap_or_else(PoisonError::into_inner).free(allocation)
         {
             log::error!("freeing {} bytes: {e}", self.size);
         }

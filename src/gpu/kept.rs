@@ -98,7 +98,7 @@ impl Objects {
     }
 
     pub(super) fn destroy(&self, device: &ash::Device) {
-        // SAFETY: the submission was never submitted, or has been waited for.
+        // SAFETY: the submission was never submitted, has been waited for, or is lost with its device.
         unsafe {
             device.destroy_query_pool(self.queries, None);
             device.destroy_fence(self.fence, None);

@@ -80,9 +80,9 @@ fn choose(instance: &ash::Instance, wanted: Option<&str>) -> Result<(vk::Physica
     }
     if let Some(wanted) = wanted {
         let lower = wanted.to_lowercase();
-        let by_index = wanted.parse::<usize>().ok().and_then(|i| all.get(i));
         let named = |(_, r): &&(_, DeviceReport)| !lower.trim().is_empty() && r.name.to_lowercase().contains(&lower);
-        let found = by_index.or_else(|| all.iter().find(named));
+        // A number that is none of a device is no part of a name either: 4 is not a GeForce RTX 4090.
+        let found = wanted.parse().map_or_else(|_| all.iter().find(named), |i: usize| all.get(i));
         let Some((device, report)) = found else {
             return Err(Error::NoDevice(format!("no device `{wanted}`; there are: {}", names())));
         };

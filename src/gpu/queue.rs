@@ -5,12 +5,16 @@ use std::sync::{Mutex, PoisonError};
 
 /// A queue, and the lock that the host takes for its own submissions. Implemented for `Mutex<vk::Queue>`; a host with
 /// another kind of lock implements it for that.
-pub trait HostQueue: Send + Sync {
+///
+/// # Safety
+/// While [`HostQueue::locked`] runs `submit`, no other thread uses the queue.
+pub unsafe trait HostQueue: Send + Sync {
     /// Calls `submit` once with the queue, while the lock is held.
     fn locked(&self, submit: &mut dyn FnMut(vk::Queue));
 }
 
-impl HostQueue for Mutex<vk::Queue> {
+// SAFETY: whoever uses the queue has locked the mutex.
+unsafe impl HostQueue for Mutex<vk::Queue> {
     fn locked(&self, submit: &mut dyn FnMut(vk::Queue)) {
         // The handle stays valid even if a panic poisoned the lock.
         submit(*self.lock().unwrap_or_else(PoisonError::into_inner));

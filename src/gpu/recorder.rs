@@ -324,8 +324,8 @@ impl<'a> Recorder<'a> {
     /// Records the start of a stage, and returns the slot of its timestamp. Both timestamps are at the bottom: a stage
     /// begins when all before it has ended, so that no time counts twice.
     fn begin_stage(&mut self, name: &str) -> Option<u32> {
-        let text = std::ffi::CString::new(format!("olbvh.{}", name.replace('\0', " "))).unwrap_or_default();
         if let Some(debug) = self.gpu.debug_device() {
+            let text = std::ffi::CString::new(format!("olbvh.{}", name.replace('\0', " "))).unwrap_or_default();
             // SAFETY: the label is ended by `end_stage`.
             unsafe { debug.cmd_begin_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }
@@ -364,7 +364,9 @@ impl<'a> Recorder<'a> {
     }
 
     fn label(&self, label: &'static str) {
-        if let (Some(debug), Ok(text)) = (self.gpu.debug_device(), std::ffi::CString::new(label)) {
+        if let Some(debug) = self.gpu.debug_device()
+            && let Ok(text) = std::ffi::CString::new(label)
+        {
             // SAFETY: a plain label in a recording command buffer.
             unsafe { debug.cmd_insert_debug_utils_label(self.commands, &vk::DebugUtilsLabelEXT::default().label_name(&text)) };
         }

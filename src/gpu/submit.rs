@@ -11,14 +11,11 @@ use crate::error::{Error, Result};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
-use std::time::Duration;
 
 /// Size of a staging buffer in bytes; larger transfers are split.
 const STAGING: u64 = 32 << 20;
 /// Where memory is limited, a staging buffer takes one part in this many of the limit.
 const STAGING_SHARE: u64 = 16;
-/// How often a failed wait is retried, 10 ms apart.
-const WAITS: u32 = 1000;
 
 /// Device time of a recorded stage.
 #[derive(Clone, Debug)]
@@ -92,8 +89,8 @@ impl Gpu {
     fn execute(&self, mut submission: Submission<'_>, recorder: &Recorder<'_>, label: &str) -> Result<StageTimes> {
         recorder.finish()?;
         let device = self.device();
-        let Objects { commands, fence, queries, .. } = submission.objects();
-        // SAFETY: objects of this device, which no other submission uses; the queue is locked during the submission.
+        let Objects { commands, queries, .. } = submission.objects();
+        // SAFETY: objects of this device, which no other submission uses.
         unsafe {
             // Makes the results visible to the host, and to the submissions that follow.
             let barrier = [vk::MemoryBarrier::default()
@@ -104,40 +101,9 @@ impl Gpu {
             device.cmd_pipeline_barrier(commands, source, target, vk::DependencyFlags::empty(), &barrier, &[], &[]);
             device.end_command_buffer(commands).map_err(failed("vkEndCommandBuffer"))?;
         }
-        let buffers = [commands];
-        self.submit_to_queue(&[vk::SubmitInfo::default().command_buffers(&buffers)], fence)?;
-        self.wait(fence).map_err(failed("vkWaitForFences")).map_err(|e| named(e, label))?;
-        submission.end();
+        submission.start()?;
+        submission.wait().map_err(|e| named(e, label))?;
         Ok(StageTimes { stages: self.read_timestamps(queries, recorder.timed_stages())? })
-    }
-
-    /// Submits under the queue's lock.
-    fn submit_to_queue(&self, submit: &[vk::SubmitInfo<'_>], fence: vk::Fence) -> Result<()> {
-        let Some(queue) = self.host_queue() else {
-            return Err(Error::Invalid("the host lent no queue: only the cmd_* functions can be used".into()));
-        };
-        let mut result = None;
-        queue.locked(&mut |queue| {
-            // A second call, which would submit the commands again while they run, does nothing.
-            // SAFETY: the submitted commands and the fence belong to this device; the lock of the queue is held.
-            result.get_or_insert_with(|| unsafe { self.device().queue_submit(queue, submit, fence) });
-        });
-        result.unwrap_or(Err(vk::Result::ERROR_UNKNOWN)).map_err(failed("vkQueueSubmit"))
-    }
-
-    /// Waits for a submitted fence. When out of memory, a driver may stop waiting while the work still runs, and the
-    /// buffers in use must not be freed then.
-    fn wait(&self, fence: vk::Fence) -> std::result::Result<(), vk::Result> {
-        let mut result = Err(vk::Result::ERROR_UNKNOWN);
-        for _ in 0..WAITS {
-            // SAFETY: the fence belongs to this device, and was submitted.
-            result = unsafe { self.device().wait_for_fences(&[fence], true, u64::MAX) };
-            if matches!(result, Ok(()) | Err(vk::Result::ERROR_DEVICE_LOST)) {
-                break;
-            }
-            std::thread::sleep(Duration::from_millis(10));
-        }
-        result
     }
 
     fn read_timestamps(&self, queries: vk::QueryPool, stages: &[(String, u32, u32)]) -> Result<Vec<StageTime>> {

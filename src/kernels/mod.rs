@@ -19,6 +19,16 @@ mod generated {
 }
 pub(crate) use generated::*;
 
+/// Most buffers that a kernel binds. A constant, so that not every kernel is linked for it.
+pub(crate) const MOST_BUFFERS: usize = {
+    let (mut most, mut i) = (0, 0);
+    while i < ALL.len() {
+        most = if ALL[i].buffers.len() > most { ALL[i].buffers.len() } else { most };
+        i += 1;
+    }
+    most
+};
+
 /// Every kernel's name with the names of its buffers, for tests.
 #[doc(hidden)]
 pub fn interfaces() -> impl Iterator<Item = (&'static str, Vec<&'static str>)> {

@@ -55,7 +55,7 @@ pub use valid::ValidTets;
 /// `1/√x` of a normal positive `x`, computed by correctly rounded multiplications and subtractions alone, so that every
 /// device gets the same bits. The relative error is below 2^-22. Twin of `inverse_sqrt` in `glsl/shared/rays.glsl`.
 pub fn inverse_sqrt(x: f32) -> f32 {
-    let mut r = f32::from_bits(0x5f37_59df - (x.to_bits() >> 1));
+    let mut r = f32::from_bits(0x5f37_59df_u32.wrapping_sub(x.to_bits() >> 1));
     let half = x * 0.5;
     for _ in 0..4 {
         r *= 1.5 - (half * r) * r;

@@ -74,7 +74,8 @@ impl RayGrid {
 
     /// Whether the rays of all pixels of a picture of this size are finite.
     pub(crate) fn is_finite(&self, [width, height]: [u32; 2]) -> bool {
-        let corners = [(0, 0), (width - 1, 0), (0, height - 1), (width - 1, height - 1)].map(|(x, y)| self.ray(x, y));
+        let [right, bottom] = [width, height].map(|n| n.saturating_sub(1));
+        let corners = [(0, 0), (right, 0), (0, bottom), (right, bottom)].map(|(x, y)| self.ray(x, y));
         corners.iter().all(|(origin, direction)| origin.iter().chain(direction).all(|v| v.is_finite()))
     }
 }

@@ -214,8 +214,7 @@ pub extern "C" fn olbvh_scene_arrays(scene: *const OlbvhScene, field: *const Olb
         let scene = &handle(scene, "scene")?.scene;
         // SAFETY: the caller passes null or a valid `OlbvhBuffer`.
         let field = unsafe { field.as_ref() }.and_then(OlbvhBuffer::given);
-        field.map_or(Ok(()), |field| field.check(4 * u64::from(scene.mesh.input.points), "a field"))?;
-        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field);
+        let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, field)?;
         let [_, bindings @ ..] = buffers.list(scene.tree.status).map(OlbvhBuffer::from);
         let MeshArrays { status: mesh_status, bad, .. } = scene.mesh.arrays;
         let [status, mesh_status, bad] = [scene.tree.status, mesh_status, bad].map(OlbvhBuffer::from);
