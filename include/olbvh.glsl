@@ -55,7 +55,8 @@ struct olbvh_Grid {
     uint first_leaf; // Node index of the first leaf, n_ni.
     uint ids;     // Bits of an entry of P that hold its tetrahedron; the bits above are its quarters, if there are any.
     uint slabs;   // Word of PO where the slabs of the leaves begin; 0: there are none.
-    uint pad[3];  // Unused.
+    uint longest; // Entries of the longest leaf.
+    uint pad[2];  // Unused.
 };
 
 // Device addresses of a mesh and its tree, for the shaders of other programs, low word first. See src/glsl.rs.

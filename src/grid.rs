@@ -96,7 +96,7 @@ impl CellRange {
     /// Converts a box of cells of `level` into cells of the finest grid.
     #[must_use]
     pub fn finest(&self, level: u32) -> Self {
-        let shift = MAX_LEVEL - level;
+        let shift = MAX_LEVEL.saturating_sub(level);
         Self { lo: self.lo.map(|k| k << shift), hi: self.hi.map(|k| ((k + 1) << shift) - 1) }
     }
 

@@ -67,7 +67,8 @@
 //! - **Queues**: a [`gpu::Gpu`] records for one queue family. Semaphores and timelines are yours: recording submits
 //!   nothing. Only the owning calls ([`build::DeviceMesh::upload`], [`build::Tree::build`], [`query::locate`] …) and
 //!   [`gpu::Gpu::run`], which runs what you record, submit, under the queue's lock, and wait for a fence.
-//! - **Threads**: everything is [`Send`] and [`Sync`], except that a [`gpu::Recorder`] belongs to one thread.
+//! - **Threads**: whatever is kept (devices, buffers, meshes, trees, plans) is [`Send`] and [`Sync`]. Command buffers are not
+//!   shared: a [`gpu::Recorder`] is used by one thread at a time.
 //! - **A lost device** is reported as an [`Error::Vulkan`] with its `vk::Result`, by the call that waited. Drop
 //!   everything and start again with a new device.
 //!
@@ -131,7 +132,7 @@ pub use build::{BadCells, DeviceMesh, Tree};
 pub use error::{Error, Result};
 pub use gpu::{Gpu, GpuOptions};
 pub use mesh::Mesh;
-pub use options::BuildOptions;
+pub use options::{Assign, BuildOptions, Fineness, Lists};
 
 /// The results of owning calls can be sent to and shared by any thread.
 const _: () = {

@@ -83,7 +83,7 @@ impl TreeArrays {
 
     /// The mask of a node: of its children, or of the octants of a leaf.
     pub fn mask_of(&self, node: u32) -> u32 {
-        self.masks[node as usize / 4] >> (8 * (node % 4)) & 0xff
+        self.masks.get(node as usize / 4).map_or(0, |word| word >> (8 * (node % 4)) & 0xff)
     }
 
     /// Child mask of a node, 0 for leaves.
@@ -94,11 +94,14 @@ impl TreeArrays {
     /// The child of a node with the 3-bit Morton digit `digit`.
     pub fn child(&self, node: u32, digit: u32) -> Option<u32> {
         let mask = self.child_mask(node);
-        let before = (mask & ((1 << digit) - 1)).count_ones();
-        (mask >> digit & 1 != 0).then(|| self.co[node as usize] + 1 + before)
+        let before = (mask & ((1 << (digit & 7)) - 1)).count_ones();
+        if digit < 8 && mask >> digit & 1 != 0 { self.co.get(node as usize).map(|co| co + 1 + before) } else { None }
     }
 
     /// The range of a node's entries in `p`, from those of its first leaf to those of its last.
+    ///
+    /// # Panics
+    /// For a node that the tree does not have, or in a tree that breaks its rules (see [`TreeArrays::validate`]).
     pub fn entries(&self, node: u32) -> Range<usize> {
         let (mut first, mut last) = (node, node);
         while first < self.internal_nodes() {
@@ -110,6 +113,9 @@ impl TreeArrays {
 
     /// The tetrahedra of a node. For a leaf they are ascending and distinct; for an internal node the lists of its
     /// leaves follow one another.
+    ///
+    /// # Panics
+    /// As [`TreeArrays::entries`].
     pub fn primitives(&self, node: u32) -> &[u32] {
         &self.p[self.entries(node)]
     }

@@ -6,10 +6,10 @@ use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
-use olbvh::mesh::{Bounds, Field, Mesh, On, kuhn_jittered};
+use olbvh::mesh::{Field, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists, TOLERANCE};
 use olbvh::query::{self, LocateOptions, Rendered, SILENT};
-use olbvh::render::{Prepared, RenderSettings, TransferFunction, ValidTets};
+use olbvh::render::{RenderSettings, TransferFunction};
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings};
 
 /// A mesh, and both structures over it.
@@ -136,10 +136,7 @@ fn size(name: &str, size: [u32; 2]) -> [u32; 2] {
 
 /// The picture, which both structures must draw alike; `None` if nothing is visible.
 fn same_picture(name: &str, b: &HostAndDevice, settings: &RenderSettings, field: &Field) -> Option<Rendered> {
-    let bounds = Bounds::from(b.device.grid());
-    let (neighbours, bad) = (b.device.neighbours().unwrap(), b.device.bad_cells().unwrap());
-    let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|t| bad.binary_search(&t).is_err() };
-    let prepared = Prepared::new(settings, &b.mesh, &valid, field).ok()?;
+    let prepared = query::prepare_picture(&b.device, &b.mesh, field, settings).ok()?;
     let normals = settings.shading.then_some(&prepared.normals[..]);
     let (plan, field) = (&prepared.plan, (&field.values[..], field.on));
     let expected = query::render(&b.tree, plan, field, normals, SILENT).unwrap();

@@ -11,7 +11,7 @@ use olbvh::gpu::{Binding, Gpu, GpuOptions};
 use olbvh::layout::NONE;
 use olbvh::mesh::cases::cases;
 use olbvh::mesh::{Field, Mesh, On, kuhn, kuhn_jittered};
-use olbvh::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
+use olbvh::options::{Assign, BuildOptions, Fineness, LIST_PART, Lists, TOLERANCE};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, PointInput, SILENT, Scene, cmd_locate, locate, locate_all, overlap, render, slice,
 };
@@ -102,11 +102,17 @@ impl Subject {
         let barycentrics = gpu.buffer("olbvh.test.barycentrics", 16 * count).unwrap();
         let input = PointInput { points: input.all(), stride: 3, count: count as u32, hints: Some(hint_buffer.all()), order: None };
         let output = LocateOutput { owners: owners.all(), barycentrics: barycentrics.all() };
-        let scene = Scene::of(&tree);
-        submit(gpu, "olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
-        let found: Vec<u32> = gpu.download(&owners, owners.all()).unwrap();
-        for (i, owner) in found.into_iter().enumerate() {
-            assert_eq!(locator.locate_near(points[i], hints[i]).owner, owner, "hint: {}", what(i));
+        // Also as a host records it that does not know how long lists are: parts begin behind the end of all of them.
+        let known = Scene::of(&tree).longest_leaf;
+        for longest_leaf in [known, known.max(1) + 2 * LIST_PART] {
+            let scene = Scene { longest_leaf, ..Scene::of(&tree) };
+            submit(gpu, "olbvh.test.locate", |r| cmd_locate(r, &scene, &input, &output, &LocateOptions::default())).unwrap();
+            let found: Vec<u32> = gpu.download(&owners, owners.all()).unwrap();
+            let coordinates: Vec<[f32; 4]> = gpu.download(&barycentrics, barycentrics.all()).unwrap();
+            for (i, (owner, barycentric)) in found.into_iter().zip(coordinates).enumerate() {
+                let near = locator.locate_near(points[i], hints[i]);
+                assert_eq!((near.owner, near.barycentric), (owner, barycentric), "hint, lists up to {longest_leaf}: {}", what(i));
+            }
         }
         expected
     }

@@ -10,7 +10,7 @@ use olbvh::kernels::{DeviceClass, Target};
 use olbvh::mesh::{Bounds, Mesh, On, kuhn_jittered};
 use olbvh::options::{BuildOptions, Lists};
 use olbvh::query::{self, LocateMethod, LocateOptions, SILENT};
-use olbvh::render::{Prepared, RenderSettings, ValidTets};
+use olbvh::render::RenderSettings;
 use olbvh::slicing::{Extrapolate, SliceSettings};
 use olbvh::tree::TreeArrays;
 
@@ -41,8 +41,7 @@ fn ask(gpu: &Gpu, mesh: &Mesh) -> Answers {
     let field = &mesh.fields[0];
     let settings = RenderSettings { size: [40, 32], ..RenderSettings::default() };
     let neighbours = device.neighbours().unwrap();
-    let valid = ValidTets { bounds, neighbours: &neighbours, is_valid: &|_| true };
-    let prepared = Prepared::new(&settings, mesh, &valid, field).unwrap();
+    let prepared = query::prepare_picture(&device, mesh, field, &settings).unwrap();
     let values = (field.values.as_slice(), On::Points);
     let drawn = query::render(&boundary, &prepared.plan, values, Some(&prepared.normals), SILENT).unwrap();
     assert!(drawn.stats.found_samples > 0);

@@ -59,7 +59,8 @@ void main() {
     g.level = MAX_LEVEL;
     g.first_leaf = 0u;
     g.slabs = 0u;
-    g.pad = uint[3](0u, 0u, 0u);
+    g.longest = 0u;
+    g.pad = uint[2](0u, 0u);
     g.ids = NONE;
     g.extent = vec4(normalise(g, g.hi.xyz), 0.0);
     grid.at[0] = g;

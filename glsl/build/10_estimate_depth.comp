@@ -60,7 +60,13 @@ void main() {
     }
     large = subgroupOr(large);
     if (subgroupElect() && large != 0u) atomicOr(status.at[0].large_levels, large);
-    for (uint i = 0u; i < 12u; ++i) ADD_WIDE(low[i], high[i], sums[i].x, sums[i].y)
+    [[unroll]] for (uint i = 0u; i < 12u; ++i) {
+        // The subgroup's sum, by halves of the low word, which do not overflow.
+        uint halves = subgroupAdd(sums[i].x & 0xffffu), others = subgroupAdd(sums[i].x >> 16), above = subgroupAdd(sums[i].y);
+        uint upper = others + (halves >> 16);
+        uvec2 sum = uvec2(upper << 16 | (halves & 0xffffu), above + (upper >> 16));
+        if (subgroupElect()) ADD_WIDE(low[i], high[i], sum.x, sum.y)
+    }
     barrier();
     for (uint i = local_index(); i < 12u; i += WORKGROUP) {
         uint k = 2u * i;

@@ -1,6 +1,7 @@
 #version 460
 // Leaves, 2 of 2 or 3 (Alg. 1): writes the box of every leaf, where boxes are stored, from the code of its last entry; the
-// flag of leaves outside of the mesh (see src/reference/leaves.rs); the mask of each leaf's octants; and statistics.
+// flag of leaves outside of the mesh (see src/reference/leaves.rs); the mask of each leaf's octants; statistics, and the
+// length of the longest list.
 // Where cells are MARKED (Lists::Boundary), the mark of a leaf's cell is its flag.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
@@ -12,7 +13,7 @@
 layout(constant_id = 2) const uint BOXES = 0;
 layout(constant_id = 3) const uint MARKED = 0;
 NO_SCALARS(11)
-BUFFER16(0, readonly, Grid, grid)
+BUFFER16(0, READ_WRITE, Grid, grid)
 BUFFER(1, readonly, uint, codes)
 BUFFER(2, readonly, uint, po)
 BUFFER(3, READ_WRITE, uint, flags)
@@ -99,7 +100,10 @@ void main() {
     entries = subgroupMax(entries);
     flagged = subgroupAdd(flagged);
     if (subgroupElect()) {
-        if (entries > 0u) atomicMax(status.at[0].longest_leaf, entries);
+        if (entries > 0u) {
+            atomicMax(status.at[0].longest_leaf, entries);
+            atomicMax(grid.at[0].longest, entries);
+        }
         if (flagged > 0u) atomicAdd(status.at[0].boundary_leaves, flagged);
     }
 }

@@ -61,7 +61,7 @@ bool largest_face(Grid g, uint first, uint last, SlabCell cell, out uint bits) {
         }
     }
     uint most = subgroupMax(largest);
-    bits = subgroupBroadcast(normal_bits(normal), subgroupBallotFindLSB(subgroupBallot(largest == most)));
+    bits = subgroupMax(largest == most ? normal_bits(normal) : 0u); // one face has this size and place
     return most > PLACES;
 }
 
@@ -128,11 +128,10 @@ void main() {
     }
     bool asks = begin < end && end - begin <= MAX_LIST_FOR_SLAB;
     while (subgroupAny(asks)) {
-        uint turn = subgroupBallotFindLSB(subgroupBallot(asks));
-        uint of_leaf = fitted(g, subgroupBroadcast(begin, turn), subgroupBroadcast(end, turn), subgroupBroadcast(code, turn));
-        if (gl_SubgroupInvocationID != turn) continue;
-        slab = of_leaf;
-        asks = false;
+        bool turn = gl_SubgroupInvocationID == subgroupMin(asks ? gl_SubgroupInvocationID : NONE);
+        uint of_leaf = fitted(g, subgroupMax(turn ? begin : 0u), subgroupMax(turn ? end : 0u), subgroupMax(turn ? code : 0u));
+        if (turn) slab = of_leaf;
+        asks = asks && !turn;
     }
     if (is_leaf) po.at[g.slabs + i] = slab;
 }

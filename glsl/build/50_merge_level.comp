@@ -27,11 +27,17 @@ void main() {
     uint shift = 3u * (g.level - 1u - level);
     uint flag = 0u, mask = 0u;
     vec3 lo = vec3(0.0), hi = vec3(0.0);
+    // The last leaf below each child; if there are fewer than eight, the last one stands for the others. All children go down
+    // together, so that their loads do not wait for each other.
+    uint leaf[8];
+    [[unroll]] for (uint k = 0u; k < 8u; ++k) leaf[k] = min(begin + k, end);
+    for (uint below = level + 1u; below < g.level; ++below) {
+        [[unroll]] for (uint k = 0u; k < 8u; ++k) leaf[k] = co.at[leaf[k] + 1u];
+    }
+    [[unroll]] for (uint k = 0u; k < 8u; ++k) leaf[k] = po.at[leaf[k] - g.first_leaf + 1u];
+    [[unroll]] for (uint k = 0u; k < 8u; ++k) mask |= 1u << (codes.at[leaf[k] - 1u] >> shift & 7u);
     for (uint child = begin; child <= end; ++child) {
         flag |= flags.at[child >> 5u] >> (child & 31u) & 1u;
-        uint leaf = child; // the last leaf below the child
-        for (uint k = level + 1u; k < g.level; ++k) leaf = co.at[leaf + 1u];
-        mask |= 1u << (codes.at[po.at[leaf - g.first_leaf + 1u] - 1u] >> shift & 7u);
         if (BOXES != 0u) {
             for (uint c = 0u; c < 3u; ++c) {
                 float least = boxes.at[6u * child + c], most = boxes.at[6u * child + 3u + c];

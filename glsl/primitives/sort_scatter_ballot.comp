@@ -42,9 +42,9 @@ const uint DIGITS_EACH = (DIGITS + WORKGROUP - 1u) / WORKGROUP; // that an invoc
 
 uint digit_of(uint key) { return key >> shift & mask; }
 
-// Counts the digits of a tile, and tells the tiles after it. The first tile also knows where its pairs go, which `to_digit`
-// receives. `move` is not used otherwise yet.
-void tell(uint tile, uint n, out uint counts[DIGITS_EACH], out uint to_digit[DIGITS_EACH]) {
+// Counts the digits of a tile, and tells the tiles after it, unless it has done so itself; `told` is what they read then. The
+// first tile also knows where its pairs go, which `to_digit` receives. `move` is not used otherwise yet.
+void tell(uint tile, uint n, out uint counts[DIGITS_EACH], out uint to_digit[DIGITS_EACH], out uint told[DIGITS_EACH]) {
     for (uint d = local_index(); d < DIGITS; d += WORKGROUP) move[d] = 0u;
     // All loads first: a loop of loads and atomics would wait for one after the other.
     uint key[ROWS], first = tile * TILE + local_index();
@@ -67,7 +67,8 @@ void tell(uint tile, uint n, out uint counts[DIGITS_EACH], out uint to_digit[DIG
             before += all;
         }
         uint word = tile == 0u ? all_up_to(to_digit[k] + counts[k]) : own_count(counts[k]);
-        if (d < DIGITS) atomicCompSwap(chain.at[tile * DIGITS + d], NOTHING, word);
+        uint before_that = d < DIGITS ? atomicCompSwap(chain.at[tile * DIGITS + d], NOTHING, word) : NOTHING;
+        told[k] = before_that == NOTHING ? word : before_that;
     }
 }
 
@@ -86,8 +87,8 @@ void main() {
     barrier();
     uint tile = BACKWARDS == 0u ? begun : tiles - 1u - begun;
     // Early, so that others need not wait.
-    uint counts[DIGITS_EACH], to_digit[DIGITS_EACH];
-    tell(tile, n, counts, to_digit);
+    uint counts[DIGITS_EACH], to_digit[DIGITS_EACH], told[DIGITS_EACH];
+    tell(tile, n, counts, to_digit, told);
     uint first = tile * TILE + gl_SubgroupID * gl_SubgroupSize * ROWS + gl_SubgroupInvocationID;
     // Of the pair in each row; its place is first how many of the subgroup's are before it, then that in the tile.
     uint key[ROWS], place[ROWS];
@@ -147,7 +148,9 @@ void main() {
         [[unroll]] for (uint k = 0u; k < DIGITS_EACH; ++k) {
             uint d = k * WORKGROUP + local_index();
             while (from[k] > 0u) {
-                uint word = chain.at[(from[k] - 1u) * DIGITS + d];
+                // Some devices load from a cache that does not see what other workgroups write; atomics do.
+                uint i = (from[k] - 1u) * DIGITS + d;
+                uint word = (polls & 63u) == 63u ? atomicOr(chain.at[i], 0u) : chain.at[i];
                 if (word != NOTHING) {
                     step_back(word, from[k], to_digit[k]);
                 } else if (++polls >= MOST_POLLS) {
@@ -162,7 +165,10 @@ void main() {
         if (late == 0u) break;
         if (local_index() == 0u) missing = 0u;
         uint their_counts[DIGITS_EACH], their_digits[DIGITS_EACH];
-        tell(late - 1u, n, their_counts, their_digits);
+        tell(late - 1u, n, their_counts, their_digits, told);
+        [[unroll]] for (uint k = 0u; k < DIGITS_EACH; ++k) {
+            if (from[k] == late) step_back(told[k], from[k], to_digit[k]);
+        }
         barrier();
     }
     [[unroll]] for (uint k = 0u; k < DIGITS_EACH; ++k) {

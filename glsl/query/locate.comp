@@ -17,7 +17,7 @@ ARGUMENTS(13)
     uint count;
     uint stride; // floats from one point to the next
     uint part;  // number of this dispatch
-    uint last;   // not 0: lists end in this part
+    uint last;   // not 0: the last part that is recorded
     float tolerance;
 END_ARGUMENTS
 TREE(0)
@@ -56,6 +56,9 @@ void main() {
     if (place >= count) return;
     uint end = place + min(RUN, count - place);
     Grid g = grid.at[0];
+    // Who recorded this may not have known how long lists get: all have ended before this part, or end in it.
+    if (part > 0u && part * PART_LENGTH >= g.longest) return;
+    bool is_last = last != 0u || (part + 1u) * PART_LENGTH >= g.longest;
     Point a = point_at(g, place);
     uint from = NONE; // where the next stride starts
     uint left = 0u;   // steps that this stride may still take; 0: it has ended
@@ -74,7 +77,7 @@ void main() {
             Sides sides = sides_of(stand, a.x);
             if (sides.clear) {
                 owners.at[a.i] = stand.t;
-                barycentrics.at[a.i] = record(last == 0u ? vec4(1.0, 1.0, 0.0, 0.0) : barycentric(stand, sides));
+                barycentrics.at[a.i] = record(is_last ? barycentric(stand, sides) : vec4(1.0, 1.0, 0.0, 0.0));
                 if (++place < end) a = point_at(g, place);
                 left = HINTED;
                 in_leaf = false;
@@ -106,9 +109,9 @@ void main() {
         uint begin = min(range.y, range.x + part * PART_LENGTH), behind = min(range.y, begin + PART_LENGTH);
         if (!walks && !best.inside) search(best, begin, behind, sought_at(g, a.at, a.x, tolerance));
         uint owner = best.inside || leaf != NONE ? decide(best, leaf, tolerance) : NONE;
-        vec4 b = last == 0u ? vec4(float(best.inside), float(best.in_box), best.smallest, 0.0) : vec4(0.0);
-        if (last != 0u && owner != NONE) b = barycentric(load_tet(words(cells.at[owner])), a.x);
-        owners.at[a.i] = last == 0u ? best.owner : owner;
+        vec4 b = is_last ? vec4(0.0) : vec4(float(best.inside), float(best.in_box), best.smallest, 0.0);
+        if (is_last && owner != NONE) b = barycentric(load_tet(words(cells.at[owner])), a.x);
+        owners.at[a.i] = is_last ? owner : best.owner;
         barycentrics.at[a.i] = record(b);
         if (++place < end) {
             a = point_at(g, place);

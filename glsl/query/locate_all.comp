@@ -52,6 +52,7 @@ void main() {
     uint i = item_index();
     if (i >= count || owners.at[i] == NONE) return;
     Grid g = grid.at[0];
+    if (part > 0u && part * PART_LENGTH >= g.longest) return; // all lists have ended
     vec3 at = point(i, stride);
     vec3 x = normalise(g, at);
     uint leaf = find_leaf(g.level, quantize(g, at));

@@ -25,6 +25,7 @@ BUFFER(12, READ_WRITE, OverlapStatus, status)
 #include "shared/owner_list.glsl"
 
 void main() {
+    if (part > 0u && part * PART_LENGTH >= grid.at[0].longest) return; // all lists have ended
     uint i = item_index();
     uint located = 0u;
     bool look = i < points && status.at[0].empty == 0u && (used.at[i >> 5u] >> (i & 31u) & 1u) != 0u;

@@ -194,9 +194,10 @@ RayState go_on(RayState state, RayState before, vec3 direction) {
 // Takes places in the march for the rays of this subgroup, of which some meet the mesh. They stay together, since rays
 // side by side read the same tetrahedra.
 uint place_in_march(bool is_ray) {
-    uint rays = subgroupBallotBitCount(subgroupBallot(is_ray)), first = 0u;
-    if (subgroupElect()) first = atomicAdd(status.at[0].met, rays);
-    return subgroupBroadcastFirst(first) + gl_SubgroupInvocationID;
+    uvec4 rays = subgroupBallot(is_ray); // of those that arrive together: that all do is usual, but not promised
+    uint first = 0u;
+    if (subgroupElect()) first = atomicAdd(status.at[0].met, subgroupBallotBitCount(rays));
+    return subgroupBroadcastFirst(first) + subgroupBallotExclusiveBitCount(rays);
 }
 
 void main() {

@@ -107,36 +107,44 @@ pub(super) fn each(
     let LocateRequest { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
-    let mut job = Job { gpu, points, done: 0, took: InBlocks::default(), ask, report };
+    let mut job = Job { gpu, points, done: 0.0, took: InBlocks::default(), ask, report };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.place(gpu, mesh, options, 0);
-        if unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all)))?.is_some() {
+        let asked = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
+        if asked.is_some() {
             return Ok(job.end());
         }
+        job.done = 0.0;
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
     job.took.bad_cells[0] = source.bad_cells();
     // The other points lie so far outside that they have no cell.
     let near: Vec<u32> = all.into_iter().filter(|&i| place(&source.grid, points[i as usize]).is_some()).collect();
-    let mut waiting = vec![(source.whole(), near)];
-    while let Some((block, ids)) = waiting.pop() {
+    // Of the work on these points, a block has this share; where each point has one block, all of it.
+    let mut waiting = vec![(source.whole(), near, 1.0)];
+    while let Some((block, ids, share)) = waiting.pop() {
         if ids.is_empty() || block.tets.is_empty() {
+            job.advance(ids.len(), share);
             continue;
         }
+        let before = job.done;
         let need = block.bytes(gpu, &source.options)?;
         let tried = try_block(need, memory, || {
             let placed = job.took.build(|| block.place(gpu, &source))?;
-            job.ask(&placed, Some(block.cells.finest(source.level)), &ids)
+            job.ask(&placed, Some(block.cells.finest(source.level)), &ids, share)
         })?;
         let Tried::TooLarge(why) = tried else { continue };
+        job.done = before;
         let Some([low, high]) = smaller(&source, &block, pieces(need, memory), ANYWHERE) else {
             let beside = PER_POINT * FEW.min(ids.len()) as u64;
             let refused = Refused { gpu, sources: from_ref(&source), beside, may: ANYWHERE };
             return Err(refused.error(block.tets.len(), need, why));
         };
         let is_low = |&i: &u32| low.cells.contains(source.cell(points[i as usize]));
-        let (below, above) = if blocks == Blocks::All { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
-        waiting.extend([(high, above), (low, below)]);
+        let every = blocks == Blocks::All;
+        let share = if every { share / 2.0 } else { share };
+        let (below, above) = if every { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
+        waiting.extend([(high, above, share), (low, below, share)]);
     }
     report(points.len() as u64, points.len() as u64);
     Ok(job.end())
@@ -145,7 +153,8 @@ pub(super) fn each(
 struct Job<'a> {
     gpu: &'a Gpu,
     points: &'a [[f32; 3]],
-    done: usize,
+    /// Points done so far; of one that several blocks are asked about, their shares.
+    done: f64,
     took: InBlocks,
     ask: Ask<'a>,
     report: Progress<'a>,
@@ -153,7 +162,7 @@ struct Job<'a> {
 
 impl Job<'_> {
     /// Queries the points in chunks that fit the memory that is left.
-    fn ask(&mut self, placed: &Placed, cells: Option<CellRange>, ids: &[u32]) -> Result<()> {
+    fn ask(&mut self, placed: &Placed, cells: Option<CellRange>, ids: &[u32], share: f64) -> Result<()> {
         let input = placed.mesh.input();
         let left = self.gpu.memory_left().saturating_sub(4 * u64::from(input.points.max(input.tets)));
         let most = usize::try_from(left / PER_POINT).unwrap_or(POINT_CHUNK).min(POINT_CHUNK);
@@ -165,11 +174,16 @@ impl Job<'_> {
         for chunk in ids.chunks(most.max(1)) {
             let points: Vec<_> = chunk.iter().map(|&i| self.points[i as usize]).collect();
             (self.ask)(chunk, &points, placed, cells)?;
-            self.done += chunk.len();
-            (self.report)(self.done.min(self.points.len()) as u64, self.points.len() as u64);
+            self.advance(chunk.len(), share);
         }
         log::debug!("{} points in {} tetrahedra", ids.len(), input.tets);
         Ok(())
+    }
+
+    /// Reports that a share of the work on some points is done.
+    fn advance(&mut self, points: usize, share: f64) {
+        self.done += share * points as f64;
+        (self.report)(self.done as u64, self.points.len() as u64);
     }
 
     fn end(&self) -> InBlocks {

@@ -96,14 +96,8 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
 
 fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
     let (Placed { mesh, tree, .. }, RenderRequest { field, settings, .. }) = (placed, asked);
-    let bad = if mesh.status().bad == 0 { Vec::new() } else { mesh.bad_cells()? };
-    let neighbours = if settings.iso.is_empty() { mesh.neighbours()? } else { Vec::new() };
-    let is_valid = |t| bad.binary_search(&t).is_err();
-    let valid = ValidTets { bounds: tree.grid().into(), neighbours: &neighbours, is_valid: &is_valid };
-    let Prepared { plan, camera, bounds, normals, range } = Prepared::new(settings, asked.mesh, &valid, field)?;
-    drop(neighbours);
-    let normals = (!normals.is_empty()).then_some(normals.as_slice());
-    let rendered = query::render(tree, &plan, (&field.values, field.on), normals, report)?;
+    let Prepared { plan, camera, bounds, normals, range } = query::prepare_picture(mesh, asked.mesh, field, settings)?;
+    let rendered = query::render(tree, &plan, (&field.values, field.on), Some(&normals), report)?;
     Ok(Picture { rendered, plan, camera, bounds, range })
 }
 

@@ -74,6 +74,15 @@ impl DeviceMesh {
         Ok(made)
     }
 
+    /// As [`DeviceMesh::upload`], for points and vertices of tetrahedra in arrays of the caller. Bad tetrahedra are left out;
+    /// [`DeviceMesh::bad_cells`] tells which.
+    ///
+    /// # Errors
+    /// As [`DeviceMesh::upload`].
+    pub fn upload_slices(gpu: &Gpu, points: &[[f32; 3]], tets: &[[u32; 4]]) -> Result<Self> {
+        Self::upload_arrays(gpu, points, tets, None, &[])
+    }
+
     /// Uploads the points and the vertices of the tetrahedra of a mesh, as [`DeviceMesh::upload_in`] does; bad
     /// tetrahedra are left out. `crowded` points count as crowded, however many tetrahedra meet there.
     pub(crate) fn upload_arrays(
@@ -87,7 +96,7 @@ impl DeviceMesh {
         let (points, tets) = (number(places.len())?, number(corners.len())?);
         check_tets(tets)?;
         // Level and ids are those of a tree; each tree over the mesh sets its own.
-        let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, slabs: 0, ..*grid };
+        let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, slabs: 0, longest: 0, ..*grid };
         let grid = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[finest(grid)])).transpose()?;
         let thin = || {
             let mut thin = vec![0; places.len()];

@@ -35,7 +35,8 @@ pub fn cmd_ranges(r: &mut Recorder<'_>, mesh: &MeshView, tree: &TreeMemory, (fie
     }
     check_field((field, on), &input)?;
     ranges.check(range_bytes(capacity.nodes), "ranges")?;
-    let of_level = |level: u32| Groups::Count(8u64.pow(level).min(u64::from(capacity.nodes)).div_ceil(u64::from(workgroup)) as u32);
+    let of_level =
+        |level: u32| Groups::Count(8u64.saturating_pow(level).min(u64::from(capacity.nodes)).div_ceil(u64::from(workgroup)) as u32);
     r.stage("build.ranges", |r| {
         r.fill(ranges.part(0, range_bytes(capacity.nodes)), 0);
         r.barrier("ranges.clear → ranges.scatter");

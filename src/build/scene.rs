@@ -1,7 +1,8 @@
 //! A mesh and its tree in memory of a host, which rebuilds them as often as it likes.
 
 use super::{
-    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, check_points, cmd_build, cmd_move_mesh, cmd_prepare_mesh,
+    BuildScratch, Capacity, MeshArrays, MeshInput, MeshScratch, MeshView, TreeMemory, check_points, cmd_build, cmd_move_mesh,
+    cmd_prepare_mesh,
 };
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Gpu, Recorder};

@@ -332,7 +332,7 @@ pub extern "C" fn olbvh_mesh_upload(
         let points = array(points.cast::<[f32; 3]>(), point_count, "points")?;
         let tets = array(tets.cast::<[u32; 4]>(), tet_count, "tets")?;
         let (device, ids) = if reorder == 0 {
-            (DeviceMesh::upload_arrays(gpu, points, tets, None, &[])?, None)
+            (DeviceMesh::upload_slices(gpu, points, tets)?, None)
         } else {
             let mesh = Mesh::new(points.to_vec(), tets.to_vec()).along_curve()?;
             (DeviceMesh::upload(gpu, &mesh, BadCells::Skip)?, mesh.cell_ids.zip(mesh.point_ids).map(<[_; 2]>::from))

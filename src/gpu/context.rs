@@ -96,7 +96,8 @@ impl Gpu {
             unsafe { instance.get_physical_device_properties(*physical) };
         let bound = limits.max_per_stage_descriptor_storage_buffers;
         if binding == Binding::Descriptors && MOST_BUFFERS > bound as usize {
-            let text = format!("{} binds {bound} storage buffers to a shader; kernels need {MOST_BUFFERS}, or buffer addresses", report.name);
+            let text =
+                format!("{} binds {bound} storage buffers to a shader; kernels need {MOST_BUFFERS}, or buffer addresses", report.name);
             return Err(Error::NoDevice(text));
         }
         if requirements.sizes_vary() && !requirements.subgroup_size_control {

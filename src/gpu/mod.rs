@@ -52,7 +52,9 @@ pub(crate) fn failed(call: &'static str) -> impl FnOnce(vk::Result) -> Error {
     move |result| {
         let hint = match result {
             vk::Result::ERROR_DEVICE_LOST => "; the driver gave up: try smaller jobs, or another device",
-            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => "; the device's memory is full: free some, or take a smaller job (a larger alpha makes a smaller tree)",
+            vk::Result::ERROR_OUT_OF_DEVICE_MEMORY => {
+                "; the device's memory is full: free some, or take a smaller job (a larger alpha makes a smaller tree)"
+            }
             _ => "",
         };
         Error::Vulkan { call, result, hint: hint.into() }

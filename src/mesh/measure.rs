@@ -12,7 +12,13 @@ impl Mesh {
             let [a, b, c, d] = tet.map(|v| DVec3::from_array(self.points[v as usize].map(f64::from)));
             (b - a).cross(c - a).dot(d - a).abs()
         };
-        (0..).zip(&self.tets).filter(|&(t, _)| valid(t)).map(|(_, tet)| of(tet)).sum::<f64>() / 6.0
+        self.valid(valid).map(of).sum::<f64>() / 6.0
+    }
+
+    /// The tetrahedra that are `valid`; never those with vertices that the mesh lacks.
+    fn valid(&self, valid: impl Fn(u32) -> bool) -> impl Iterator<Item = &[u32; 4]> {
+        let has_points = |tet: &[u32; 4]| tet.iter().all(|&v| (v as usize) < self.points.len());
+        (0..).zip(&self.tets).filter(move |&(t, tet)| valid(t) && has_points(tet)).map(|(_, tet)| tet)
     }
 
     /// Number of parts into which the tetrahedra that are `valid` fall: two that have a point in common belong together.
@@ -21,7 +27,7 @@ impl Mesh {
         // The parent of each point; the root of a part is its own.
         let mut parents = vec![UNUSED; self.points.len()];
         let mut parts = 0;
-        for (_, tet) in (0..).zip(&self.tets).filter(|&(t, _)| valid(t)) {
+        for tet in self.valid(valid) {
             let mut part = UNUSED;
             for &v in tet {
                 if parents[v as usize] == UNUSED {
@@ -68,5 +74,7 @@ mod tests {
         assert_eq!((mesh.volume(|_| false), mesh.parts(|_| false)), (0.0, 0));
         mesh.tets.push([0, 1, n, n + 1]);
         assert_eq!(mesh.parts(|_| true), 1);
+        mesh.tets.push([0, 1, 2, u32::MAX]);
+        assert_eq!((mesh.volume(|t| t > 288), mesh.parts(|t| t > 288)), (0.0, 0), "a vertex that is not there");
     }
 }

@@ -23,7 +23,7 @@ pub use slice::{SliceInput, SliceMemory, Sliced, cmd_slice, slice};
 pub(crate) use slice::{Slicing, slice_in};
 pub use visible::{cmd_visible, visible_bytes};
 pub(crate) use volume::{Canvas, Rays, render_in};
-pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_depths, cmd_render, render};
+pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_depths, cmd_render, prepare_picture, render};
 
 use crate::build::{MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
@@ -82,9 +82,12 @@ pub struct Scene {
     /// The tree over it.
     pub tree: TreeMemory,
     /// Number of entries of the longest leaf. Lists are searched in parts, up to this length, so too small a number
-    /// loses points. [`Scene::recorded`] gives the number of tetrahedra, which no list exceeds; that costs up to
-    /// [`MAX_LIST_PARTS`] dispatches on a GPU, and one for every [`LIST_PART`] tetrahedra on a processor. A host that reads
-    /// back [`crate::layout::BuildStatus::longest_leaf`] spares them.
+    /// loses points. [`Scene::recorded`] gives the number of tetrahedra, which no list exceeds; that records up
+    /// to [`MAX_LIST_PARTS`] dispatches on a GPU, and one for every [`LIST_PART`] tetrahedra on a processor, of which those end
+    /// at once that begin behind the end of the longest list, which the device knows. A host that reads back
+    /// [`crate::layout::BuildStatus::longest_leaf`] spares them. A list of N entries is a loop of up to N /
+    /// [`MAX_LIST_PARTS`] passes on a GPU: where a tree had to be built much coarser than its mesh asks for, record few points
+    /// at a time.
     pub longest_leaf: u32,
 }
 

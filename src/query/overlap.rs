@@ -76,7 +76,7 @@ impl Job<'_> {
             rounds = Rounds::resume(at_once);
             let sum = |pick: fn(&OverlapStatus) -> u32| statuses.iter().map(|s| u64::from(pick(s))).sum::<u64>();
             let (waiting, unfinished) = (sum(|s| s.waiting), sum(|s| s.unfinished));
-            (self.report)(waiting - unfinished, waiting);
+            (self.report)(waiting.saturating_sub(unfinished), waiting);
             if unfinished == 0 {
                 break statuses;
             }
@@ -99,7 +99,7 @@ impl Job<'_> {
         let (buffer, memory) = Arena::reserve(self.gpu, "olbvh.query.overlap_counts", carve)?;
         // In the first pass pairs are counted, in the second they are written.
         let (report, n) = (self.report, u64::from(tets));
-        let tell = |passes: u64, left: u32| report(passes * n - u64::from(left), 2 * n);
+        let tell = |passes: u64, left: u32| report((passes * n).saturating_sub(left.into()), 2 * n);
         let mut rounds = Rounds::begin(1);
         let status = loop {
             self.submit(|r, [a, b]| cmd_count_pairs(r, a, b, &memory, rounds))?;

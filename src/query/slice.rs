@@ -53,12 +53,12 @@ pub struct SliceInput<'a> {
 impl SliceInput<'_> {
     /// Number of voxels.
     pub fn count(&self) -> u32 {
-        self.rows.count * self.voxels.size[0]
+        self.rows.count.saturating_mul(self.voxels.size[0])
     }
 
     /// Number of runs, in all columns together.
     fn runs(&self) -> u32 {
-        self.rows.runs(self.voxels.size[1]) * self.voxels.size[0]
+        self.rows.runs(self.voxels.size[1]).saturating_mul(self.voxels.size[0])
     }
 }
 
@@ -187,7 +187,8 @@ fn cmd_plan(
         first_cell,
         last_cell,
     };
-    r.dispatch(&arguments, SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() }, Groups::Count(1))
+    let spec = SlicePlanSpec { workgroup: r.gpu().subgroup_size(), ..Default::default() };
+    r.stage("query.slice_plan", |r| r.dispatch(&arguments, spec, Groups::Count(1)))
 }
 
 fn cmd_locate_voxels(

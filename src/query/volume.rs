@@ -11,7 +11,7 @@
 
 mod picture;
 pub(crate) use picture::{Canvas, Rays, render_in};
-pub use picture::{Rendered, render};
+pub use picture::{Rendered, prepare_picture, render};
 
 use super::searched::{Searched, dispatch};
 use super::{Rounds, Scene, cmd_visible, visible_bytes};
@@ -326,11 +326,8 @@ fn cmd_plan(
         last_cell,
     };
     let workgroup = r.gpu().target().each;
-    r.dispatch(
-        &arguments,
-        VolumePlanSpec { workgroup, ..Default::default() },
-        Groups::Count((TABLE_SIZE.max(TOP_CELLS) as u32).div_ceil(workgroup)),
-    )
+    let groups = Groups::Count((TABLE_SIZE.max(TOP_CELLS) as u32).div_ceil(workgroup));
+    r.stage("query.render_plan", |r| r.dispatch(&arguments, VolumePlanSpec { workgroup, ..Default::default() }, groups))
 }
 
 fn cmd_intervals(
@@ -405,5 +402,6 @@ pub fn cmd_depths(r: &mut Recorder<'_>, input: &RenderInput, memory: &RenderMemo
     depths.check(4 * u64::from(input.size[0]) * u64::from(input.size[1]), "a depth buffer")?;
     let arguments = VolumeDepths { frames: memory.frame, states: memory.rays, colors: memory.colors, depths, status: memory.status };
     let workgroup = r.gpu().target().each;
-    r.dispatch(&arguments, VolumeDepthsSpec { workgroup, ..Default::default() }, Groups::Count(rays.div_ceil(workgroup)))
+    let (spec, groups) = (VolumeDepthsSpec { workgroup, ..Default::default() }, Groups::Count(rays.div_ceil(workgroup)));
+    r.stage("query.depths", |r| r.dispatch(&arguments, spec, groups))
 }

@@ -78,7 +78,8 @@ pub fn construct(mesh: &Mesh, topology: &Topology, vertices: &Vertices, level: u
     let boxes = options.boxes.then(|| levels::boxes(leaves::boxes(&splits, &grid), &splits));
     let masks = levels::masks(&octants, &splits);
     let (p, po, co, no) = (entries.primitives, splits.po, splits.co, splits.no);
-    let grid = Grid { first_leaf: co.len() as u32 - 1, slabs: if slabs.is_empty() { 0 } else { po.len() as u32 }, ..grid };
+    let slabs_at = if slabs.is_empty() { 0 } else { po.len() as u32 };
+    let grid = Grid { first_leaf: co.len() as u32 - 1, slabs: slabs_at, longest: leaves::longest_list(&po), ..grid };
     let tree = TreeArrays { assign: options.assign, lists: options.lists, grid, p, quarters, po, slabs, co, no, flags, masks, boxes };
     Ok(Construction { codes: entries.codes, tree })
 }

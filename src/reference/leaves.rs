@@ -96,6 +96,11 @@ pub fn boxes(splits: &Splits, grid: &Grid) -> Vec<Box6> {
     splits.codes[first..].par_iter().map(|&code| cell_box(grid, grid.level, code)).collect()
 }
 
+/// Entries of the longest leaf; `po` as in [`Splits`].
+pub fn longest_list(po: &[u32]) -> u32 {
+    po.windows(2).map(|ends| ends[1].saturating_sub(ends[0])).max().unwrap_or(0)
+}
+
 fn first_leaf(no: &[u32]) -> usize {
     if no.len() < 2 { 0 } else { no[no.len() - 2] as usize }
 }

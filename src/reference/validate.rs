@@ -2,7 +2,7 @@
 
 use super::boundary::Topology;
 use super::codes::Stage;
-use super::leaves::{cell_box, flag, octants};
+use super::leaves::{cell_box, flag, longest_list, octants};
 use super::levels::union;
 use super::marks::Marks;
 use super::quarters::{id_mask, quarters_near};
@@ -63,6 +63,7 @@ impl TreeArrays {
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
         expected.ids = id_mask(self.lists, topology.neighbours.len());
         expected.slabs = if self.slabs.is_empty() { 0 } else { self.po.len() as u32 };
+        expected.longest = longest_list(&self.po);
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 

@@ -11,7 +11,7 @@ pub struct ValidTets<'a> {
     /// They may be missing if only iso-surfaces are drawn.
     pub neighbours: &'a [[u32; 4]],
     /// Whether the tetrahedron of this number is valid.
-    pub is_valid: &'a dyn Fn(u32) -> bool,
+    pub is_valid: &'a (dyn Fn(u32) -> bool + Sync),
 }
 
 impl ValidTets<'_> {

@@ -2,15 +2,15 @@
 //! ray is done.
 
 use super::{BLOCK, RenderInput, RenderMemory, Share, Visibility, cmd_render_in};
-use crate::build::{Tree, cmd_ranges, range_bytes};
+use crate::build::{DeviceMesh, Tree, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, DeviceKind, Gpu, Recorder};
 use crate::grid::CellRange;
 use crate::layout::{RayState, RenderStatus, wide};
-use crate::mesh::On;
+use crate::mesh::{Field, Mesh, On};
 use crate::query::searched::Searched;
 use crate::query::{Progress, Rounds, SILENT, upload_field};
-use crate::render::{Plan, RenderStats, TABLE_SIZE};
+use crate::render::{Plan, Prepared, RenderSettings, RenderStats, TABLE_SIZE, ValidTets};
 use bytemuck::Pod;
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long. Fewer for
@@ -197,14 +197,42 @@ fn strip_rows(rays: u32, [width, height]: [u32; 2]) -> u32 {
     (rays / width.max(1)).max(1).next_multiple_of(BLOCK).min(height)
 }
 
+/// The plan of a picture of a field of `mesh`, which was uploaded as `device`, and the normals that its light needs. Reads
+/// back what is on the surface. A renderer that draws frame after frame makes plans itself, as the crate's front page says.
+///
+/// # Errors
+/// Those of [`Prepared::new`], or a failed transfer.
+pub fn prepare_picture(device: &DeviceMesh, mesh: &Mesh, field: &Field, settings: &RenderSettings) -> Result<Prepared> {
+    let bad = if device.status().bad == 0 { Vec::new() } else { device.bad_cells()? };
+    // Light and opacity of a volume depend on where the surface is; those of iso-surfaces do not.
+    let neighbours = if settings.iso.is_empty() { device.neighbours()? } else { Vec::new() };
+    let is_valid = |tet: u32| bad.binary_search(&tet).is_err();
+    Prepared::new(settings, mesh, &ValidTets { bounds: device.grid().into(), neighbours: &neighbours, is_valid: &is_valid }, field)
+}
+
 /// Draws a plan of a field (values per point or per tetrahedron) over the mesh of a tree. `normals` has one normal per
-/// point, for shading. `report` receives the number of rays done and their total.
+/// point, for light; without any, colours are not lit. `report` receives the number of rays done and their total.
+///
+/// ```no_run
+/// use olbvh::{BadCells, BuildOptions, DeviceMesh, Fineness, Gpu, GpuOptions, Tree, formats, query, render::RenderSettings};
+///
+/// # fn main() -> olbvh::Result<()> {
+/// let mesh = olbvh::mesh::kuhn([32, 32, 32])?;
+/// let field = &mesh.fields[0];
+/// let gpu = Gpu::new(&GpuOptions::default())?;
+/// let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip)?;
+/// let tree = Tree::build(&gpu, &device, &BuildOptions { fineness: Fineness::Pictures, slabs: true, ..Default::default() })?;
+/// let picture = query::prepare_picture(&device, &mesh, field, &RenderSettings { size: [800, 600], ..Default::default() })?;
+/// let drawn = query::render(&tree, &picture.plan, (&field.values, field.on), Some(&picture.normals), query::SILENT)?;
+/// formats::write_png("jet.png".as_ref(), 800, 600, &picture.plan.pixels(&drawn.colors, 1))
+/// # }
+/// ```
 ///
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field, normals or transfer
 /// function have the wrong length.
 pub fn render(tree: &Tree, plan: &Plan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
-    render_in(tree.gpu(), &tree.into(), plan, field, normals, report)
+    render_in(tree.gpu(), &tree.into(), plan, field, normals.filter(|normals| !normals.is_empty()), report)
 }
 
 /// [`render`], with any structure.
