@@ -57,7 +57,7 @@
 //!   the preparation of a mesh.
 //! - **Your scene**: draw what is opaque, copy the depth attachment to a buffer (a `D32_SFLOAT` as it is, with a barrier from
 //!   the transfer to compute shaders), and record [`query::cmd_render`] with it ([`query::RenderInput::depth`]) and with the
-//!   view of your matrix ([`render::Plan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over
+//!   view of your matrix ([`render::PicturePlan::with_projected`]). Then blend the colours, which are premultiplied sRGB values, over
 //!   your picture: `color.rgb + (1 − color.a)·yours`, where yours are sRGB values as well: after tone mapping, and through a
 //!   view whose format is `UNORM`, not `SRGB`. If you draw more behind it, [`query::cmd_depths`] writes to that buffer how
 //!   far what became opaque is away, such as an iso-surface.

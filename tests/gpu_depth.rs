@@ -14,7 +14,7 @@ use olbvh::query::{RenderInput, RenderMemory, Rounds, SILENT, Scene, cmd_depths,
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::volume::{Drawing, render};
-use olbvh::render::{Plan, ProjectedView, RenderSettings, ValidTets};
+use olbvh::render::{PicturePlan, ProjectedView, RenderSettings, ValidTets};
 use submit::submit;
 
 const SIZE: [u32; 2] = [44, 30];
@@ -71,7 +71,7 @@ fn what_lies_behind_is_not_drawn() {
         let depth = gpu.upload("olbvh.test.depth", &depths).unwrap();
         for iso in [vec![], vec![lo + 0.2 * (hi - lo), lo + 0.5 * (hi - lo)]] {
             let settings = RenderSettings { size: SIZE, iso, opacity_scale: 0.1, ..RenderSettings::default() };
-            let plan = Plan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
+            let plan = PicturePlan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
             let scene = || Drawing::new(&mesh, &topology, &arrays, field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
             let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
             let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
@@ -115,7 +115,7 @@ fn depths_are_those_of_what_is_opaque() {
         let inverse = view.to_clip.inverse();
         for (iso, opacity_scale) in [(vec![2.5], 1.0), (vec![], 1e6)] {
             let settings = RenderSettings { size: SIZE, iso: iso.clone(), opacity_scale, ..RenderSettings::default() };
-            let plan = Plan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
+            let plan = PicturePlan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
             let drawing = Drawing::new(&mesh, &topology, &arrays, &field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
             let picture = render(&drawing, SILENT);
             let places = picture.depths.iter().zip(0..).filter_map(|(depth, i)| {

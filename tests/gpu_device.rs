@@ -135,10 +135,25 @@ fn devices_keep_their_pipelines_in_files_of_their_own() {
 }
 
 #[test]
-fn a_pipeline_cache_that_cannot_be_written_is_no_error() {
+fn a_pipeline_cache_that_cannot_be_written_is_an_error_only_if_asked_for() {
     let folder = tempfile::tempdir().unwrap();
     let file = folder.path().join("a file");
     fs::write(&file, "x").unwrap();
-    drop(Gpu::new(&GpuOptions { pipeline_cache: Some(file.join("below")), ..Default::default() }).unwrap());
+    let gpu = Gpu::new(&GpuOptions { pipeline_cache: Some(file.join("below")), ..Default::default() }).unwrap();
+    let error = gpu.save_pipelines().unwrap_err();
+    assert!(matches!(&error, Error::Io { path, .. } if path.starts_with(&file)), "{error}");
+    drop(gpu);
     assert_eq!(fs::read(&file).unwrap(), b"x");
+}
+
+#[test]
+fn a_pipeline_cache_is_written_while_the_device_is_in_use() {
+    let folder = tempfile::tempdir().unwrap();
+    let gpu = Gpu::new(&GpuOptions { pipeline_cache: Some(folder.path().into()), ..Default::default() }).unwrap();
+    assert_eq!(files(folder.path()).len(), 0);
+    gpu.save_pipelines().unwrap();
+    let file = &files(folder.path())[0];
+    let saved = fs::read(file).unwrap();
+    drop(gpu);
+    assert_eq!(fs::read(file).unwrap(), saved, "nothing was compiled since");
 }

@@ -10,7 +10,7 @@ use olbvh::mesh::{Bounds, On, kuhn};
 use olbvh::options::{Assign, BuildOptions, Lists};
 use olbvh::query::{LocateMethod, LocateOptions, SILENT, locate, overlap, render};
 use olbvh::render::RayGrid;
-use olbvh::render::{Plan, RenderSettings, TABLE_SIZE};
+use olbvh::render::{PicturePlan, RenderSettings, TABLE_SIZE};
 use std::any::Any;
 use std::fmt::Debug;
 
@@ -50,10 +50,10 @@ fn wrong_sizes_are_refused() {
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
     let (values, settings) = (vec![0.0; mesh.points.len()], RenderSettings { size: [16, 16], ..RenderSettings::default() });
-    let mut plan = Plan::new(&settings, &Bounds::from(device.grid()), mesh.origin, Some([0.0, 1.0])).unwrap();
+    let mut plan = PicturePlan::new(&settings, &Bounds::from(device.grid()), mesh.origin, Some([0.0, 1.0])).unwrap();
     plan.table.truncate(2);
     refused("render", "2 colours", render(&tree, &plan, (&values, On::Points), None, SILENT));
-    let unseen = Plan { rays: RayGrid { origin: [f32::NAN; 3], ..plan.rays }, table: vec![[0.0; 4]; TABLE_SIZE], ..plan };
+    let unseen = PicturePlan { rays: RayGrid { origin: [f32::NAN; 3], ..plan.rays }, table: vec![[0.0; 4]; TABLE_SIZE], ..plan };
     refused("render", "no finite numbers", render(&tree, &unseen, (&values, On::Points), None, SILENT));
     let eleven = BuildOptions { level: Some(11), ..BuildOptions::default() };
     refused("level", "level is 11", Tree::build(&gpu, &device, &eleven).map(|_| ()));

@@ -24,7 +24,7 @@ use olbvh::reference::build::build;
 use olbvh::reference::locate::Locator;
 use olbvh::reference::overlap::{OverlapSide, overlap as reference};
 use olbvh::reference::slice::Slicer;
-use olbvh::render::{Plan, RenderSettings, interval_slack};
+use olbvh::render::{PicturePlan, RenderSettings, interval_slack};
 use olbvh::slicing::{Band, Extrapolate, Rows};
 use submit::submit;
 
@@ -270,10 +270,10 @@ fn rounds_go_on_where_they_ended() {
 }
 
 /// A picture drawn in several recordings equals that of one recording: of a volume, or of a surface across it.
-fn picture_goes_on(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], iso: bool) -> (Plan, Vec<f32>, Vec<[f32; 4]>) {
+fn picture_goes_on(gpu: &Gpu, scene: &Scene, points: &[[f32; 3]], iso: bool) -> (PicturePlan, Vec<f32>, Vec<[f32; 4]>) {
     let (surfaces, step) = if iso { (vec![0.7], 0.1) } else { (vec![], 0.2) };
     let settings = RenderSettings { size: [4, 3], step: Some(step), iso: surfaces, ..RenderSettings::default() };
-    let plan = Plan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();
+    let plan = PicturePlan::new(&settings, &Bounds { lo: [0.0; 3], hi: [1.0; 3] }, [0.0; 3], Some([0.0, 1.0])).unwrap();
     let view = gpu.upload("olbvh.test.view", &[plan.view()]).unwrap();
     let table = gpu.upload("olbvh.test.table", &plan.table).unwrap();
     let values: Vec<f32> = points.iter().map(|p| if iso { p[0] } else { 0.9 }).collect();

@@ -6,7 +6,7 @@ use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, On, kuhn, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::query::{self, SILENT};
-use olbvh::render::{Plan, RenderSettings, TransferFunction};
+use olbvh::render::{PicturePlan, RenderSettings, TransferFunction};
 
 fn bits(colors: &[[f32; 4]]) -> Vec<[u32; 4]> {
     colors.iter().map(|color| color.map(f32::to_bits)).collect()
@@ -24,8 +24,8 @@ fn strips_skip_what_is_not_visible() {
     let settings = RenderSettings { size: [4096, 264], camera, transfer, step: Some(0.3), shading: false, ..RenderSettings::default() };
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let plan = Plan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
-    let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
+    let plan = PicturePlan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
+    let all = PicturePlan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
     let [some, all] = [plan, all].map(|plan| query::render(&tree, &plan, (&field.values, field.on), None, SILENT).unwrap());
     assert!(bits(&some.colors) == bits(&all.colors));
     assert!(some.colors[4096 * 256..].iter().any(|color| color[3] > 0.1));
@@ -43,8 +43,8 @@ fn walks_count_as_work() {
     let settings = RenderSettings { size: [8, 8], camera, step: Some(0.01), shading: false, ..RenderSettings::default() };
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
-    let plan = Plan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
-    let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], termination: 2.0, ..plan };
+    let plan = PicturePlan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
+    let all = PicturePlan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], termination: 2.0, ..plan };
     let stats = query::render(&tree, &all, (&field.values, field.on), None, SILENT).unwrap().stats;
     // Each of these rays takes 800 samples in the mesh, each of which tests some forty tetrahedra.
     assert!(stats.found_samples > 40_000 && (10..100).contains(&stats.submissions), "{stats:?}");

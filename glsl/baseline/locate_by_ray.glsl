@@ -17,7 +17,7 @@ RECORDS(4, vec4, vertices)
 BUFFER(5, readonly, float, points)
 BUFFER(6, writeonly, uint, owners)
 BUFFER16(7, writeonly, vec4, barycentrics)
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/points.glsl"
 
 const vec3 WAY = vec3(0.36, 0.48, 0.8); // of unit length, and in no plane of a regular grid

@@ -8,7 +8,7 @@ layout(constant_id = 2) const uint SHARE = 32; // most candidates of a share, se
 ARGUMENTS(5)
     uint tets;
     uint stride;
-    uint share; // tetrahedra per workgroup
+    uint tets_each; // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
@@ -36,7 +36,7 @@ void main() {
     uint large = 0u;
     uvec2 sums[12];
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
-    uvec2 items = items_of_share(share, tets);
+    uvec2 items = items_of_share(tets_each, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);

@@ -17,7 +17,7 @@ BUFFER(5, readonly, uint, candidates)
 BUFFER(6, writeonly, uint, codes)
 BUFFER(7, writeonly, uint, ids)
 #include "shared/cells.glsl"
-#include "shared/owner.glsl"
+#include "shared/tet_of_candidate.glsl"
 
 void main() {
     uint n = min(candidates.at[0], capacity);
@@ -25,7 +25,7 @@ void main() {
     if (first >= n) return;
     uint end = min(n, first + ROWS);
     Grid g = grid.at[0];
-    uint t = owner_of(first, tets);
+    uint t = tet_of_candidate(first, tets);
     uint next = offsets.at[t + 1u];
     CellBox box = coarser(finest_box(t), g.level);
     uvec3 at = candidate(box, first - offsets.at[t]);
@@ -34,7 +34,7 @@ void main() {
             // Most tetrahedra have candidates. A long stretch of bad ones, which have none, must not become a long
             // loop.
             t = min(t + 1u, tets - 1u);
-            if (offsets.at[t + 1u] <= i) t = owner_of(i, tets);
+            if (offsets.at[t + 1u] <= i) t = tet_of_candidate(i, tets);
             next = offsets.at[t + 1u];
             box = coarser(finest_box(t), g.level);
             at = box.lo;

@@ -23,7 +23,7 @@ BUFFER(7, readonly, uint, boundary)
 #include "shared/shares.glsl"
 #include "shared/assign.glsl"
 #include "shared/touching.glsl"
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/marks.glsl"
 #include "shared/boundary_tet.glsl"
 

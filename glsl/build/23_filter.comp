@@ -30,7 +30,7 @@ BUFFER(11, READ_WRITE, uint, doubt_count) // zeroed
 #include "shared/shares.glsl"
 #include "shared/assign.glsl"
 #include "shared/touching.glsl"
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/marks.glsl"
 #include "shared/boundary_tet.glsl"
 #include "shared/seeds.glsl"

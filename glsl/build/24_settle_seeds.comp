@@ -25,7 +25,7 @@ BUFFER(11, readonly, uint, shares) // number of shares
 #include "shared/cells.glsl"
 #include "shared/shares.glsl"
 #include "shared/centre.glsl"
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/walk.glsl"
 #include "shared/marks.glsl"
 #include "shared/seeds.glsl"

@@ -1,5 +1,5 @@
 #version 460
-// Splits, 1 of 2: counts how many nodes end on each level in every run of ROWS codes: counts[level * runs + run].
+// Splits, 1 of 3: counts how many nodes end on each level in every run of ROWS codes: counts[level * runs + run].
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

@@ -1,5 +1,5 @@
 #version 460
-// Splits, 2 of 2: writes where leaves end (PO) and, for every node of the levels above, its last child (CO), without a
+// Splits, 3 of 3: writes where leaves end (PO) and, for every node of the levels above, its last child (CO), without a
 // sort by level. Where a node ends, its last child on the next level ends too, and that child is counted at the same
 // moment. CO therefore needs no search, and the paper's CI array of n_m words is not needed.
 #include "shared/kernel.glsl"

@@ -1,6 +1,6 @@
 #version 460
-// Leaves, 1 of 2 (Alg. 1): sets boundary flags, in parallel over entries, so that a long leaf does not become a long
-// loop.
+// Leaves, first with Lists::All (Alg. 1): sets boundary flags, in parallel over entries, so that a long leaf does not
+// become a long loop.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

@@ -1,5 +1,5 @@
 #version 460
-// Leaves, 1 of 3 with Lists::Boundary, where the boundary flags are known: writes into the top bits of every entry of P
+// Leaves, first with Lists::Boundary, whose boundary flags follow from marks: writes into the top bits of every entry of P
 // which quarters of its leaf's cell the entry is near, so that a search can skip most of a list.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"

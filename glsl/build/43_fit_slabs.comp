@@ -1,5 +1,5 @@
 #version 460
-// Leaves, 3 of 3 with Lists::Boundary: the slab of each leaf, behind PO. See src/reference/slabs.rs.
+// Leaves, last where they have slabs: the slab of each leaf, behind PO. See src/reference/slabs.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

@@ -120,7 +120,7 @@ vec3 shade(vec3 n) {
 vec3 normal_at(vec4 b) { return vec3(weighed(b, held_normals[0]), weighed(b, held_normals[1]), weighed(b, held_normals[2])); }
 
 // The normal at a place of the ray, whose own is n. Where a clip cuts the mesh open, it is that of the cut, and less so
-// with every step behind it. Twin of `Plan::beside_cut`.
+// with every step behind it. Twin of `PicturePlan::beside_cut`.
 vec3 beside_cut(float at, vec3 n) {
     if (cut == NONE) return n;
     precise float part = 1.0 - (at - unclipped.x) * view.cut_fade;

@@ -1,6 +1,6 @@
 #version 460
 // Volume rendering (SPEC 3.3), first kernel: copies the host's view and transfer function, and computes what depends on
-// the bounds and the octree, which only the device knows. Twin of `interval_slack` in src/render/plan.rs.
+// the bounds and the octree, which only the device knows. Twin of `interval_slack` in src/render/picture_plan.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

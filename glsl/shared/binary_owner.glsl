@@ -1,7 +1,7 @@
 // Point location in the baseline's binary tree, which finds the same owner as the octree. Needs grid.glsl, tet.glsl,
 // and nodes, root, ids, boundary, cells, vertices.
 #include "shared/binary_tree.glsl"
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/owner_search.glsl"
 #include "shared/boundary_tet.glsl"
 

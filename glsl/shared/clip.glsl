@@ -5,7 +5,7 @@
 float limit_of(uvec2 pixel, uint place) { return DEPTH != 0u ? steps_to_depth(view, pixel, depths.at[place]) : MAX_SAMPLES; }
 
 // The stretch of a ray that no clip leaves out, and that lies within a limit, in steps from its origin, and the clip at
-// which it begins, or NONE. Twin of `Plan::kept_stretch`.
+// which it begins, or NONE. Twin of `PicturePlan::kept_stretch`.
 vec2 kept_stretch(vec3 origin, vec3 direction, float limit, out uint cut) {
     vec2 kept = vec2(0.0, limit);
     cut = NONE;

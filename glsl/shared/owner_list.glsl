@@ -2,7 +2,7 @@
 // and flags, cells, vertices.
 
 #include "shared/boundary_node.glsl"
-#include "shared/candidates.glsl"
+#include "shared/best_owner.glsl"
 #include "shared/leaf_slab.glsl"
 
 // Of up to 32 entries from `begin` on and before `end`, those that are near the point's quarters of the leaf's cell,

@@ -1,4 +1,4 @@
-// A search for the owner of a point that may take several dispatches. Needs candidates.glsl.
+// A search for the owner of a point that may take several dispatches. Needs best_owner.glsl.
 
 // The state of such a search.
 struct OwnerSearch {

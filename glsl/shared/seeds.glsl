@@ -1,5 +1,5 @@
 // Seeds of unmarked cells (SPEC 2.6). Twin of src/reference/marks.rs, which explains them. Needs marks.glsl,
-// cells.glsl, centre.glsl and candidates.glsl.
+// cells.glsl, centre.glsl and best_owner.glsl.
 
 // The candidates of a tetrahedron whose centre its own box contains: from lo to hi, inclusive; none if hi is less than
 // lo. Along each axis, only the first and the last candidate can have their centre outside.

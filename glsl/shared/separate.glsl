@@ -99,7 +99,7 @@ float box_square(vec3 v[4]) {
     return dot_product(d, d);
 }
 
-float share(float x, float whole) {
+float part_of(float x, float whole) {
     if (whole <= 0.0) return 0.0;
     precise float r = x * reciprocal(whole);
     return clamp(canonical(r), 0.0, 1.0);
@@ -123,14 +123,14 @@ vec3 closest_in_triangle(vec3 a, vec3 b, vec3 c) {
     float vc = area(d1, d4, d3, d2);
     if (vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0) {
         precise float whole = d1 - d3;
-        float t = share(d1, whole);
+        float t = part_of(d1, whole);
         precise float rest = 1.0 - t;
         return vec3(rest, t, 0.0);
     }
     float vb = area(d5, d2, d1, d6);
     if (vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0) {
         precise float whole = d2 - d6;
-        float t = share(d2, whole);
+        float t = part_of(d2, whole);
         precise float rest = 1.0 - t;
         return vec3(rest, 0.0, t);
     }
@@ -138,12 +138,12 @@ vec3 closest_in_triangle(vec3 a, vec3 b, vec3 c) {
     precise float d43 = d4 - d3, d56 = d5 - d6;
     if (va <= 0.0 && d43 >= 0.0 && d56 >= 0.0) {
         precise float whole = d43 + d56;
-        float t = share(d43, whole);
+        float t = part_of(d43, whole);
         precise float rest = 1.0 - t;
         return vec3(0.0, rest, t);
     }
     precise float sum = (va + vb) + vc;
-    float v = share(vb, sum), w = share(vc, sum);
+    float v = part_of(vb, sum), w = part_of(vc, sum);
     precise float u = (1.0 - v) - w;
     return vec3(u, v, w);
 }

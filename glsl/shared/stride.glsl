@@ -1,4 +1,4 @@
-// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
+// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs best_owner.glsl, cells,
 // vertices and neighbours.
 #include "shared/vertices.glsl"
 

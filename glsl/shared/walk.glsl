@@ -1,5 +1,5 @@
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
-// and their order are the same. Needs candidates.glsl, cells and neighbours.
+// and their order are the same. Needs best_owner.glsl, cells and neighbours.
 const uint STAR = 128u;   // Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see corners.glsl.
 const uint STEPS = 512u;  // Most steps of part 1.
 const uint HINTED = 16u;  // Most steps of a stride from a hint.

@@ -9,7 +9,7 @@ use crate::mesh::On;
 use crate::primitives::{Count, SortScratch, cmd_fill, cmd_sort_pairs};
 use crate::query::searched::{BinaryTree, Searched, Structure};
 use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in};
-use crate::render::Plan;
+use crate::render::PicturePlan;
 use crate::slicing::{Band, Extrapolate, VoxelGrid};
 
 /// Bits of a code: ten per axis, and one that sorts bad tetrahedra last.
@@ -230,7 +230,7 @@ impl Lbvh {
     ///
     /// # Errors
     /// Those of [`crate::query::render`].
-    pub fn render(&self, plan: &Plan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
+    pub fn render(&self, plan: &PicturePlan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
         render_in(&self.gpu, &self.searched(), plan, field, normals, report)
     }
 

@@ -11,7 +11,7 @@ use crate::gpu::Gpu;
 use crate::grid::morton;
 use crate::mesh::{Bounds, Field, Mesh, On, fault_of};
 use crate::query::{self, Rendered, SILENT, Sliced};
-use crate::render::{Plan, RenderSettings};
+use crate::render::{PicturePlan, RenderSettings};
 use crate::slicing::{Band, Extrapolate, SliceSettings, VoxelGrid};
 
 /// Thickness of voxels as a fraction of the largest extent: one cell of the paper's mesh *Jets*.
@@ -34,7 +34,7 @@ pub(super) struct Subject<'a> {
     /// Points to locate, and the quantity that they measure.
     pub points: Vec<(Quantity, Vec<[f32; 3]>)>,
     field: Field,
-    plan: Option<Plan>,
+    plan: Option<PicturePlan>,
     voxels: Option<VoxelGrid>,
 }
 
@@ -66,7 +66,7 @@ impl<'a> Subject<'a> {
         let field = of_points.unwrap_or_else(along_x);
         // Every sample is taken, because nothing is opaque and no ray ends early.
         let picture = RenderSettings { size: [settings.picture; 2], shading: false, termination: 1.0, ..RenderSettings::default() };
-        let plan = (settings.picture > 0).then(|| Plan::new(&picture, &bounds, mesh.origin, field.range())).transpose()?;
+        let plan = (settings.picture > 0).then(|| PicturePlan::new(&picture, &bounds, mesh.origin, field.range())).transpose()?;
         let thickness = extent.into_iter().fold(0.0, f32::max).max(f32::MIN_POSITIVE);
         let slice =
             SliceSettings { size: [settings.slice, 0], thickness: Some(f64::from(thickness) * THICKNESS), ..SliceSettings::default() };
@@ -108,7 +108,7 @@ impl<'a> Subject<'a> {
 
 /// Samples within the bounds of some of a picture's rays, in blocks of 8 × 8 rays that are spread over the picture;
 /// front to back within each block.
-fn samples(plan: &Plan, bounds: &Bounds, most: usize) -> Vec<[f32; 3]> {
+fn samples(plan: &PicturePlan, bounds: &Bounds, most: usize) -> Vec<[f32; 3]> {
     let across = plan.size[0].div_ceil(8);
     let blocks = across * plan.size[1].div_ceil(8);
     let steps = (2.0 * bounds.diagonal() / f64::from(plan.step)) as u32;

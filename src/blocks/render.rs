@@ -12,7 +12,7 @@ use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Camera, Plan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
+use crate::render::{Camera, PicturePlan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
 use rayon::prelude::*;
 use std::ops::Range;
 use std::slice::from_ref;
@@ -41,7 +41,7 @@ pub struct Picture {
     /// The colours, and what they cost.
     pub rendered: Rendered,
     /// The plan that it was rendered with.
-    pub plan: Plan,
+    pub plan: PicturePlan,
     /// The camera that sees it, in coordinates of the mesh.
     pub camera: Camera,
     /// The bounds of the mesh.
@@ -149,7 +149,7 @@ impl Job<'_> {
     /// Whether a block contains values that are visible. An iso-surface may lie between the samples of two blocks, so
     /// with iso-surfaces no block can be left out.
     fn shows(&self, block: &Block) -> bool {
-        let Plan { iso, visible_values, .. } = &self.prepared.plan;
+        let PicturePlan { iso, visible_values, .. } = &self.prepared.plan;
         let Field { values, on, .. } = self.field;
         let range = |&t: &u32| {
             let ids = self.source.mesh.tets[t as usize];
@@ -233,7 +233,7 @@ struct Order {
 }
 
 impl Order {
-    fn new(plan: &Plan, grid: &Grid) -> Self {
+    fn new(plan: &PicturePlan, grid: &Grid) -> Self {
         let [width, height] = plan.size;
         let none = || Self { least_up: [u32::MAX; 3], greatest_down: [None; 3] };
         let with = |mut all: Self, (x, y): (u32, u32)| {
@@ -321,7 +321,7 @@ mod tests {
         let mut answers = [0; 2];
         for rays in cameras() {
             let settings = RenderSettings { size: SIZE, ..RenderSettings::default() };
-            let plan = Plan { rays, ..Plan::new(&settings, &BOUNDS, [0.0; 3], Some([0.0, 1.0])).unwrap() };
+            let plan = PicturePlan { rays, ..PicturePlan::new(&settings, &BOUNDS, [0.0; 3], Some([0.0, 1.0])).unwrap() };
             let order = Order::new(&plan, &grid);
             let all: Vec<_> = (0..SIZE[1]).flat_map(|y| (0..SIZE[0]).map(move |x| rays.ray(x, y))).collect();
             for (axis, last) in [0, 1, 2].into_iter().flat_map(|axis| (0..1023).step_by(31).map(move |last| (axis, last))) {

@@ -45,12 +45,12 @@ impl Build<'_> {
             r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
             r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
             r.barrier("depth.clear → depth.estimate");
-            let share = summing_share(tets, workgroup);
-            let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, share };
+            let tets_each = summing_share(tets, workgroup);
+            let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, tets_each };
             r.dispatch(
                 &estimate,
                 EstimateDepthSpec { workgroup, share: SHARE, ..Default::default() },
-                Groups::Count(tets.div_ceil(share)),
+                Groups::Count(tets.div_ceil(tets_each)),
             )?;
             r.barrier("depth.estimate → depth.choose");
             let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), each: workgroup, ..Default::default() };

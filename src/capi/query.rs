@@ -6,7 +6,7 @@ use crate::gpu::BufferRef;
 use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::query::{LocateOptions, SILENT, locate, nearest, overlap, render, slice};
 use crate::render::settings::MAX_ISO;
-use crate::render::{Plan, Prepared, RenderSettings, TransferFunction, ValidTets};
+use crate::render::{PicturePlan, Prepared, RenderSettings, TransferFunction, ValidTets};
 use crate::slicing::{Band, Extrapolate, TOUCHED, VoxelGrid};
 use bytemuck::Pod;
 use std::ffi::{CStr, c_char};
@@ -136,14 +136,14 @@ fn kept<T>(cell: &OnceLock<T>, make: impl FnOnce() -> Result<T>) -> Result<&T> {
 impl HeldMesh {
     /// The plan of a picture, and its normals (none without shading). The mesh is read back only if the settings leave
     /// open what depends on it.
-    fn prepare(&self, settings: &RenderSettings, bounds: Bounds, field: &Field) -> Result<(Plan, Vec<[f32; 3]>)> {
+    fn prepare(&self, settings: &RenderSettings, bounds: Bounds, field: &Field) -> Result<(PicturePlan, Vec<[f32; 3]>)> {
         let RenderSettings { camera, transfer, iso, range, shading, .. } = settings;
         let adapts = iso.is_empty() && !transfer.has_opacity();
         let frames = camera.eye.is_none() || camera.ortho == Some(None);
         let needs_mesh = range.or(transfer.range()).is_none() || adapts || frames || *shading;
         // What is wrong with surfaces of a field of cells, `Prepared` says.
         if !needs_mesh && (iso.is_empty() || field.on == On::Points) {
-            return Ok((Plan::new(settings, &bounds, [0.0; 3], None)?, Vec::new()));
+            return Ok((PicturePlan::new(settings, &bounds, [0.0; 3], None)?, Vec::new()));
         }
         let bad = if self.device.status().bad == 0 { &[][..] } else { kept(&self.copy.bad, || self.device.bad_cells())? };
         // Opacity and light of a volume depend on where the surface is.

@@ -11,7 +11,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::query::{Canvas, Rays, SILENT, render};
 use crate::reference::volume::{Drawing, render as draw};
-use crate::render::{Plan, RenderSettings, TransferFunction};
+use crate::render::{PicturePlan, RenderSettings, TransferFunction};
 
 /// A small picture.
 #[derive(Clone, Copy, Debug)]
@@ -77,7 +77,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let mut others = Vec::new();
         let hides = plan.hides(&field.values);
         if hides {
-            let all = Plan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
+            let all = PicturePlan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], ..plan.clone() };
             others.push(("every sample", render(&tree, &all, (&field.values, field.on), normals, SILENT)?.colors));
         }
         if case.parts {
@@ -105,7 +105,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
 
 /// Two halves of the finest grid in the order in which all rays of a picture meet them. Both are whole leaves of every
 /// tree but one that is a single leaf.
-fn halves(plan: &Plan) -> [CellRange; 2] {
+fn halves(plan: &PicturePlan) -> [CellRange; 2] {
     let [right, bottom] = plan.size.map(|n| n - 1);
     let ways = [(0, 0), (right, 0), (0, bottom), (right, bottom)].map(|(x, y)| plan.rays.ray(x, y).1);
     let [mut low, mut high] = [CellRange::WHOLE; 2];

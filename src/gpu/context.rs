@@ -322,11 +322,28 @@ impl Gpu {
     }
 }
 
+impl Gpu {
+    /// Writes the pipelines compiled so far to the file of [`GpuOptions::pipeline_cache`], so that later runs need not compile
+    /// them. The last handle does so when it is dropped; call this where that never happens, as in a program that ends by
+    /// `std::process::exit`. Without such a file, and if the host provides the cache, there is nothing to do.
+    ///
+    /// # Errors
+    /// [`crate::Error::Io`], or a failed Vulkan call.
+    pub fn save_pipelines(&self) -> Result<()> {
+        if self.inner.foundation.pipeline_cache.is_some() {
+            return Ok(());
+        }
+        self.inner.pipelines.save(self.device())
+    }
+}
+
 impl Drop for Inner {
     fn drop(&mut self) {
         let Foundation { device, pipeline_cache, ours, .. } = &self.foundation;
-        if pipeline_cache.is_none() {
-            self.pipelines.save(device);
+        if pipeline_cache.is_none()
+            && let Err(e) = self.pipelines.save(device)
+        {
+            log::info!("compiled kernels are not kept for the next start: {e}");
         }
         // SAFETY: every user of the device holds an `Arc` of it, and a host has waited for what it recorded (see
         // `from_raw`), so nothing is in use any more. Children are destroyed before parents, and the host's objects are

@@ -89,7 +89,7 @@ impl DescriptorPools {
             )));
         }
         let alignment = self.gpu.limits().min_storage_buffer_offset_alignment.max(1);
-        if let Some(odd) = buffers.iter().find(|b| b.offset % alignment != 0) {
+        if let Some(odd) = buffers.iter().find(|b| b.size > 0 && b.offset % alignment != 0) {
             let text = format!("{kernel} is given a buffer at offset {}, the device binds multiples of {alignment}", odd.offset);
             return Err(Error::Invalid(text));
         }

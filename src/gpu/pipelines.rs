@@ -2,7 +2,7 @@
 
 use super::failed;
 use super::foundation::Foundation;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use ash::vk;
 use std::collections::HashMap;
 use std::collections::hash_map::Entry;
@@ -105,24 +105,27 @@ impl Pipelines {
         }
     }
 
-    /// Writes the pipeline cache to a temporary file beside its own and renames that, so that readers never see a
-    /// partial file.
-    pub fn save(&self, device: &ash::Device) -> Option<()> {
-        let file = self.file.as_ref()?;
+    /// Writes the pipeline cache to its file, if it has one and differs from what is there: to a temporary file, which is
+    /// renamed, so that readers never see a partial one.
+    pub fn save(&self, device: &ash::Device) -> Result<()> {
+        let Some(path) = &self.file else { return Ok(()) };
         // SAFETY: the cache belongs to this device, which is alive.
-        let data = unsafe { device.get_pipeline_cache_data(self.cache) }.ok()?;
+        let data = unsafe { device.get_pipeline_cache_data(self.cache) }.map_err(failed("vkGetPipelineCacheData"))?;
         let content = [&seal(&data)[..], &data].concat();
-        if std::fs::read(file).is_ok_and(|stored| stored == content) {
-            return None;
+        if std::fs::read(path).is_ok_and(|stored| stored == content) {
+            return Ok(());
         }
-        std::fs::create_dir_all(file.parent()?).ok()?;
         let (process, number) = (std::process::id(), WRITTEN.fetch_add(1, Ordering::Relaxed));
-        let temporary = file.with_extension(format!("{process}.{number}.tmp"));
-        let written = std::fs::write(&temporary, content).and_then(|()| std::fs::rename(&temporary, file));
-        if written.is_err() {
+        let temporary = path.with_extension(format!("{process}.{number}.tmp"));
+        let write = || {
+            path.parent().map_or(Ok(()), std::fs::create_dir_all)?;
+            std::fs::write(&temporary, content)?;
+            std::fs::rename(&temporary, path)
+        };
+        write().map_err(|source| {
             let _ = std::fs::remove_file(&temporary);
-        }
-        written.ok()
+            Error::Io { path: path.clone(), source }
+        })
     }
 
     /// Destroys the pipelines, and the cache if this crate owns it.

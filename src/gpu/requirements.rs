@@ -183,6 +183,12 @@ fn query_subgroup_of(usual: u32, least: u32, control: bool) -> u32 {
     if control { least.max(8).min(usual) } else { usual }
 }
 
+/// A device whose extensions cannot be listed counts as one without any.
+fn no_extensions(error: vk::Result) -> Vec<vk::ExtensionProperties> {
+    log::warn!("vkEnumerateDeviceExtensionProperties failed: {error:?}; no extension is used");
+    Vec::new()
+}
+
 impl Requirements {
     /// Whether the driver may choose the size of subgroups.
     pub(super) fn sizes_vary(&self) -> bool {
@@ -206,7 +212,7 @@ impl Requirements {
             instance.get_physical_device_properties2(device, &mut properties);
             (
                 properties.properties,
-                instance.enumerate_device_extension_properties(device).unwrap_or_default(),
+                instance.enumerate_device_extension_properties(device).unwrap_or_else(no_extensions),
                 instance.get_physical_device_queue_family_properties(device),
             )
         };

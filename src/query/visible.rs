@@ -11,7 +11,7 @@ pub fn visible_bytes(nodes: u32) -> u64 {
 }
 
 /// Records into `marks` which nodes of a tree have a value within one of the ranges `values` (two floats each,
-/// ascending and disjoint, as in [`crate::render::Plan::visible_values`]). `values` consists of the ranges and their
+/// ascending and disjoint, as in [`crate::render::PicturePlan::visible_values`]). `values` consists of the ranges and their
 /// number. `marks` has [`visible_bytes`] for the nodes of the tree's capacity. `ranges` are the nodes' ranges as
 /// [`crate::build::cmd_ranges`] records them. Compute shaders read and write everything; there is no barrier before or
 /// after.

@@ -27,7 +27,7 @@ use crate::layout::constants::frame::TOP_LEVEL;
 use crate::layout::{DrawUniforms, RayState, RenderStatus, ViewUniforms};
 use crate::mesh::On;
 use crate::primitives::Count;
-use crate::render::{Plan, TABLE_SIZE};
+use crate::render::{PicturePlan, TABLE_SIZE};
 use std::mem::offset_of;
 
 /// Entries, nodes, and tetrahedra on and around walks that one ray may test in one dispatch, roughly.
@@ -45,12 +45,12 @@ const BLOCK: u32 = 8;
 pub struct RenderInput {
     /// Width and height in pixels, those of the settings that the view was made with; of a part, its own height.
     pub size: [u32; 2],
-    /// [`ViewUniforms`]: rays, light, step and range of values, as [`crate::render::Plan::view`] makes it.
+    /// [`ViewUniforms`]: rays, light, step and range of values, as [`crate::render::PicturePlan::view`] makes it.
     pub view: BufferRef,
     /// Draws iso-surfaces, for the values that the view has, instead of the volume. View and table must have been made for
     /// the same; [`RenderInput::of`] sees to that.
     pub iso: bool,
-    /// The transfer function: [`TABLE_SIZE`] times four floats, as in [`crate::render::Plan::table`].
+    /// The transfer function: [`TABLE_SIZE`] times four floats, as in [`crate::render::PicturePlan::table`].
     pub table: BufferRef,
     /// A field, one 32-bit float per point of the mesh or per tetrahedron, and which of the two.
     pub field: (BufferRef, On),
@@ -59,7 +59,7 @@ pub struct RenderInput {
     pub normals: Option<BufferRef>,
     /// A depth buffer, behind which nothing is drawn: a 32-bit float per pixel of this picture or part, row 0 on top, such as
     /// a copy of a depth attachment (`D32_SFLOAT`) has. [`crate::render::RayGrid::depth`] of the view says what its values
-    /// mean: with [`crate::render::Plan::with_projected`] what Vulkan wrote there, with a camera the distance from the eye
+    /// mean: with [`crate::render::PicturePlan::with_projected`] what Vulkan wrote there, with a camera the distance from the eye
     /// along the axis of the view.
     pub depth: Option<BufferRef>,
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
@@ -70,9 +70,9 @@ pub struct RenderInput {
 }
 
 impl RenderInput {
-    /// The whole picture of a plan, unlit and with nothing in front of it. `view` and `table` have [`Plan::view`] and
-    /// [`Plan::table`], or those of a later plan of the same size and kind.
-    pub fn of(plan: &Plan, view: BufferRef, table: BufferRef, field: (BufferRef, On)) -> Self {
+    /// The whole picture of a plan, unlit and with nothing in front of it. `view` and `table` have [`PicturePlan::view`] and
+    /// [`PicturePlan::table`], or those of a later plan of the same size and kind.
+    pub fn of(plan: &PicturePlan, view: BufferRef, table: BufferRef, field: (BufferRef, On)) -> Self {
         let (size, iso) = (plan.size, !plan.iso.is_empty());
         Self { size, view, iso, table, field, normals: None, depth: None, visibility: None, row: 0 }
     }
@@ -112,7 +112,7 @@ pub struct Visibility {
     /// The range of the field's values in every node, as [`crate::build::cmd_ranges`] records them.
     pub ranges: BufferRef,
     /// Ranges outside of which the transfer function is transparent: two floats each, ascending and disjoint, as in
-    /// [`crate::render::Plan::visible_values`].
+    /// [`crate::render::PicturePlan::visible_values`].
     pub values: BufferRef,
     /// Number of these ranges. `[∞, ∞]` shows nothing, so a caller whose transfer function changes can pad the ranges
     /// to a fixed number with it.
@@ -196,17 +196,17 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// continues the work. `Rounds::begin(0)` only prepares, and leaves all rays unfinished. A renderer that does not read back
 /// records a fixed number of rounds, and reads the status a few frames later.
 ///
-/// A picture in the scene of a renderer; see [`crate::render::Plan::with_projected`] for the plan:
+/// A picture in the scene of a renderer; see [`crate::render::PicturePlan::with_projected`] for the plan:
 ///
 /// ```no_run
-/// use olbvh::{build::cmd_ranges, gpu::{BufferRef, Recorder}, mesh::On, query::*, render::Plan, Result};
+/// use olbvh::{build::cmd_ranges, gpu::{BufferRef, Recorder}, mesh::On, query::*, render::PicturePlan, Result};
 ///
 /// /// Buffers of yours with plan.view(), plan.table and plan.visible_values; with the field and its ranges in the nodes
 /// /// (range_bytes); and with a copy of your depth attachment.
 /// struct Yours { view: BufferRef, table: BufferRef, values: BufferRef, field: BufferRef, ranges: BufferRef, depth: BufferRef }
 ///
 /// /// `memory` is that of RenderMemory::carve(arena, plan.size, Some(&scene.tree.capacity)).
-/// fn draw(r: &mut Recorder, scene: &Scene, plan: &Plan, yours: &Yours, memory: &RenderMemory) -> Result<()> {
+/// fn draw(r: &mut Recorder, scene: &Scene, plan: &PicturePlan, yours: &Yours, memory: &RenderMemory) -> Result<()> {
 ///     let field = (yours.field, On::Points);
 ///     cmd_ranges(r, &scene.mesh, &scene.tree, field, yours.ranges)?; // for a new tree, or new values; ends with a barrier
 ///     // A barrier of yours: what you uploaded, and the copy of the depths, to compute shaders.

@@ -1,8 +1,8 @@
 //! Point location by lists and by walks: every point of the mesh has one owner (SPEC 3.1). Twin of `glsl/query/locate`.
 
 use super::assign::{cell_centre, half_cell};
+use super::best_owner::Best;
 use super::boundary::Topology;
-use super::candidates::Best;
 use super::quarters::{is_near, leaves_room, reach};
 use super::slabs::SlabCell;
 use super::tet::{Tet, Vec3, Weights};

@@ -2,10 +2,10 @@
 //! It is the oracle of the tests, documents the algorithms, and runs `--device cpu`. It does not depend on Vulkan.
 
 pub mod assign;
+pub mod best_owner;
 pub mod boundary;
 pub mod brute;
 pub mod build;
-pub mod candidates;
 pub mod codes;
 pub mod corners;
 pub mod depth;

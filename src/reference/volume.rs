@@ -21,7 +21,7 @@ use super::ranges::{ranges, visible};
 use crate::error::{Error, Result};
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
-use crate::render::{MAX_SAMPLES, Plan, Prepared, RenderSettings, RenderStats, ValidTets};
+use crate::render::{MAX_SAMPLES, PicturePlan, Prepared, RenderSettings, RenderStats, ValidTets};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -95,7 +95,7 @@ impl<'a> Drawing<'a> {
 
     /// Draws another plan of the same field and settings: from a view that no camera describes.
     #[must_use]
-    pub fn seen_in(mut self, plan: Plan) -> Self {
+    pub fn seen_in(mut self, plan: PicturePlan) -> Self {
         self.prepared.plan = plan;
         self
     }
@@ -114,7 +114,7 @@ impl<'a> Drawing<'a> {
     }
 
     /// The plan of the picture.
-    pub fn plan(&self) -> &Plan {
+    pub fn plan(&self) -> &PicturePlan {
         &self.prepared.plan
     }
 

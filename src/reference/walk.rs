@@ -16,7 +16,7 @@
 //! is lost. A walk that comes near x ends with the *star* of x: the tetrahedra reached across faces that are so near x
 //! that rounding could put it on either side. The owner is chosen among them, so it does not depend on the way taken.
 
-use super::candidates::Best;
+use super::best_owner::Best;
 use super::tet::{Bounds, Sides, Tet, Vec3, Weights, least_of, sides_of};
 use crate::grid::{per_axis, reciprocal, two_to};
 use crate::layout::NONE;

@@ -1,15 +1,15 @@
-//! Definition of a picture (SPEC 3.3): camera, transfer function and settings, and the [`Plan`] that they yield for a
+//! Definition of a picture (SPEC 3.3): camera, transfer function and settings, and the [`PicturePlan`] that they yield for a
 //! mesh. Does not depend on Vulkan: the kernels and the reference renderer draw the same plan with the same operations
 //! in the same order.
 //!
 //! # Definition
 //! - The ray of pixel (x, y), with row 0 on top, is [`RayGrid::ray`]. Sample k lies at
 //!   `origin + direction · ((k + ½)·Δ)`, independently of the tree.
-//! - Samples beyond a clip ([`Plan::kept_stretch`]) are not taken, nor those behind what a depth buffer shows
+//! - Samples beyond a clip ([`PicturePlan::kept_stretch`]) are not taken, nor those behind what a depth buffer shows
 //!   ([`RayGrid::steps_to`]).
 //! - A sample adds nothing if it lies outside the mesh or its value is not finite. Otherwise it has the field's value v
 //!   in its owner, the place x = clamp((v − lo)·scale, 0, 1) in the transfer function, and the colour and opacity of
-//!   [`Plan::lookup`] there.
+//!   [`PicturePlan::lookup`] there.
 //! - Samples are composited front to back, with colour C and opacity A starting at 0: `w = (1 − A)·a`, `C += w·c`,
 //!   `A += w`, until A reaches the termination.
 //! - Colours are composited as the sRGB values they are displayed with (as `ParaView` does), not as light. So a
@@ -30,7 +30,7 @@ pub mod auto;
 pub mod camera;
 pub mod clip;
 pub mod maps;
-pub mod plan;
+pub mod picture_plan;
 pub mod rays;
 pub mod settings;
 pub mod shading;
@@ -43,7 +43,7 @@ mod visible_values;
 pub use auto::auto_opacity;
 pub use camera::{Camera, CameraSpec, ProjectedView, Projection};
 pub use clip::{Clip, ClipPlace};
-pub use plan::{Plan, Prepared, TABLE_SIZE, interval_slack};
+pub use picture_plan::{PicturePlan, Prepared, TABLE_SIZE, interval_slack};
 pub use rays::{MAX_SAMPLES, RayGrid};
 pub use settings::{Background, OPACITY_UNIT, RenderSettings};
 pub use shading::{Lighting, Shade, gradient_normals, shading_normals};

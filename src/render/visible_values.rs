@@ -28,14 +28,14 @@ pub(super) fn visible_values(table: &[[f32; 4]], value_lo: f32, value_scale: f32
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Plan, RenderSettings, TransferFunction};
+    use super::super::{PicturePlan, RenderSettings, TransferFunction};
     use crate::mesh::Bounds;
 
     const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
 
-    fn plan(opacity: &[(f32, f32)], range: [f32; 2]) -> Plan {
+    fn plan(opacity: &[(f32, f32)], range: [f32; 2]) -> PicturePlan {
         let transfer = TransferFunction::default().with_opacity(opacity.to_vec()).unwrap();
-        Plan::new(&RenderSettings { transfer, ..RenderSettings::default() }, &BOX, [0.0; 3], Some(range)).unwrap()
+        PicturePlan::new(&RenderSettings { transfer, ..RenderSettings::default() }, &BOX, [0.0; 3], Some(range)).unwrap()
     }
 
     #[test]

@@ -12,7 +12,7 @@ use crate::query::{self, LocateMethod, LocateOptions, SILENT};
 use crate::reference::boundary::topology;
 use crate::reference::build::build;
 use crate::reference::locate::Locator;
-use crate::render::{Plan, RenderSettings};
+use crate::render::{PicturePlan, RenderSettings};
 use crate::slicing::{Extrapolate, SliceSettings, VoxelGrid};
 use crate::tree::TreeArrays;
 use std::cell::RefCell;
@@ -32,7 +32,7 @@ pub struct Workload<'a> {
     mesh: &'a Mesh,
     points: Vec<[f32; 3]>,
     field: Field,
-    plan: Plan,
+    plan: PicturePlan,
     voxels: VoxelGrid,
     expected: Answers,
     load: Load,
@@ -78,7 +78,7 @@ impl<'a> Workload<'a> {
         let along_x = || Field { name: "x".into(), on: On::Points, values: mesh.points.iter().map(|p| p[0]).collect() };
         let field = mesh.fields.iter().find(|f| f.on == On::Points).cloned().unwrap_or_else(along_x);
         let picture = RenderSettings { size: [PIXELS[of]; 2], shading: false, ..RenderSettings::default() };
-        let plan = Plan::new(&picture, &bounds, mesh.origin, field.range())?;
+        let plan = PicturePlan::new(&picture, &bounds, mesh.origin, field.range())?;
         let voxels = SliceSettings { size: [PIXELS[of], 0], ..SliceSettings::default() }.voxels(lo, hi, [0.0; 3])?;
         let gpu = gpu.clone();
         let (expected, load, prepared) = (Answers::default(), Load::new(&gpu)?, RefCell::default());

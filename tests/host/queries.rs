@@ -11,7 +11,7 @@ use olbvh::query::{
     Rounds, Scene, SliceInput, SliceMemory, Visibility, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
     cmd_list_pairs, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points,
 };
-use olbvh::render::{Plan, RenderSettings, TransferFunction};
+use olbvh::render::{PicturePlan, RenderSettings, TransferFunction};
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
 
 /// The memory of the queries of a frame, and their input.
@@ -30,7 +30,7 @@ pub struct Queries {
     pub sets: OverlapMemory,
     pub pairs: PairMemory,
     pub found: BufferRef,
-    pub plan: Plan,
+    pub plan: PicturePlan,
     pub normals: Vec<[f32; 3]>,
     pub picture: RenderMemory,
     pub memory: Buffer,
@@ -135,9 +135,9 @@ impl Queries {
 }
 
 /// The plan of a small picture of values in the middle of their range, seen from farther away than the meshes move.
-fn plan(values: &[f32]) -> Plan {
+fn plan(values: &[f32]) -> PicturePlan {
     let transfer = TransferFunction::default().with_opacity(vec![(0.0, 0.0), (0.4, 0.0), (0.5, 0.3), (0.6, 0.0), (1.0, 0.0)]).unwrap();
     let settings = RenderSettings { size: [37, 30], transfer, ..RenderSettings::default() };
     let range = values.iter().fold([f32::MAX, f32::MIN], |[lo, hi], &v| [lo.min(v), hi.max(v)]);
-    Plan::new(&settings, &Bounds { lo: [-8.0; 3], hi: [10.0; 3] }, [0.0; 3], Some(range)).unwrap()
+    PicturePlan::new(&settings, &Bounds { lo: [-8.0; 3], hi: [10.0; 3] }, [0.0; 3], Some(range)).unwrap()
 }

@@ -3,7 +3,7 @@
 use crate::legend::ink;
 use glam::{DMat3, DVec2, DVec3};
 use olbvh::mesh::Bounds;
-use olbvh::render::{Plan, RayGrid};
+use olbvh::render::{PicturePlan, RayGrid};
 
 /// Opacity of a line.
 const OPACITY: f32 = 0.6;
@@ -71,7 +71,7 @@ fn corner(bounds: &Bounds, i: usize) -> DVec3 {
 }
 
 /// Draws the edges of the bounds into the `colors` of the rays (premultiplied), of which a pixel has `across` by `across`.
-pub fn draw(colors: &mut [[f32; 4]], plan: &Plan, bounds: &Bounds, across: u32) {
+pub fn draw(colors: &mut [[f32; 4]], plan: &PicturePlan, bounds: &Bounds, across: u32) {
     let lines = lines(&Projector::new(&plan.rays), bounds);
     let height = plan.size[1];
     let width = f64::from(across) * (f64::from(height / across) / FINE).max(1.0);
@@ -133,9 +133,9 @@ mod tests {
     use super::*;
     use olbvh::render::RenderSettings;
 
-    fn plan(camera: &str, bounds: &Bounds) -> Plan {
+    fn plan(camera: &str, bounds: &Bounds) -> PicturePlan {
         let settings = RenderSettings { size: [320, 200], camera: camera.parse().unwrap(), ..RenderSettings::default() };
-        Plan::new(&settings, bounds, [0.0; 3], Some([0.0, 1.0])).unwrap()
+        PicturePlan::new(&settings, bounds, [0.0; 3], Some([0.0, 1.0])).unwrap()
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! The colour legend of a picture, in a strip at its right side: which colour stands for which value.
 
 use noto_sans_mono_bitmap::{FontWeight, RasterHeight, get_raster, get_raster_width};
-use olbvh::render::{Background, Plan};
+use olbvh::render::{Background, PicturePlan};
 
 /// Characters of a label, such as `-1234.567` or `-1.50e-12`.
 const LABEL: usize = 9;
@@ -22,7 +22,7 @@ pub struct Explained<'a> {
     /// Values at the two ends of the colours.
     pub range: [f32; 2],
     /// The colours, the background, and the values of iso-surfaces, if these are drawn.
-    pub plan: &'a Plan,
+    pub plan: &'a PicturePlan,
 }
 
 impl Legend {

@@ -10,7 +10,7 @@ use crate::gpu::Arena;
 use crate::layout::ViewUniforms;
 use crate::mesh::Bounds;
 use crate::query::{RenderInput, RenderMemory, Scene, Visibility, cmd_depths, cmd_render};
-use crate::render::{Plan, ProjectedView};
+use crate::render::{PicturePlan, ProjectedView};
 use glam::DMat4;
 use std::mem::offset_of;
 
@@ -117,7 +117,7 @@ pub extern "C" fn olbvh_view_make(
 ) -> OlbvhStatus {
     border(|| {
         let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
-        put(out, view_of(&Plan::new(&handle(settings, "settings")?.read()?, &bounds, [0.0; 3], None)?))
+        put(out, view_of(&PicturePlan::new(&handle(settings, "settings")?.read()?, &bounds, [0.0; 3], None)?))
     })
 }
 
@@ -138,11 +138,11 @@ pub extern "C" fn olbvh_view_make_projected(
         let bounds = Bounds { lo: *handle(lo.cast::<[f32; 3]>(), "lo")?, hi: *handle(hi.cast::<[f32; 3]>(), "hi")? };
         let to_clip = DMat4::from_cols_array(handle(to_clip.cast::<[f64; 16]>(), "to_clip")?);
         let view = ProjectedView { to_clip, reversed: reversed != 0 };
-        put(out, view_of(&Plan::with_projected(&handle(settings, "settings")?.read()?, &view, &bounds, [0.0; 3], None)?))
+        put(out, view_of(&PicturePlan::with_projected(&handle(settings, "settings")?.read()?, &view, &bounds, [0.0; 3], None)?))
     })
 }
 
-fn view_of(plan: &Plan) -> OlbvhView {
+fn view_of(plan: &PicturePlan) -> OlbvhView {
     let mut view = OlbvhView { frame: [0; 64], table: [[0.0; 4]; 1024], drawn: [[f32::INFINITY; 2]; 512], drawn_count: 0 };
     let frame = plan.view();
     view.frame.iter_mut().zip(bytemuck::cast_slice(std::slice::from_ref(&frame))).for_each(|(to, word)| *to = *word);

@@ -8,7 +8,7 @@ use crate::layout::{NearState, ViewUniforms};
 use crate::mesh::{Bounds, Field};
 use crate::options::TOLERANCE;
 use crate::query::{LocateOptions, Nearest, SILENT, locate, locate_all, nearest, overlap, render, slice};
-use crate::render::{Plan, Prepared, ProjectedView, ValidTets};
+use crate::render::{PicturePlan, Prepared, ProjectedView, ValidTets};
 use crate::slicing::{Band, Extrapolate};
 use bytemuck::Pod;
 use glam::DMat4;
@@ -64,7 +64,7 @@ fn sliced(tree: &Tree, field: Option<(&[f32], On)>, voxels: &OlbvhVoxels) -> (Ve
     (answers, values, bands)
 }
 
-fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &Plan, normals: Option<&[[f32; 3]]>) -> Expected {
+fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &PicturePlan, normals: Option<&[[f32; 3]]>) -> Expected {
     let values = values(&meshes[0]);
     let field = Some((&values[..], On::Points));
     let [mesh, other] = meshes.each_ref().map(|m| DeviceMesh::upload(gpu, m, BadCells::Skip).unwrap());
@@ -138,7 +138,8 @@ fn projected(settings: &OlbvhPictureSettings) {
     let views: [OlbvhView; 2] = [0, 1].map(|reversed| made(|out| make(reversed, out)));
     for (view, reversed) in views.iter().zip([false, true]) {
         let (view, bounds) = (&view.frame, Bounds { lo: LO, hi: HI });
-        let plan = Plan::with_projected(&settings.read().unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None).unwrap();
+        let plan =
+            PicturePlan::with_projected(&settings.read().unwrap(), &ProjectedView { to_clip, reversed }, &bounds, [0.0; 3], None).unwrap();
         assert_eq!(bytemuck::cast_slice::<u32, u8>(&view[..size_of::<ViewUniforms>() / 4]), bytemuck::bytes_of(&plan.view()));
     }
     assert!(views[0].frame != views[1].frame);
@@ -156,7 +157,7 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
     projected(&settings);
     let view: OlbvhView = made(|out| olbvh_view_make(&raw const settings, LO.as_ptr(), HI.as_ptr(), out));
     assert!((1..100).contains(&view.drawn_count));
-    let plan = Plan::new(&settings.read().unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
+    let plan = PicturePlan::new(&settings.read().unwrap(), &Bounds { lo: LO, hi: HI }, [0.0; 3], None).unwrap();
     let normals = vec![[0.6, 0.0, 0.7f32]; meshes[0].points.len()];
     let expected = expected(device, &meshes, &plan, Some(&normals));
 

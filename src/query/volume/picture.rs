@@ -10,7 +10,7 @@ use crate::layout::{RayState, RenderStatus, wide};
 use crate::mesh::{Field, Mesh, On};
 use crate::query::searched::Searched;
 use crate::query::{Progress, Rounds, SILENT, upload_field};
-use crate::render::{Plan, Prepared, RenderSettings, RenderStats, TABLE_SIZE, ValidTets};
+use crate::render::{PicturePlan, Prepared, RenderSettings, RenderStats, TABLE_SIZE, ValidTets};
 use bytemuck::Pod;
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long. Fewer for
@@ -51,7 +51,7 @@ impl Rays {
 pub(crate) struct Canvas<'a> {
     gpu: &'a Gpu,
     searched: Searched,
-    plan: &'a Plan,
+    plan: &'a PicturePlan,
     field: (Buffer, On),
     normals: Option<Buffer>,
     uniforms: [Buffer; 3],
@@ -73,7 +73,7 @@ impl<'a> Canvas<'a> {
     pub(crate) fn new(
         gpu: &'a Gpu,
         searched: &Searched,
-        plan: &'a Plan,
+        plan: &'a PicturePlan,
         (values, on): (&[f32], On),
         normals: Option<&[[f32; 3]]>,
         in_strips: bool,
@@ -231,7 +231,13 @@ pub fn prepare_picture(device: &DeviceMesh, mesh: &Mesh, field: &Field, settings
 /// # Errors
 /// [`Error::Memory`], [`Error::TooLarge`], a failed Vulkan call, or [`Error::Invalid`] if field, normals or transfer
 /// function have the wrong length.
-pub fn render(tree: &Tree, plan: &Plan, field: (&[f32], On), normals: Option<&[[f32; 3]]>, report: Progress<'_>) -> Result<Rendered> {
+pub fn render(
+    tree: &Tree,
+    plan: &PicturePlan,
+    field: (&[f32], On),
+    normals: Option<&[[f32; 3]]>,
+    report: Progress<'_>,
+) -> Result<Rendered> {
     render_in(tree.gpu(), &tree.into(), plan, field, normals.filter(|normals| !normals.is_empty()), report)
 }
 
@@ -239,7 +245,7 @@ pub fn render(tree: &Tree, plan: &Plan, field: (&[f32], On), normals: Option<&[[
 pub(crate) fn render_in(
     gpu: &Gpu,
     searched: &Searched,
-    plan: &Plan,
+    plan: &PicturePlan,
     field: (&[f32], On),
     normals: Option<&[[f32; 3]]>,
     report: Progress<'_>,

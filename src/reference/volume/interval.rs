@@ -4,7 +4,7 @@ use super::skip::inverse_of;
 use crate::grid::{Box6, CellRange};
 use crate::layout::bit;
 use crate::reference::leaves::cell_box;
-use crate::render::{MAX_SAMPLES, Plan, interval_slack};
+use crate::render::{MAX_SAMPLES, PicturePlan, interval_slack};
 use crate::tree::TreeArrays;
 
 /// Ray intervals of a plan.
@@ -12,7 +12,7 @@ pub struct Intervals<'a> {
     tree: &'a TreeArrays,
     /// One bit per node, set if the node is to be visited.
     nodes: &'a [u32],
-    plan: &'a Plan,
+    plan: &'a PicturePlan,
     /// Only samples in these cells of the finest grid are taken.
     part: CellRange,
     /// Boxes are enlarged by this, so that no sample is lost by rounding of samples, boxes and rays.
@@ -24,7 +24,7 @@ type Node = (u32, u32, u32);
 
 impl<'a> Intervals<'a> {
     /// Prepares the rays of `plan`. `visible` has one bit per node, set if something is visible there.
-    pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &'a Plan) -> Self {
+    pub fn new(tree: &'a TreeArrays, visible: Option<&'a [u32]>, plan: &'a PicturePlan) -> Self {
         Self { tree, nodes: visible.unwrap_or(&tree.flags), plan, part: CellRange::WHOLE, slack: interval_slack(&tree.grid) }
     }
 

@@ -6,12 +6,12 @@ use crate::grid::{canonical, per_axis, reciprocal};
 use crate::layout::constants::volume_march::WALK;
 use crate::reference::tet::Sides;
 use crate::reference::walk::{Stand, way_before, weighed};
-use crate::render::{Lighting, Plan};
+use crate::render::{Lighting, PicturePlan};
 
 /// Marches rays, one after the other.
 pub struct Marcher<'a> {
     scene: &'a Drawing<'a>,
-    plan: &'a Plan,
+    plan: &'a PicturePlan,
     /// The tetrahedron of the last sample, if it lay in one. After a gap the tree is searched first.
     cell: Option<u32>,
     /// Number of samples taken so far.

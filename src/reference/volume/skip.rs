@@ -3,7 +3,7 @@
 use crate::grid::{MAX_LEVEL, morton, reciprocal};
 use crate::layout::bit;
 use crate::reference::leaves::cell_side;
-use crate::render::Plan;
+use crate::render::PicturePlan;
 use crate::render::rays::LEAST;
 use crate::tree::TreeArrays;
 
@@ -19,7 +19,7 @@ pub struct Skips<'a> {
     /// One bit per node, set if something is visible there.
     pub visible: &'a [u32],
     /// The plan of the picture.
-    pub plan: &'a Plan,
+    pub plan: &'a PicturePlan,
 }
 
 impl Skips<'_> {

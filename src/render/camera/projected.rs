@@ -10,13 +10,13 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 ///
 /// ```
 /// use olbvh::glam::{DVec3, dcamera::rh::{proj::vulkan::perspective_infinite_reverse, view::look_at_mat4}};
-/// use olbvh::{mesh::Bounds, render::{Plan, ProjectedView, RenderSettings}};
+/// use olbvh::{mesh::Bounds, render::{PicturePlan, ProjectedView, RenderSettings}};
 ///
 /// let eye = look_at_mat4(DVec3::new(-3.0, -4.0, 5.0), DVec3::ZERO, DVec3::Z);
 /// let view = ProjectedView { to_clip: perspective_infinite_reverse(0.8, 16.0 / 9.0, 0.1) * eye, reversed: true };
 /// let bounds = Bounds { lo: [-1.0; 3], hi: [1.0; 3] };
 /// let settings = RenderSettings { size: [1920, 1080], ..RenderSettings::default() };
-/// let plan = Plan::with_projected(&settings, &view, &bounds, [0.0; 3], Some([20.0, 95.0]))?;
+/// let plan = PicturePlan::with_projected(&settings, &view, &bounds, [0.0; 3], Some([20.0, 95.0]))?;
 /// // Upload plan.view() and plan.table, and give both to query::cmd_render, along with your depth buffer.
 /// # Ok::<(), olbvh::Error>(())
 /// ```

@@ -2,7 +2,7 @@
 // counts.
 
 // The last tetrahedron t with offsets[t] <= i, for i below the total. Tetrahedra without candidates are skipped.
-uint owner_of(uint i, uint tets) {
+uint tet_of_candidate(uint i, uint tets) {
     // Where nearly every tetrahedron has one candidate (or one share of them), moving t by the difference of the
     // offsets leads almost to the right tetrahedron.
     uint t = min(i, tets - 1u);

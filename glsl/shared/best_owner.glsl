@@ -1,4 +1,4 @@
-// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl and vertices.
+// Candidate owners of a point. Twin of src/reference/best_owner.rs. Needs grid.glsl and vertices.
 #include "shared/vertices.glsl"
 #include "shared/quarters.glsl"
 

@@ -26,7 +26,7 @@ const MAX_DISTANCE: f64 = 1e9;
 
 /// A picture to draw.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Plan {
+pub struct PicturePlan {
     /// Width and height in rays: in pixels, unless a pixel has several.
     pub size: [u32; 2],
     /// The rays.
@@ -56,7 +56,7 @@ pub struct Plan {
     pub background: Background,
 }
 
-impl Plan {
+impl PicturePlan {
     /// Evaluates `settings` for a mesh with these bounds, whose coordinates are relative to `origin`, and a field with
     /// this range.
     ///
@@ -71,10 +71,10 @@ impl Plan {
         Self::with_camera(settings, &camera, bounds, origin, field_range)
     }
 
-    /// As [`Plan::new`], but with `camera` instead of the camera of the settings.
+    /// As [`PicturePlan::new`], but with `camera` instead of the camera of the settings.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// As [`PicturePlan::new`].
     pub fn with_camera(
         settings: &RenderSettings,
         camera: &Camera,
@@ -103,7 +103,7 @@ impl Plan {
         Self::with_view(settings, &view, bounds, origin, field_range)
     }
 
-    /// As [`Plan::new`], but with the view of a renderer instead of the camera of the settings. Opacities are those of the
+    /// As [`PicturePlan::new`], but with the view of a renderer instead of the camera of the settings. Opacities are those of the
     /// settings; [`RenderSettings::for_field`] chooses some that suit a field.
     ///
     /// `bounds` contain the mesh in every frame that is drawn with this plan: nothing is drawn that is nearer than their
@@ -111,7 +111,7 @@ impl Plan {
     /// that holds all its positions.
     ///
     /// # Errors
-    /// As [`Plan::new`], and if the matrix has no inverse, or planes of equal depth that are not parallel to the picture.
+    /// As [`PicturePlan::new`], and if the matrix has no inverse, or planes of equal depth that are not parallel to the picture.
     pub fn with_projected(
         settings: &RenderSettings,
         view: &ProjectedView,
@@ -309,7 +309,7 @@ pub fn interval_slack(grid: &Grid) -> [f32; 3] {
 #[derive(Clone, Debug)]
 pub struct Prepared {
     /// The plan.
-    pub plan: Plan,
+    pub plan: PicturePlan,
     /// The camera, framed around the mesh's vertices.
     pub camera: Camera,
     /// The bounds of the mesh.
@@ -324,13 +324,13 @@ impl Prepared {
     /// Prepares everything needed to draw `field` on `mesh`.
     ///
     /// # Errors
-    /// As [`Plan::new`].
+    /// As [`PicturePlan::new`].
     pub fn new(settings: &RenderSettings, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Result<Self> {
         let settings = settings.for_field(mesh, valid, field)?;
         let points = if settings.frames_bounds { valid.bounds.corners().to_vec() } else { used_points(mesh, valid) };
         let aspect = f64::from(settings.size[0]) / f64::from(settings.size[1]);
         let camera = settings.camera.resolve_around(&valid.bounds, &points, mesh.origin, aspect)?;
-        let plan = Plan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
+        let plan = PicturePlan::with_camera(&settings, &camera, &valid.bounds, mesh.origin, None)?;
         let range = settings.range.unwrap_or([0.0, 1.0]);
         Ok(Self { plan, camera, bounds: valid.bounds, normals: settings.normals(mesh, valid, field), range })
     }
@@ -338,7 +338,7 @@ impl Prepared {
 
 impl RenderSettings {
     /// These settings with what they leave open chosen for a field: the range of values and, for a volume, opacities. Done
-    /// once per field; a renderer then makes a [`Plan`] of them in every frame.
+    /// once per field; a renderer then makes a [`PicturePlan`] of them in every frame.
     ///
     /// # Errors
     /// [`Error::Invalid`] if a setting is out of its limits, or for iso-surfaces of a field of cells.

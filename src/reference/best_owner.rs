@@ -1,4 +1,4 @@
-//! Choice of the owner of a point among candidate tetrahedra (SPEC 3.1). Twin of `glsl/shared/candidates.glsl`.
+//! Choice of the owner of a point among candidate tetrahedra (SPEC 3.1). Twin of `glsl/shared/best_owner.glsl`.
 
 use super::tet::{Tet, Weights};
 use crate::layout::NONE;

@@ -7,7 +7,7 @@ const BOX: Bounds = Bounds { lo: [0.0; 3], hi: [3.0, 4.0, 12.0] };
 fn opacity_is_independent_of_the_step() {
     let through = |step: f64| {
         let settings = RenderSettings { step: Some(step), ..RenderSettings::default() };
-        let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([0.0, 1.0])).unwrap();
+        let plan = PicturePlan::new(&settings, &BOX, [0.0; 3], Some([0.0, 1.0])).unwrap();
         // Transparency of one unit (1/100 of 13) at the top of the range.
         (1.0 - plan.lookup(1.0)[3]).powf(0.13 / plan.step)
     };
@@ -20,7 +20,7 @@ fn opacity_is_independent_of_the_step() {
 #[test]
 fn lookups_follow_the_function_and_clamp() {
     let settings = RenderSettings { step: Some(0.13), ..RenderSettings::default() };
-    let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([100.0, 300.0])).unwrap();
+    let plan = PicturePlan::new(&settings, &BOX, [0.0; 3], Some([100.0, 300.0])).unwrap();
     for (value, place) in [(100.0, 0.0), (150.0, 0.25), (213.0, 0.565), (300.0, 1.0), (99.0, 0.0), (f32::MAX, 1.0), (f32::MIN, 0.0)] {
         let (got, expected) = (plan.lookup(value), settings.transfer.at(place));
         assert!((0..4).all(|c| (got[c] - expected[c]).abs() < 2e-3), "{value}: {got:?} {expected:?}");
@@ -30,12 +30,12 @@ fn lookups_follow_the_function_and_clamp() {
 #[test]
 fn constant_and_odd_ranges_have_lookups() {
     for range in [None, Some([5.0, 5.0]), Some([0.0, 0.0]), Some([f32::MIN, f32::MAX]), Some([1e-40, 2e-40])] {
-        let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], range).unwrap();
+        let plan = PicturePlan::new(&RenderSettings::default(), &BOX, [0.0; 3], range).unwrap();
         for v in [0.0, 5.0, f32::MAX, f32::MIN] {
             assert!(plan.lookup(v).iter().all(|c| (0.0..=1.0).contains(c)), "{range:?} {v} {:?}", plan.lookup(v));
         }
     }
-    let plan = Plan::new(&RenderSettings::default(), &BOX, [0.0; 3], Some([5.0, 5.0])).unwrap();
+    let plan = PicturePlan::new(&RenderSettings::default(), &BOX, [0.0; 3], Some([5.0, 5.0])).unwrap();
     assert_eq!(((5.0 - plan.value_lo) * plan.value_scale * 10.0).round(), 5.0);
 }
 
@@ -46,7 +46,7 @@ fn sample_numbers_are_held_down() {
     };
     let plan = |camera: &Camera, step: f64| {
         let settings = RenderSettings { size: [16_384, 1], step: Some(step), ..RenderSettings::default() };
-        Plan::with_camera(&settings, camera, &BOX, [0.0; 3], None)
+        PicturePlan::with_camera(&settings, camera, &BOX, [0.0; 3], None)
     };
     // One camera is far beside the box, which appears at the edge of a very wide picture; the other is equally far
     // in front of it.
@@ -63,7 +63,7 @@ fn steps_out_of_proportion_are_refused() {
         (1e39, "1e39 is longer than the diagonal"),
     ] {
         let settings = RenderSettings { step: Some(step), ..RenderSettings::default() };
-        let message = Plan::new(&settings, &BOX, [0.0; 3], None).unwrap_err().to_string();
+        let message = PicturePlan::new(&settings, &BOX, [0.0; 3], None).unwrap_err().to_string();
         assert!(message.contains(why), "{message}");
     }
 }
@@ -72,7 +72,7 @@ fn steps_out_of_proportion_are_refused() {
 fn rays_that_are_no_numbers_are_refused() {
     let plan = |camera: &str| {
         let settings = RenderSettings { camera: camera.parse().unwrap(), ..RenderSettings::default() };
-        Plan::new(&settings, &BOX, [0.0; 3], None).map_err(|error| error.to_string())
+        PicturePlan::new(&settings, &BOX, [0.0; 3], None).map_err(|error| error.to_string())
     };
     for (camera, why) in [
         ("ortho=1e39", "a picture 1e39 high, with rays beyond"),
@@ -106,14 +106,14 @@ fn values_as_places_do_not_move_with_the_range() {
     ] {
         let unit = BOX.diagonal() * OPACITY_UNIT;
         let settings = RenderSettings { transfer: transfer.clone(), range, step: Some(unit), ..RenderSettings::default() };
-        let plan = Plan::new(&settings, &BOX, [0.0; 3], Some([7.0, 8.0])).unwrap();
+        let plan = PicturePlan::new(&settings, &BOX, [0.0; 3], Some([7.0, 8.0])).unwrap();
         for value in [21.0, 30.0, 47.0, 53.0, 94.0] {
             let ([r, _, _, a], opacity) = (plan.lookup(value), if value < 50.0 { 0.0 } else { 0.4 });
             assert!((r - fraction(value)).abs() < 1e-3 && (a - opacity).abs() < 1e-3, "{range:?}: {value} {r} {a}");
         }
         // Opacities that are given beside the file have places from 0 to 1.
         let transfer = transfer.with_opacity(vec![(0.0, 0.0), (1.0, 0.5)]).unwrap();
-        let plan = Plan::new(&RenderSettings { transfer, ..settings }, &BOX, [0.0; 3], None).unwrap();
+        let plan = PicturePlan::new(&RenderSettings { transfer, ..settings }, &BOX, [0.0; 3], None).unwrap();
         let [lo, hi] = [0.0, 1.0].map(|place| plan.value_lo + place / plan.value_scale);
         assert!(plan.lookup(lo)[3] < 1e-3 && (plan.lookup(hi)[3] - 0.5).abs() < 1e-3, "{range:?}");
         assert!((plan.lookup(30.0)[0] - fraction(30.0)).abs() < 1e-3, "{range:?}");
@@ -123,7 +123,7 @@ fn values_as_places_do_not_move_with_the_range() {
 #[test]
 fn pixels_are_means_of_rays() {
     let settings = RenderSettings { size: [5, 4], background: Background::Transparent, ..RenderSettings::default() };
-    let plan = Plan::new(&settings, &BOX, [0.0; 3], None).unwrap();
+    let plan = PicturePlan::new(&settings, &BOX, [0.0; 3], None).unwrap();
     let colors: Vec<_> = (0..20).map(|ray| [f32::from(ray == 6), 0.0, 0.0, f32::from(ray == 6 || ray == 7)]).collect();
     let alone = plan.pixels(&colors, 1);
     assert_eq!((alone.len(), &alone[24..32]), (80, &[255, 0, 0, 255, 0, 0, 0, 255][..]));
