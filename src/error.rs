@@ -49,6 +49,9 @@ pub enum Error {
     /// A problem is larger than the device or the 32-bit indices of the tree can hold.
     #[error("too large: {0}")]
     TooLarge(String),
+    /// A caller's [`crate::query::Progress`] ended the call.
+    #[error("cancelled")]
+    Cancelled,
     /// An argument contradicts another one or lies outside its range.
     #[error("invalid argument: {0}")]
     Invalid(String),

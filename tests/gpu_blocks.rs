@@ -179,7 +179,10 @@ fn overlapped(gpu: &Gpu, a: &Mesh) {
         let trees = devices.each_ref().map(|device| Tree::build(gpu, device, &options).unwrap());
         let [x, y] = [&trees[0], &trees[1]];
         let told = RefCell::new(Vec::new());
-        let report = |done, all| told.borrow_mut().push((done, all));
+        let report = |done, all| {
+            told.borrow_mut().push((done, all));
+            Ok(())
+        };
         let whole = query::overlap(x, y, pairs, &report).unwrap().overlap;
         let searched = u64::from(whole.effort[0].searched) + u64::from(whole.effort[1].searched);
         rises(&told, if pairs { 2 * a.tets.len() as u64 } else { searched });
@@ -210,7 +213,10 @@ fn apart(gpu: &Gpu, a: &Mesh) {
     let options = BuildOptions { lists: Lists::All, ..BuildOptions::default() };
     for (pairs, wanted) in [(false, None), (true, Some(vec![]))] {
         let told = RefCell::new(Vec::new());
-        let report = |done, all| told.borrow_mut().push((done, all));
+        let report = |done, all| {
+            told.borrow_mut().push((done, all));
+            Ok(())
+        };
         // Too little memory for the whole meshes to be tried.
         let found = overlap(gpu, 1 << 19, &OverlapRequest { meshes: [a, &b], options, pairs }, &report).unwrap();
         rises(&told, 1_000_000);
@@ -378,11 +384,14 @@ fn large_pictures_are_drawn_in_strips() {
     let (topology, options) = (topology(&mesh).unwrap(), BuildOptions::default());
     let host = build(&mesh, &topology, &options).unwrap();
     let scene = volume::Drawing::new(&mesh, &topology, &host, &field, &settings).unwrap();
-    let expected = volume::render(&scene, SILENT);
+    let expected = volume::render(&scene, SILENT).unwrap();
     let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(&gpu, &device, &options).unwrap();
     let told = RefCell::new(Vec::new());
-    let report = |done, all| told.borrow_mut().push((done, all));
+    let report = |done, all| {
+        told.borrow_mut().push((done, all));
+        Ok(())
+    };
     let drawn = query::render(&tree, scene.plan(), (&field.values, field.on), None, &report).unwrap();
     let [samples, expected_samples] = [drawn.stats, expected.stats].map(|stats| [stats.samples, stats.found_samples]);
     assert_eq!(samples, expected_samples);

@@ -84,7 +84,7 @@ fn what_lies_behind_is_not_drawn() {
             submit(&gpu, "olbvh.test.picture", |r| cmd_render(r, &on_device, &input, &memory, Rounds::begin(8))).unwrap();
             let hidden: Vec<[f32; 4]> = gpu.download(&buffer, memory.colors.part(0, 16 * u64::from(SIZE[0] * SIZE[1]))).unwrap();
             let bits = |colors: &[[f32; 4]]| colors.iter().map(|color| color.map(f32::to_bits)).collect::<Vec<_>>();
-            let expected = render(&scene().before(&depths), SILENT);
+            let expected = render(&scene().before(&depths), SILENT).unwrap();
             assert!(bits(&hidden) == bits(&expected.colors));
             // The same depths, with those of what is opaque in the picture.
             let after = gpu.upload("olbvh.test.depths", &depths).unwrap();
@@ -94,7 +94,7 @@ fn what_lies_behind_is_not_drawn() {
             assert!(after.iter().map(|d| d.to_bits()).eq(both));
             let opaque = expected.depths.iter().flatten().count();
             assert!(opaque == hidden.iter().filter(|color| color[3] >= plan.termination).count() && (opaque > 50) == input.iso, "{opaque}");
-            let whole = render(&scene(), SILENT).colors;
+            let whole = render(&scene(), SILENT).unwrap().colors;
             let differs = |i: &usize| whole[*i] != hidden[*i];
             let columns = |behind: bool| (0..whole.len()).filter(move |i| (i % 44 % 8 < 6) == behind);
             let (behind, before) = (columns(true).filter(differs).count(), columns(false).filter(differs).count());
@@ -117,7 +117,7 @@ fn depths_are_those_of_what_is_opaque() {
             let settings = RenderSettings { size: SIZE, iso: iso.clone(), opacity_scale, ..RenderSettings::default() };
             let plan = PicturePlan::with_projected(&settings, &view, &(&arrays.grid).into(), mesh.origin, field.range()).unwrap();
             let drawing = Drawing::new(&mesh, &topology, &arrays, &field, &settings).unwrap().seen_in(plan.clone()).without_skipping();
-            let picture = render(&drawing, SILENT);
+            let picture = render(&drawing, SILENT).unwrap();
             let places = picture.depths.iter().zip(0..).filter_map(|(depth, i)| {
                 let [x, y] = [i % SIZE[0], i / SIZE[0]].map(|v| f64::from(v) + 0.5);
                 let ndc = DVec3::new(x / f64::from(SIZE[0]) * 2.0 - 1.0, y / f64::from(SIZE[1]) * 2.0 - 1.0, f64::from((*depth)?));

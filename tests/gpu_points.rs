@@ -164,7 +164,11 @@ fn all_owners_of_points_on_a_crowded_edge() {
     let on_edge = |i: usize| i % (at_once / 2) == 7;
     let points: Vec<_> = (0..2 * at_once + 9).map(|i| if on_edge(i) { [0.0, 0.0, 0.25] } else { [90.0; 3] }).collect();
     let told = RefCell::new(Vec::new());
-    let found = locate_all(&tree, &points, 0.0, &|done, all| told.borrow_mut().push((done, all))).unwrap();
+    let found = locate_all(&tree, &points, 0.0, &|done, all| {
+        told.borrow_mut().push((done, all));
+        Ok(())
+    })
+    .unwrap();
     let all = points.len() as u64;
     assert_eq!(told.into_inner(), [at_once as u64, 2 * at_once as u64, all].map(|done| (done, all)));
     assert_eq!((0..points.len()).filter(|&i| on_edge(i)).count(), 5);

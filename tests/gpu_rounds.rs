@@ -1,12 +1,16 @@
 //! Pictures are drawn in strips, and in rounds of bounded work.
 #![allow(clippy::unwrap_used, reason = "helpers of tests")]
 
+use olbvh::blocks;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
+use olbvh::error::{Error, Result};
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Field, On, kuhn, kuhn_jittered};
-use olbvh::options::BuildOptions;
-use olbvh::query::{self, SILENT};
+use olbvh::options::{BuildOptions, Lists};
+use olbvh::query::{self, LocateOptions, SILENT};
 use olbvh::render::{PicturePlan, RenderSettings, TransferFunction};
+use olbvh::slicing::{Extrapolate, SliceSettings};
+use std::cell::Cell;
 
 fn bits(colors: &[[f32; 4]]) -> Vec<[u32; 4]> {
     colors.iter().map(|color| color.map(f32::to_bits)).collect()
@@ -48,4 +52,47 @@ fn walks_count_as_work() {
     let stats = query::render(&tree, &all, (&field.values, field.on), None, SILENT).unwrap().stats;
     // Each of these rays takes 800 samples in the mesh, each of which tests some forty tetrahedra.
     assert!(stats.found_samples > 40_000 && (10..100).contains(&stats.submissions), "{stats:?}");
+}
+
+/// A caller that has had enough ends a call at its first report, and what the call used is free for the next one.
+#[test]
+fn calls_can_be_cancelled() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    let mesh = kuhn([8; 3]).unwrap();
+    let field = &mesh.fields[0];
+    let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+    let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+    let whole = Tree::build(&gpu, &device, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
+    let settings = RenderSettings { size: [64, 64], ..RenderSettings::default() };
+    let voxels = SliceSettings { layers: 3, ..SliceSettings::default() }.voxels([0.0; 3], [8.0; 3], [0.0; 3]).unwrap();
+    let reports = Cell::new(0);
+    let enough = |_, _| {
+        reports.set(reports.get() + 1);
+        Err(Error::Cancelled)
+    };
+    let held = || gpu.allocated().unwrap().total_allocated_bytes;
+    let before = held();
+    let memory = 1 << 30;
+    let how = LocateOptions::default();
+    let options = BuildOptions::default();
+    let asked = blocks::LocateRequest { mesh: &mesh, options, points: &mesh.points, how };
+    let ends: [(&str, Result<()>); 8] = [
+        ("locate", query::locate(&tree, &mesh.points, None, &how, &enough).map(drop)),
+        ("locate_all", query::locate_all(&tree, &mesh.points, 0.0, &enough).map(drop)),
+        ("nearest", query::nearest(&tree, &mesh.points, 1.0, &enough).map(drop)),
+        ("overlap", query::overlap(&tree, &tree, false, &enough).map(drop)),
+        ("pairs", query::overlap(&tree, &whole, true, &enough).map(drop)),
+        ("slice", query::slice(&tree, None, &voxels, Extrapolate::Nearest, &enough, &mut |_| Ok(())).map(drop)),
+        ("blocks", blocks::locate(&gpu, memory, &asked, None, &enough).map(drop)),
+        ("render", {
+            let plan = query::prepare_picture(&device, &mesh, field, &settings).unwrap();
+            query::render(&tree, &plan.plan, (&field.values, field.on), Some(&plan.normals), &enough).map(drop)
+        }),
+    ];
+    for (call, end) in ends {
+        assert!(matches!(end, Err(Error::Cancelled)), "{call}: {end:?}");
+    }
+    assert_eq!(reports.get(), 8, "each call ends at its first report");
+    assert_eq!(held(), before, "what the calls used is given back");
+    query::locate(&tree, &mesh.points, None, &how, SILENT).unwrap();
 }

@@ -33,7 +33,7 @@ struct Drawn {
 
 impl Drawn {
     fn of(scene: &Drawing<'_>) -> Self {
-        let Picture { colors, stats, .. } = render(scene, SILENT);
+        let Picture { colors, stats, .. } = render(scene, SILENT).unwrap();
         Self { pixels: scene.plan().pixels(&colors, 1), stats }
     }
 }
@@ -60,7 +60,7 @@ fn parts_share_the_samples() {
         let settings = RenderSettings { size: [24, 20], termination: 1.0, ..settings(camera) };
         let samples = |part| {
             let scene = Drawing::new(&mesh, &topology, &tree, &mesh.fields[0], &settings).unwrap();
-            render(&scene.within(part), SILENT).stats.found_samples
+            render(&scene.within(part), SILENT).unwrap().stats.found_samples
         };
         let all = samples(CellRange::WHOLE);
         for axis in 0..3 {

@@ -104,7 +104,7 @@ impl Lbvh {
                 *status = gpu.download_one(&memory, direction.status)?;
             }
             let unfinished = statuses.iter().map(|s| u64::from(s.unfinished)).sum::<u64>();
-            report(all.saturating_sub(unfinished), all);
+            report(all.saturating_sub(unfinished), all)?;
             if unfinished == 0 {
                 break statuses;
             }

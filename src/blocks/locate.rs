@@ -124,7 +124,7 @@ pub(super) fn each(
     let mut waiting = vec![(source.whole(), near, 1.0)];
     while let Some((block, ids, share)) = waiting.pop() {
         if ids.is_empty() || block.tets.is_empty() {
-            job.advance(ids.len(), share);
+            job.advance(ids.len(), share)?;
             continue;
         }
         let before = job.done;
@@ -146,7 +146,7 @@ pub(super) fn each(
         let (below, above) = if every { (ids.clone(), ids) } else { ids.into_iter().partition(is_low) };
         waiting.extend([(high, above, share), (low, below, share)]);
     }
-    report(points.len() as u64, points.len() as u64);
+    report(points.len() as u64, points.len() as u64)?;
     Ok(job.end())
 }
 
@@ -174,16 +174,16 @@ impl Job<'_> {
         for chunk in ids.chunks(most.max(1)) {
             let points: Vec<_> = chunk.iter().map(|&i| self.points[i as usize]).collect();
             (self.ask)(chunk, &points, placed, cells)?;
-            self.advance(chunk.len(), share);
+            self.advance(chunk.len(), share)?;
         }
         log::debug!("{} points in {} tetrahedra", ids.len(), input.tets);
         Ok(())
     }
 
     /// Reports that a share of the work on some points is done.
-    fn advance(&mut self, points: usize, share: f64) {
+    fn advance(&mut self, points: usize, share: f64) -> Result<()> {
         self.done += share * points as f64;
-        (self.report)(self.done as u64, self.points.len() as u64);
+        (self.report)(self.done as u64, self.points.len() as u64)
     }
 
     fn end(&self) -> InBlocks {

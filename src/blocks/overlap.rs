@@ -69,7 +69,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
     let told = Cell::new(0);
     let tell = |share: f64| {
         told.set(told.get().max((share * 1e6) as u64));
-        report(told.get(), 1_000_000);
+        report(told.get(), 1_000_000)
     };
     // The second construction can use the scratch memory of the first one again. What it adds, the second mesh itself,
     // is half of what it takes at the least.
@@ -79,7 +79,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
             query::overlap(&a.tree, &b.tree, pairs, &|done, all| tell(done as f64 / all.max(1) as f64))
         });
         if let Some(found) = unless_too_large(found)? {
-            tell(1.0);
+            tell(1.0)?;
             return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(found));
         }
     }
@@ -94,7 +94,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
     while let Some((nodes, share)) = waiting.pop() {
         if !meet(&sources, &nodes, apart) {
             done += share;
-            tell(done);
+            tell(done)?;
             continue;
         }
         let mut need = PER_TET * (nodes[0].tets() + nodes[1].tets()) as u64;
@@ -107,7 +107,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
         })?;
         let Tried::TooLarge(why) = tried else {
             done += share;
-            tell(done);
+            tell(done)?;
             continue;
         };
         let larger = usize::from(nodes[1].tets() > nodes[0].tets());
@@ -123,7 +123,7 @@ pub fn overlap(gpu: &Gpu, memory: u64, asked: &OverlapRequest<'_>, report: Progr
             waiting.push((next, share / 2.0));
         }
     }
-    tell(1.0);
+    tell(1.0)?;
     let overlap = &mut all.overlap;
     for set in [&mut overlap.a, &mut overlap.b] {
         set.sort_unstable();

@@ -83,7 +83,7 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
         match job.visit(&block, &mut rays)? {
             None => {
                 done += share;
-                report((done * 1e6) as u64, 1_000_000);
+                report((done * 1e6) as u64, 1_000_000)?;
             }
             Some([near, far]) => waiting.extend([(far, share / 2.0), (near, share / 2.0)]),
         }

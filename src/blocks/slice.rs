@@ -121,7 +121,7 @@ impl Job<'_> {
             let tried = if met { try_block(need, self.memory, || self.visit(&block, &mut all))? } else { Tried::Done };
             let Tried::TooLarge(why) = tried else {
                 self.done += share;
-                (self.report)(self.done as u64, voxels.voxels());
+                (self.report)(self.done as u64, voxels.voxels())?;
                 self.blocks.push(block);
                 continue;
             };

@@ -67,7 +67,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
         let drawn = render(&tree, plan, (&field.values, field.on), normals, SILENT)?;
         let pixels = plan.pixels(&drawn.colors, 1);
-        let expected = draw(&scene, SILENT);
+        let expected = draw(&scene, SILENT)?;
         let stage = format!("query.volume_march (alpha {alpha}, {assign}, lists {lists})");
         // Ray intervals depend on the leaves of the tree, the picture does not.
         compare_one(&stage, "found samples", &expected.stats.found_samples, &drawn.stats.found_samples)?;

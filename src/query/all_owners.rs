@@ -155,7 +155,7 @@ pub fn locate_all(tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Prog
             begin = end as usize;
             owners
         }));
-        report(all.len() as u64, points.len() as u64);
+        report(all.len() as u64, points.len() as u64)?;
     }
     Ok(all)
 }

@@ -342,7 +342,7 @@ pub fn locate(
             all.values.extend(gpu.download::<f32>(values, values.all().part(0, 4 * n))?);
         }
         all.stages.extend(time.stages);
-        report(all.owners.len() as u64, points.len() as u64);
+        report(all.owners.len() as u64, points.len() as u64)?;
     }
     Ok(all)
 }

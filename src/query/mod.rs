@@ -31,11 +31,12 @@ use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu};
 use crate::mesh::On;
 use crate::options::LIST_PART;
 
-/// Receives the progress of an owning call: how much is done, and the total. Each call says what it counts.
-pub type Progress<'a> = &'a dyn Fn(u64, u64);
+/// Receives the progress of an owning call: how much is done, and the total. Each call says what it counts. An error ends the
+/// call, which returns it: [`Error::Cancelled`] to stop, from another thread or a window, between two submissions.
+pub type Progress<'a> = &'a dyn Fn(u64, u64) -> Result<()>;
 
 /// Receives progress and ignores it.
-pub const SILENT: &(dyn Fn(u64, u64) + Sync) = &|_, _| {};
+pub const SILENT: &(dyn Fn(u64, u64) -> Result<()> + Sync) = &|_, _| Ok(());
 
 /// How many dispatches one recording spends on work of unknown length. Each dispatch tests a limited number of
 /// candidates per item, so that no dispatch keeps the device busy for seconds. Later dispatches skip items that are

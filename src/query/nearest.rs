@@ -162,7 +162,7 @@ pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: O
         loop {
             gpu.submit("olbvh.query.nearest", |r| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds))?;
             let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
-            report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64);
+            report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64)?;
             if unfinished == 0 {
                 break;
             }

@@ -76,7 +76,7 @@ impl Job<'_> {
             rounds = Rounds::resume(at_once);
             let sum = |pick: fn(&OverlapStatus) -> u32| statuses.iter().map(|s| u64::from(pick(s))).sum::<u64>();
             let (waiting, unfinished) = (sum(|s| s.waiting), sum(|s| s.unfinished));
-            (self.report)(waiting.saturating_sub(unfinished), waiting);
+            (self.report)(waiting.saturating_sub(unfinished), waiting)?;
             if unfinished == 0 {
                 break statuses;
             }
@@ -105,7 +105,7 @@ impl Job<'_> {
             self.submit(|r, [a, b]| cmd_count_pairs(r, a, b, &memory, rounds))?;
             let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
             rounds = Rounds::resume(1);
-            tell(1, status.unfinished);
+            tell(1, status.unfinished)?;
             if status.unfinished == 0 {
                 break status;
             }
@@ -120,7 +120,7 @@ impl Job<'_> {
             self.submit(|r, [a, b]| cmd_list_pairs(r, a, b, &memory, found.all(), rounds))?;
             let status: OverlapStatus = self.gpu.download_one(&buffer, memory.status)?;
             rounds = Rounds::resume(1);
-            tell(2, status.unfilled);
+            tell(2, status.unfilled)?;
             if status.unfilled == 0 {
                 break;
             }

@@ -128,14 +128,17 @@ impl<'a> Drawing<'a> {
 type Row<'a> = (&'a mut [[f32; 4]], &'a mut [Option<f32>]);
 
 /// Draws the scene. `report` receives the number of rows done and the number of rows.
-pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Picture {
+///
+/// # Errors
+/// Those of `report`, which end the call.
+pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) -> Result<()> + Sync)) -> Result<Picture> {
     let plan = scene.plan();
     let [width, height] = plan.size;
     let intervals = Intervals::new(scene.tree, scene.visible.as_deref().filter(|_| plan.iso.is_empty()), plan).within(scene.part);
     let [done, samples, skipped, found] = [const { AtomicU64::new(0) }; 4];
     let (interval_ns, march_ns) = (AtomicU64::new(0), AtomicU64::new(0));
     let start = Instant::now();
-    let row = |(y, (colors, depths)): (usize, Row<'_>)| {
+    let row = |(y, (colors, depths)): (usize, Row<'_>)| -> Result<()> {
         let y = y as u32;
         let begin = Instant::now();
         let spans: Vec<[u32; 2]> = (0..width).map(|x| intervals.of(plan.rays.ray(x, y), scene.limit(x, y))).collect();
@@ -151,11 +154,11 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Pictur
         samples.fetch_add(marcher.samples, Ordering::Relaxed);
         skipped.fetch_add(marcher.skipped_samples, Ordering::Relaxed);
         found.fetch_add(marcher.found_samples, Ordering::Relaxed);
-        report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height));
+        report(done.fetch_add(1, Ordering::Relaxed) + 1, u64::from(height))
     };
     let (width, pixels) = (width as usize, width as usize * height as usize);
     let (mut colors, mut depths) = (vec![[0.0; 4]; pixels], vec![None; pixels]);
-    colors.par_chunks_exact_mut(width).zip(depths.par_chunks_exact_mut(width)).enumerate().for_each(row);
+    colors.par_chunks_exact_mut(width).zip(depths.par_chunks_exact_mut(width)).enumerate().try_for_each(row)?;
     // Both stages run side by side on all threads, so the elapsed time is divided in proportion to the time that the
     // threads spent in each.
     let share = |part: &AtomicU64| {
@@ -166,9 +169,9 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) + Sync)) -> Pictur
     let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
     let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
     let ranges_ms = scene.ranges_ms;
-    Picture {
+    Ok(Picture {
         colors,
         depths,
         stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 },
-    }
+    })
 }

@@ -19,7 +19,7 @@ use olbvh::slicing::{Band, Tally};
 use olbvh::tree::TreeBytes;
 
 /// Receives progress: how much of how much is done.
-pub type OnProgress<'a> = &'a (dyn Fn(u64, u64) + Sync);
+pub type OnProgress<'a> = &'a (dyn Fn(u64, u64) -> Result<()> + Sync);
 
 /// Receives the bands of a stack of slices.
 pub type Sink<'a> = &'a mut dyn FnMut(Band) -> Result<()>;

@@ -105,7 +105,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let method = if args.coherent { LocateMethod::Descent } else { LocateMethod::Suited };
     let asked = LocateRequest { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
     let progress = Progress::new(common, "locating");
-    let report = |done: u64, total: u64| progress.set(done, total);
+    let report = |done: u64, total: u64| progress.follow(done, total);
     let (start, memory) = (Instant::now(), args.memory.memory);
     let (found, beside, took, seconds) = if args.all {
         let (owners, took) = engine.locate_all(&asked, memory, &report)?.into_parts();

@@ -171,6 +171,13 @@ impl Progress {
         }))
     }
 
+    /// Shows that `done` of `total` units of work are finished. Never an error: it does as a [`olbvh::query::Progress`].
+    #[expect(clippy::unnecessary_wraps)]
+    pub fn follow(&self, done: u64, total: u64) -> Result<(), olbvh::Error> {
+        self.set(done, total);
+        Ok(())
+    }
+
     /// Shows that `done` of `total` units of work are finished.
     pub fn set(&self, done: u64, total: u64) {
         let Some(bar) = &self.0 else { return };

@@ -65,7 +65,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "overlap");
     let asked = OverlapRequest { meshes: [&a, &b], options, pairs: args.pairs };
     let start = Instant::now();
-    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
+    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
     for (path, bad) in [&args.a, &args.b].into_iter().zip(took.bad_cells) {

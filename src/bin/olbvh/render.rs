@@ -150,7 +150,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let progress = Progress::new(common, "rendering");
     let asked = RenderRequest { mesh, options, field: &field, settings: &settings };
-    let (mut picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.set(done, total))?.into_parts();
+    let (mut picture, took) = engine.render(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if expects_something && picture.rendered.colors.iter().all(|color| color[3] < FAINT) {

@@ -125,7 +125,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let start = Instant::now();
     let mut sink = |band: Band| layers.band(band);
     let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
-    let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.set(done, total), &mut sink)?;
+    let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.follow(done, total), &mut sink)?;
     let (tally, took) = sliced.into_parts();
     layers.finish()?;
     drop(progress);

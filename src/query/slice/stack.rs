@@ -148,7 +148,7 @@ pub(crate) fn slice_in(
         let band = slicing.band(rows)?;
         done += band.kinds.len() as u64;
         sink(band)?;
-        report(done, voxels.voxels());
+        report(done, voxels.voxels())?;
     }
     let Sliced { locate_ms, touch_ms, values_ms, submissions, .. } = slicing.sliced;
     log::debug!("slice: locate {locate_ms:.1} ms, touch {touch_ms:.1} ms, values {values_ms:.1} ms, {submissions} submissions");

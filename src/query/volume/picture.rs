@@ -146,7 +146,7 @@ impl<'a> Canvas<'a> {
             stats.march_ms += time.milliseconds("query.march");
             stats.submissions += 1;
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
-            report(rays.saturating_sub(u64::from(status.unfinished)), rays);
+            report(rays.saturating_sub(u64::from(status.unfinished)), rays)?;
             if status.unfinished == 0 {
                 break status;
             }

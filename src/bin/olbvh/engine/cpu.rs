@@ -66,20 +66,20 @@ impl Engine for Cpu {
     }
 
     fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| Ok(tree.locate(asked.points, &asked.how, report)))
+        on_host(asked.mesh, &asked.options, memory, |tree| tree.locate(asked.points, &asked.how, report))
     }
 
     fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
-            Ok(each(asked.points, |p| locator.owners(p), report))
+            each(asked.points, |p| locator.owners(p), report)
         })
     }
 
     fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let surface = Surface::new(tree.mesh, &tree.topology, &tree.tree);
-            let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report);
+            let found = each(asked.points, |p| surface.nearest(p, within).unwrap_or((Location::NOWHERE, f32::INFINITY)), report)?;
             Ok(Nearest {
                 owners: found.iter().map(|(location, _)| location.owner).collect(),
                 barycentrics: found.iter().map(|(location, _)| location.barycentric).collect(),
@@ -99,7 +99,7 @@ impl Engine for Cpu {
         let build_seconds = start.elapsed().as_secs_f64();
         let side_a = OverlapSide { mesh: a, topology: &topology_a, tree: &tree_a };
         let answer = overlap(side_a, OverlapSide { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
-        report(1, 1);
+        report(1, 1)?;
         let bad_cells = [topology_a.counts.bad, topology_b.counts.bad];
         Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
     }
@@ -107,7 +107,7 @@ impl Engine for Cpu {
     fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
-            let volume::Picture { colors, stats, .. } = volume::render(&scene, report);
+            let volume::Picture { colors, stats, .. } = volume::render(&scene, report)?;
             let Prepared { plan, camera, bounds, range, .. } = scene.prepared().clone();
             Ok(Picture { rendered: Rendered { colors, stats }, plan, camera, bounds, range })
         })
@@ -124,7 +124,7 @@ impl Engine for Cpu {
                 tally.add(&band.kinds);
                 sink(band)?;
                 done += u64::from(rows.count) * u64::from(voxels.size[0]);
-                report(done, voxels.voxels());
+                report(done, voxels.voxels())?;
             }
             Ok(tally)
         })
@@ -162,7 +162,7 @@ impl<'a> CpuTree<'a> {
         Ok(Self { mesh, topology, tree, topology_ms, build_ms })
     }
 
-    fn locate(&self, points: &[[f32; 3]], options: &LocateOptions, report: OnProgress<'_>) -> Located {
+    fn locate(&self, points: &[[f32; 3]], options: &LocateOptions, report: OnProgress<'_>) -> Result<Located> {
         let locator = Locator::new(self.mesh, &self.topology, &self.tree).with_tolerance(options.tolerance);
         let mut all = Located::default();
         // Chunks and runs are those of a device (sorted ones, those of a processor), so that owners are equal even where tetrahedra overlap.
@@ -176,9 +176,9 @@ impl<'a> CpuTree<'a> {
             };
             all.owners.extend(found.iter().map(|l| l.owner));
             all.barycentrics.extend(found.iter().map(|l| l.barycentric));
-            report(all.owners.len() as u64, points.len() as u64);
+            report(all.owners.len() as u64, points.len() as u64)?;
         }
-        all
+        Ok(all)
     }
 }
 
@@ -186,13 +186,13 @@ impl<'a> CpuTree<'a> {
 const CHUNK: usize = 1 << 16;
 
 /// Computes the answers for all points, in parallel, chunk by chunk.
-fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: OnProgress<'_>) -> Vec<T> {
+fn each<T: Send>(points: &[[f32; 3]], one: impl Fn([f32; 3]) -> T + Sync, report: OnProgress<'_>) -> Result<Vec<T>> {
     let mut all = Vec::with_capacity(points.len());
     for chunk in points.chunks(CHUNK) {
         all.par_extend(chunk.par_iter().map(|&p| one(p)));
-        report(all.len() as u64, points.len() as u64);
+        report(all.len() as u64, points.len() as u64)?;
     }
-    all
+    Ok(all)
 }
 
 #[cfg(test)]
@@ -216,7 +216,7 @@ mod tests {
             owners.extend(band.owners);
             Ok(())
         };
-        Cpu.slice(&SliceRequest { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| (), &mut sink)?;
+        Cpu.slice(&SliceRequest { mesh, options, field: None, voxels, extrapolate }, None, &|_, _| Ok(()), &mut sink)?;
         let CpuTree { topology, tree, .. } = &CpuTree::new(mesh, &options)?;
         let whole = Slicer::new(mesh, topology, tree, None, *voxels, extrapolate)?.band(Rows { layer: 0, first: 0, count: 130 });
         assert!(owners == whole.owners, "{} owners differ", owners.iter().zip(&whole.owners).filter(|(a, b)| a != b).count());
