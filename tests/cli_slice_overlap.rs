@@ -123,12 +123,19 @@ fn inputs_are_not_replaced() {
     std::fs::copy(mesh, folder.join("m.vtu")).unwrap();
     std::fs::write(folder.join("p.csv"), "1,2,3\n").unwrap();
     let inputs = ["m.vtu", "p.csv"].map(|name| std::fs::read(folder.join(name)).unwrap());
+    let list = |kind: &str, entries: &str| format!("<VTKFile type='{kind}'><{kind}>{entries}</{kind}></VTKFile>");
+    let steps = "<DataSet timestep='0' file='m.vtu'/><DataSet timestep='1' file='other.vtu'/>";
+    std::fs::write(folder.join("list.pvd"), list("Collection", steps)).unwrap();
+    std::fs::write(folder.join("blocks.vtm"), list("vtkMultiBlockDataSet", "<DataSet index='0' file='list.pvd'/>")).unwrap();
     for wrong in [
         &["overlap", "m.vtu", "kuhn:1,1,1", "-o", "m.vtu"][..],
         &["overlap", "kuhn:1,1,1", "m.vtu", "-o", "./m.vtu"],
         &["locate", "m.vtu", "p.csv", "-o", "m.vtu"],
         &["locate", "m.vtu", "p.csv", "-o", "p.csv"],
         &["conformance", "m.vtu", "--junit", "m.vtu"],
+        &["locate", "list.pvd", "p.csv", "-o", "m.vtu", "--time-step", "last"],
+        &["locate", "kuhn:1,1,1", "blocks.vtm", "-o", "m.vtu"],
+        &["overlap", "blocks.vtm", "kuhn:1,1,1", "-o", "m.vtu"],
     ] {
         let (code, _, text) = olbvh(folder, wrong);
         assert!(code == 2 && text.contains("would replace"), "{wrong:?}: {code} {text}");

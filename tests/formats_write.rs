@@ -159,6 +159,10 @@ fn tables_of_points() {
         ",,,,\n1,2.5,-3\n4,5,6e3\n",
         "x,y,z\n1 2.5 -3\n4 5 6e3\n",
         "x,y,z,name\n1,2.5,-3,a;b\n4,5,6e3,c;d\n",
+        "z (mm),y (mm),x (mm)\n-3,2.5,1\n6e3,5,4\n",
+        "X [ m ], Y [ m ], Z [ m ], P\n1,2.5,-3,7\n4,5,6e3,7\n",
+        "nodenumber,    x-coordinate,    y-coordinate,    z-coordinate\n1,1,2.5,-3\n2,4,5,6e3\n",
+        "zone,x_pos,y,y_pos,z,x,z_pos\n9,9,2.5,9,-3,1,9\n9,9,5,9,6e3,4,9\n",
     ] {
         std::fs::write(&path, text).unwrap();
         assert_eq!(load_points(&path).unwrap_or_else(|e| panic!("{text}: {e}")), wanted, "{text}");
@@ -179,6 +183,8 @@ fn tables_of_points() {
         ("x,y,z\n1, ,3\n", "line 2: `` is not a number"),
         ("\"1\",\"2\",\"three\"\n", "line 1: `three` is not a number"),
         ("1,2\0,3", "byte 3"),
+        ("t,x,y\n1,2,3\n", "line 1: `t,x,y` are no names of coordinates; name the columns x, y and z"),
+        ("id,temperature,pressure\n1,2,3\n", "line 1: `id,temperature,pressure` are no names"),
     ] {
         std::fs::write(&path, text).unwrap();
         let error = load_points(&path).unwrap_err().to_string();

@@ -1,17 +1,17 @@
 //! Reader for Gmsh files (`.msh`), versions 2.0–2.2, 4.0 and 4.1, text and binary of either byte order, with node and
 //! element data.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 
-use super::LoadOptions;
 use super::array::Array;
 use super::assemble::Assembly;
-use super::gmsh_data::View;
+use super::gmsh_data::{View, of_step};
 use super::gmsh_elements::{Elements, kinds};
 use super::gmsh_reader::{Reader, Version, old};
 use super::scalar::Scalar;
 use super::source::{Source, excerpt};
 use super::tags::Tags;
+use super::{LoadOptions, TimeStep};
 use crate::error::Result;
 use crate::mesh::On;
 
@@ -104,12 +104,12 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     if !content.skipped.is_empty() {
         assembly.warnings.push(format!("sections that are not read: {}", content.skipped.join(", ")));
     }
-    content.assemble(source, &mut assembly)?;
+    content.assemble(source, options.step, &mut assembly)?;
     Ok(assembly)
 }
 
 impl Content {
-    fn assemble(mut self, source: &Source, assembly: &mut Assembly) -> Result<()> {
+    fn assemble(mut self, source: &Source, step: TimeStep, assembly: &mut Assembly) -> Result<()> {
         if let Some(bad) = self.tags.iter().find(|&&t| t < 1) {
             return Err(source.error_in("$Nodes", format!("node number {bad}; they must be positive")));
         }
@@ -139,16 +139,12 @@ impl Content {
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
-        let mut seen = HashSet::new();
-        for view in std::mem::take(&mut self.views) {
+        let (views, series) = of_step(std::mem::take(&mut self.views), step, source)?;
+        assembly.warnings.extend(series.map(|(read, count)| TimeStep::remark(read, count)));
+        for view in views {
             let (tags, count) = if view.on == On::Points { (&points, assembly.n_points()) } else { (&cells, self.elements.types.len()) };
             match view.array(tags, count, &mut assembly.padding) {
-                Ok(mut array) => {
-                    if !seen.insert((view.on, view.name)) {
-                        array.name = format!("{} (step {})", array.name, view.step);
-                    }
-                    assembly.arrays.push(array);
-                }
+                Ok(array) => assembly.arrays.push(array),
                 Err(warning) => assembly.warnings.push(warning),
             }
         }

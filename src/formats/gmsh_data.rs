@@ -1,12 +1,14 @@
 //! Reader for `$NodeData` and `$ElementData` of Gmsh files.
 
+use super::TimeStep;
 use super::array::Array;
 use super::budget::Budget;
 use super::gmsh_reader::Reader;
-use super::source::excerpt;
+use super::source::{Source, excerpt};
 use super::tags::Tags;
 use crate::error::Result;
 use crate::mesh::On;
+use std::collections::{BTreeSet, HashMap};
 
 /// Values, identified by the numbers of nodes or elements.
 pub(crate) struct View {
@@ -41,6 +43,26 @@ impl View {
         }
         Ok(Array { name: self.name.clone(), on: self.on, components: n, values })
     }
+}
+
+/// The views of one time step, and those that the file has at one step only. Returns the number of that step and of all
+/// steps, if there are several.
+pub(crate) fn of_step(views: Vec<View>, step: TimeStep, source: &Source) -> Result<(Vec<View>, Option<(usize, usize)>)> {
+    let mut steps_of: HashMap<(On, &str), BTreeSet<i64>> = HashMap::new();
+    for view in &views {
+        steps_of.entry((view.on, &view.name)).or_default().insert(view.step);
+    }
+    let is_series = |view: &View| steps_of[&(view.on, view.name.as_str())].len() > 1;
+    let mut all: Vec<String> = steps_of.values().filter(|steps| steps.len() > 1).flatten().map(i64::to_string).collect();
+    all.sort_unstable();
+    all.dedup();
+    if all.len() < 2 {
+        return Ok((views, None));
+    }
+    let chosen = step.chosen(source, &mut all)?;
+    let kept: Vec<bool> = views.iter().map(|view| !is_series(view) || view.step.to_string() == all[chosen]).collect();
+    let views = views.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(view, _)| view).collect();
+    Ok((views, Some((chosen, all.len()))))
 }
 
 impl Reader<'_> {

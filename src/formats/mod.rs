@@ -65,6 +65,7 @@ pub use report::{CellCount, Fate, Report};
 use source::Source;
 pub use source::printable;
 pub use steps::TimeStep;
+pub use vtu_files::listed_files;
 pub use write::{
     Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, is_part,
     write_json, write_located, write_mesh, write_npy, write_png, xml_attribute,
@@ -79,7 +80,7 @@ pub struct LoadOptions {
     /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
     /// more are left out. Default 100.
     pub expansion: u64,
-    /// Which time step of a series is read: of a `.pvd`, or of a `.vtu` with several. What has no time steps is the same
+    /// Which time step of a series is read: of a `.pvd`, or of a `.vtu` or `.msh` with several. What has no time steps is the same
     /// at all of them.
     pub step: TimeStep,
     /// What becomes of curved cells.

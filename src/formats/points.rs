@@ -16,7 +16,8 @@ use crate::error::{Error, Result};
 /// Reads points from a `.npy` file of shape (n, 3) and type f4, f8, or whole numbers, or from a text table with one
 /// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may
 /// be in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table
-/// may name the columns: if it names `x`, `y` and `z`, these columns are used; otherwise there must be three columns.
+/// may name the columns, `x`, `y` and `z` among them (also as in `X [ m ]`, `x-coordinate` or `Points:0`): these are used.
+/// Without names there must be three columns.
 /// Lines that start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
@@ -119,6 +120,13 @@ fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> 
     let names: Vec<_> = fields(line, separator).collect();
     let (width, numbers) = (names.len(), names.iter().filter(|name| number(name).is_some()).count());
     let named = if numbers == width { None } else { named(&names) };
+    // Other names may stand for anything in any order.
+    if numbers == 0 && named.is_none() && width == 3 {
+        let found = excerpt(line);
+        return Err(
+            source.error_line(at, format!("`{found}` are no names of coordinates; name the columns x, y and z, or leave this line out"))
+        );
+    }
     let at = named.or_else(|| (width == 3).then_some([0, 1, 2])).ok_or_else(|| {
         source.error_line(at, format!("{width} columns; there must be three, or a first line that names x, y and z among them"))
     })?;
@@ -201,12 +209,28 @@ fn number(field: &[u8]) -> Option<f64> {
     })
 }
 
-/// The columns that hold x, y and z, found by their names.
+/// The columns that hold x, y and z, found by their names: the axes themselves before names that contain them.
 fn named(fields: &[&[u8]]) -> Option<[usize; 3]> {
-    let find = |names: [&str; 3]| {
-        let at = names.map(|name| fields.iter().position(|f| f.eq_ignore_ascii_case(name.as_bytes())));
+    let find = |axis_of: &dyn Fn(&[u8]) -> Option<usize>| {
+        let at = [0, 1, 2].map(|axis| fields.iter().position(|field| axis_of(field) == Some(axis)));
         Some([at[0]?, at[1]?, at[2]?])
     };
-    // The last two sets of names are those of different ParaView versions.
-    [["x", "y", "z"], ["Points:0", "Points:1", "Points:2"], ["Points_0", "Points_1", "Points_2"]].into_iter().find_map(find)
+    let plain = |field: &[u8]| "xyz".bytes().position(|axis| field.eq_ignore_ascii_case(&[axis]));
+    find(&plain).or_else(|| find(&axis_in))
+}
+
+/// The axis in the name of a column, as other programs write it: `X [ m ]`, `z (mm)`, `x-coordinate`, `Points:0`.
+fn axis_in(field: &[u8]) -> Option<usize> {
+    let name = field.split(|b| b"([".contains(b)).next()?.trim_ascii().to_ascii_lowercase();
+    let (first, word) = match name.split_first()? {
+        (first @ b'x'..=b'z', word) => (usize::from(first - b'x'), word),
+        // Different versions of ParaView write a colon or an underscore.
+        _ => match name.strip_prefix(b"points")? {
+            [b':' | b'_', number @ b'0'..=b'2'] => (usize::from(number - b'0'), &[][..]),
+            _ => return None,
+        },
+    };
+    let word = word.trim_ascii_start();
+    let word = word.strip_prefix(b"-").or(word.strip_prefix(b"_")).unwrap_or(word);
+    [&b""[..], b"coordinate", b"coord", b"position", b"pos"].contains(&word).then_some(first)
 }

@@ -16,6 +16,8 @@ use crate::error::Result;
 const MOST_FILES: usize = 1 << 16;
 /// Most lists within each other.
 const MOST_DEEP: usize = 4;
+/// Endings of lists.
+const LISTS: [&str; 8] = ["pvtu", "pvts", "pvtr", "pvti", "vtm", "vtpd", "vtpc", "pvd"];
 /// Endings of files of VTK with surfaces and tables.
 const NO_VOLUMES: [&str; 3] = ["vtp", "pvtp", "vtt"];
 /// Endings of files of VTK with volumes of another kind.
@@ -95,6 +97,26 @@ pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Fil
         warnings.push(format!("listed files are left out: {unread}; {why}"));
     }
     Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
+}
+
+/// The files that a list (`.pvtu` and the like, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`) names, of all time steps, and those that lists
+/// among these name; none if the file is no list, or cannot be read. Tells whether a result would replace one of them.
+pub fn listed_files(path: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    collect(path, 1, &mut found);
+    found
+}
+
+fn collect(path: &Path, deep: usize, found: &mut Vec<PathBuf>) {
+    if deep > MOST_DEEP || !LISTS.contains(&ending(path).as_str()) {
+        return;
+    }
+    let Ok(Document::List(list)) = Source::open(path, ".vtu").and_then(|source| parse(&source, TimeStep::Last)) else { return };
+    let folder = path.parent().unwrap_or(Path::new(""));
+    for listed in list.files.iter().map(|file| folder.join(&file.path)).take(MOST_FILES) {
+        collect(&listed, deep + 1, found);
+        found.push(listed);
+    }
 }
 
 /// What has been found in lists.

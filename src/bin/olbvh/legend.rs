@@ -157,23 +157,23 @@ fn is_single([lo, hi]: [f64; 2]) -> bool {
     hi - lo <= lo.abs().max(hi.abs()) * 1e-6
 }
 
-/// About `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten.
-fn marks([lo, hi]: [f64; 2], most: usize) -> Vec<f64> {
+/// About `most` round values within a range, ascending: multiples of 1, 2 or 5 times a power of ten, and that step.
+fn marks([lo, hi]: [f64; 2], most: usize) -> (Vec<f64>, f64) {
     if is_single([lo, hi]) {
-        return vec![lo];
+        return (vec![lo], f64::INFINITY);
     }
     let rough = (hi - lo) / most.max(2) as f64;
     let power = 10f64.powf(rough.log10().floor());
     let step = [1.0, 2.0, 5.0, 10.0].into_iter().map(|m| m * power).find(|&step| step >= rough).unwrap_or(rough);
     // A hair beyond the ends, since multiples are rounded.
     let [first, last] = [(lo / step - 1e-6).ceil(), (hi / step + 1e-6).floor()];
-    (0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).collect()
+    ((0..=(last - first) as u32).map(|i| (first + f64::from(i)) * step).collect(), step)
 }
 
 /// The ends of a range and about `most` round values between, ascending, with their labels. Labels are at least `gap`
 /// apart from those of the ends, as a part of the range.
 fn ticks([lo, hi]: [f64; 2], most: usize, gap: f64) -> Vec<(f64, String)> {
-    let mut between = marks([lo, hi], most);
+    let (mut between, step) = marks([lo, hi], most);
     if is_single([lo, hi]) {
         return labelled(between);
     }
@@ -181,8 +181,17 @@ fn ticks([lo, hi]: [f64; 2], most: usize, gap: f64) -> Vec<(f64, String)> {
     between.retain(|v| v - lo >= near && hi - v >= near);
     // Three digits of the range.
     let unit = 10f64.powf((hi - lo).log10().floor() - 2.0);
-    let ends = digits(&[lo, hi].map(|v| (v / unit).round() * unit));
-    let mut all = labelled(between);
+    let ends = Need::of(&[lo, hi].map(|v| (v / unit).round() * unit), f64::INFINITY);
+    let inner = Need::of(&between, step);
+    let Some([ends, inner]) = Need::digits([ends, inner]) else {
+        // What is added to the lower end.
+        let higher: Vec<f64> = between.into_iter().chain([hi]).collect();
+        let need = Need::of(&higher.iter().map(|value| value - lo).collect::<Vec<_>>(), step);
+        let [digits] = Need::digits([need]).unwrap_or([need.powers()]);
+        let labelled = higher.into_iter().map(|value| (value, format!("+{}", label(value - lo, digits))));
+        return [(lo, label(lo, ends.powers()))].into_iter().chain(labelled).collect();
+    };
+    let mut all: Vec<_> = between.into_iter().map(|value| (value, label(value, inner))).collect();
     all.insert(0, (lo, label(lo, ends)));
     all.push((hi, label(hi, ends)));
     all
@@ -190,7 +199,8 @@ fn ticks([lo, hi]: [f64; 2], most: usize, gap: f64) -> Vec<(f64, String)> {
 
 /// Values with labels that tell them apart.
 fn labelled(values: Vec<f64>) -> Vec<(f64, String)> {
-    let digits = digits(&values);
+    let need = Need::of(&values, f64::INFINITY);
+    let [digits] = Need::digits([need]).unwrap_or([need.powers()]);
     values.into_iter().map(|value| (value, label(value, digits))).collect()
 }
 
@@ -201,24 +211,70 @@ enum Digits {
     Powers(usize),
 }
 
-/// The digits that tell values apart.
-fn digits(values: &[f64]) -> Digits {
-    let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
-    let apart = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 0.0).fold(largest, f64::min);
-    if largest == 0.0 {
-        return Digits::Fixed(0);
+/// What labels must show.
+#[derive(Clone, Copy)]
+struct Need {
+    /// Power of ten of the largest value.
+    order: i32,
+    /// Power of ten that tells values apart.
+    behind: i32,
+    /// Characters of the largest exponent.
+    exponent: usize,
+    /// Whether a value is negative.
+    signs: bool,
+}
+
+impl Need {
+    /// What tells values apart that are at least `step` apart, and from each other.
+    fn of(values: &[f64], step: f64) -> Self {
+        let largest = values.iter().fold(0.0, |most: f64, v| most.max(v.abs()));
+        let signs = values.iter().any(|v| *v < 0.0);
+        if largest == 0.0 {
+            return Self { order: 0, behind: 0, exponent: 1, signs };
+        }
+        let apart = values.windows(2).map(|v| v[1] - v[0]).filter(|d| *d > 0.0).fold(largest.min(step), f64::min);
+        let power = |x: f64| (x.log10() + 1e-9).floor() as i32;
+        let (order, least) = (power(largest), power(apart));
+        // Values that are not round, such as those of iso-surfaces, need more digits than their order.
+        let whole = |power: i32| values.iter().map(|v| v / 10f64.powi(power)).all(|x| (x - x.round()).abs() < 1e-4);
+        let behind = (order - 6..=least).rev().find(|&power| whole(power));
+        let behind = behind.unwrap_or(least - 2).max(order - 6);
+        let exponent = values.iter().filter(|v| **v != 0.0).map(|v| power(v.abs()).to_string().len()).max().unwrap_or(1);
+        Self { order, behind, exponent, signs }
     }
-    let [order, least] = [largest, apart].map(|x| (x.log10() + 1e-9).floor() as i32);
-    // Values that are not round, such as those of iso-surfaces, need more digits than their order.
-    let whole = |power: i32| values.iter().map(|v| v / 10f64.powi(power)).all(|x| (x - x.round()).abs() < 1e-4);
-    let behind = (order - 6..=least).rev().find(|&power| whole(power));
-    let behind = behind.unwrap_or(least - 2).max(order - 6);
-    let fixed = behind.min(0).unsigned_abs() as usize;
-    let signs = usize::from(values.iter().any(|v| *v < 0.0)) + usize::from(fixed > 0);
-    if order.max(0) as usize + fixed + signs < LABEL - 1 {
-        Digits::Fixed(fixed)
-    } else {
-        Digits::Powers((order - behind).clamp(0, 3) as usize)
+
+    /// Digits of values in one notation: in powers of ten where fixed notation takes too many characters. `None`: there is no
+    /// room for what tells them apart.
+    fn digits<const N: usize>(needs: [Self; N]) -> Option<[Digits; N]> {
+        let most = needs.iter().map(|need| need.characters()).max().unwrap_or(0);
+        let told = needs.iter().all(|need| matches!(need.powers(), Digits::Powers(n) if n >= need.places()));
+        match most {
+            _ if most < LABEL || most == LABEL && !told => Some(needs.map(|need| Digits::Fixed(need.decimals()))),
+            _ if told => Some(needs.map(Self::powers)),
+            _ => None,
+        }
+    }
+
+    /// Digits behind the point in fixed notation.
+    fn decimals(self) -> usize {
+        self.behind.min(0).unsigned_abs() as usize
+    }
+
+    /// Characters of the largest value in fixed notation.
+    fn characters(self) -> usize {
+        let decimals = self.decimals();
+        1 + self.order.max(0) as usize + decimals + usize::from(decimals > 0) + usize::from(self.signs)
+    }
+
+    /// Digits behind the point in powers of ten.
+    fn places(self) -> usize {
+        (self.order - self.behind).max(0) as usize
+    }
+
+    /// In powers of ten, with as many digits as there is room for.
+    fn powers(self) -> Digits {
+        let room = LABEL.saturating_sub("1.e".len() + self.exponent + usize::from(self.signs));
+        Digits::Powers(self.places().min(room))
     }
 }
 
@@ -227,8 +283,11 @@ fn label(value: f64, digits: Digits) -> String {
         Digits::Fixed(n) => format!("{value:.n$}"),
         Digits::Powers(n) => format!("{value:.n$e}"),
     };
-    let zero = !text.contains(|c: char| ('1'..='9').contains(&c));
-    text.strip_prefix('-').filter(|_| zero).map(str::to_owned).unwrap_or(text)
+    let mantissa = text.split('e').next().unwrap_or_default();
+    if mantissa.contains(|c: char| ('1'..='9').contains(&c)) {
+        return text;
+    }
+    if matches!(digits, Digits::Powers(_)) { "0".into() } else { mantissa.trim_start_matches('-').into() }
 }
 
 #[cfg(test)]
@@ -236,8 +295,8 @@ mod tests {
     use super::*;
 
     fn labels(range: [f64; 2]) -> Vec<String> {
-        let marks = marks(range, 6);
-        let digits = digits(&marks);
+        let (marks, step) = marks(range, 6);
+        let [digits] = Need::digits([Need::of(&marks, step)]).unwrap();
         marks.into_iter().map(|v| label(v, digits)).collect()
     }
 
@@ -247,7 +306,7 @@ mod tests {
         assert_eq!(labels([-1.0, 1.0]), ["-1.0", "-0.5", "0.0", "0.5", "1.0"]);
         assert_eq!(labels([0.0, 0.25]), ["0.00", "0.05", "0.10", "0.15", "0.20", "0.25"]);
         assert_eq!(labels([1e8, 3e8]), ["1.0e8", "1.5e8", "2.0e8", "2.5e8", "3.0e8"]);
-        assert_eq!(labels([-2e-9, 1e-9]), ["-2.0e-9", "-1.5e-9", "-1.0e-9", "-5.0e-10", "0.0e0", "5.0e-10", "1.0e-9"]);
+        assert_eq!(labels([-2e-9, 1e-9]), ["-2.0e-9", "-1.5e-9", "-1.0e-9", "-5.0e-10", "0", "5.0e-10", "1.0e-9"]);
         assert_eq!(labels([7.0, 7.0]), ["7"]);
         for (lo, hi) in [(1e-30, 1e-29), (-3e37, 3e37), (1000.0, 1000.01), (0.0, 0.0), (-7.5, 123_456.0)] {
             assert!(labels([lo, hi]).iter().all(|l| !l.is_empty() && l.len() <= LABEL), "{:?}", labels([lo, hi]));
@@ -265,10 +324,31 @@ mod tests {
         assert_eq!(ticks([20.0, 95.0], 1, 0.2).len(), 3);
     }
 
+    /// Of any range wider than a millionth, labels ascend, as numbers too, and are none too long.
+    #[test]
+    fn labels_tell_values_apart() {
+        let labels = |lo, hi| ticks([lo, hi], 6, 0.1).into_iter().map(|(_, label)| label).collect::<Vec<_>>();
+        assert_eq!(ticks([1.0, 1.0002], 2, 0.3).into_iter().map(|t| t.1).collect::<Vec<_>>(), ["1.0000", "1.0001", "1.0002"]);
+        assert_eq!(labels(1e8, 1.0001e8).first().unwrap(), "1.0000e8");
+        for base in [1.0, 2.0, 10.0, 0.5, 101_325.0, 1e8, 1e-3, 7e12, 3.3e-9] {
+            for width in [2e-5, 1e-4, 2e-4, 1e-3, 0.1, 1.0, 1e4] {
+                for sign in [1.0, -1.0] {
+                    let range = if sign > 0.0 { [base, base * (1.0 + width)] } else { [-base * (1.0 + width), -base] };
+                    let all = labels(range[0], range[1]);
+                    // Those with a plus are added to the first one.
+                    let first = usize::from(all[1].starts_with('+'));
+                    let numbers: Vec<f64> = all[first..].iter().map(|label| label.parse().unwrap()).collect();
+                    let fits = all.iter().all(|label| label.len() <= LABEL);
+                    assert!(numbers.is_sorted_by(|a, b| a < b) && fits, "{range:?}: {all:?}");
+                }
+            }
+        }
+    }
+
     #[test]
     fn iso_values_keep_their_digits() {
         let values = [0.125, 40.0];
-        assert_eq!(digits(&values), Digits::Fixed(3));
+        assert_eq!(Need::digits([Need::of(&values, f64::INFINITY)]), Some([Digits::Fixed(3)]));
         assert_eq!(short("temperature", 20), "temperature");
         assert_eq!(["displacement.x", "displacement.y"].map(|name| short(name, 12)), ["displa..nt.x", "displa..nt.y"]);
     }

@@ -3,7 +3,7 @@
 use crate::common::{Common, Failure, Outcome};
 use indicatif::{ProgressBar, ProgressStyle};
 use olbvh::error::Error;
-use olbvh::formats::{OutputFile, OutputFormat, destination, is_part};
+use olbvh::formats::{OutputFile, OutputFormat, destination, is_part, listed_files};
 use std::io::{IsTerminal as _, Write as _};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, PoisonError};
@@ -123,7 +123,8 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
         return Err(Failure::Usage(format!("{}: this result goes to a file, not to a stream or device", path.display())));
     }
     let place = std::fs::canonicalize(path).ok();
-    if place.is_some() && inputs.iter().any(|input| std::fs::canonicalize(input).ok() == place) {
+    let is_it = |input: &Path| std::fs::canonicalize(input).ok() == place;
+    if place.is_some() && inputs.iter().any(|input| is_it(input) || listed_files(input).iter().any(|listed| is_it(listed))) {
         return Err(Failure::Usage(format!("{}: the result would replace an input; choose another name", path.display())));
     }
     let destination = destination(path);
