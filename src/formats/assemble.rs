@@ -12,6 +12,7 @@ use crate::error::{Error, Result};
 use crate::grid::COORDINATE_LIMIT;
 use crate::mesh::{Field, Mesh, On};
 use polyhedra::Centres;
+use scale::remark_on_resolution;
 
 /// A mesh under construction. Set the points, push the cells in file order, add the arrays, then call
 /// [`finish`](Assembly::finish).
@@ -156,6 +157,8 @@ impl Assembly {
             let remedy = "--merge all (Merge::All) makes coinciding points one";
             self.warnings.push(format!("each cell has points of its own, so every face counts as boundary and queries are slow; {remedy}"));
         }
+        self.warnings.extend(self.remark_on_rounding(&points, origin));
+        self.warnings.extend(self.remark_on_small_cells(lo, hi));
         self.remove_replaced(&merged, &mut points, &mut used);
         let fields = self.fields(&used);
         if self.straightened > 0 {
@@ -242,11 +245,10 @@ impl Assembly {
         Ok(self.points.iter().map(|p| moved(p).map(|x| x as f32)).collect())
     }
 
-    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron. Where ghost cells were left out,
-    /// points that no tetrahedron uses have no value, lest theirs count in ranges: writers fill them with anything.
+    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron. Points that no tetrahedron uses have no
+    /// value, lest theirs count in ranges: writers fill them with anything.
     fn fields(&mut self, used_points: &[bool]) -> Vec<Field> {
         let mut fields = Vec::new();
-        let ghosts = self.counts.iter().any(|cells| cells.fate == Fate::Ghost);
         let mut used_cells = vec![false; self.n_cells];
         self.ids.iter().for_each(|&id| used_cells[id as usize] = true);
         let mut names = Names::default();
@@ -267,12 +269,13 @@ impl Assembly {
             for (tuple, &used) in array.values.chunks_exact_mut(array.components).zip(used) {
                 of += usize::from(used);
                 missing += usize::from(used && tuple.iter().any(|v| !v.is_finite()));
-                tuple.iter_mut().filter(|v| ghosts && !used || !v.is_finite()).for_each(|v| *v = f32::NAN);
+                tuple.iter_mut().filter(|v| !used || !v.is_finite()).for_each(|v| *v = f32::NAN);
             }
             if missing > 0 {
                 let none = "has no value, or none that is finite in single precision,";
                 self.warnings.push(format!("array `{shown}` {none} at {missing} of {of} {what}"));
             }
+            self.warnings.extend(remark_on_resolution(&array));
             let name = names.free(&array);
             if name != array.name {
                 self.warnings.push(format!("another array `{shown}` is called `{}`", excerpt(name.as_bytes())));
@@ -306,5 +309,6 @@ fn bounds(points: &[[f64; 3]], used: &[bool]) -> ([f64; 3], [f64; 3]) {
 mod cells;
 mod pieces;
 mod polyhedra;
+mod scale;
 #[cfg(test)]
 mod tests;

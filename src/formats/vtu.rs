@@ -18,6 +18,9 @@ use super::vtu_parser::Piece;
 use crate::error::Result;
 use crate::mesh::On;
 
+/// Up to here, single precision has all whole numbers.
+const MOST_WHOLE: f32 = 16_777_216.0;
+
 /// Reads a mesh from a grid, or from the grids that the file lists, which are taken as pieces of one.
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let Files { format, mut grids, bytes, warnings } = grids(source, options)?;
@@ -111,6 +114,10 @@ fn read_arrays<'p>(
                 assembly.warn(format!("array `{}` has {} components and is left out", shown(), array.components));
             } else {
                 let values: Vec<f32> = codec.floats(source, array, count)?;
+                if array.scalar.is_some_and(|scalar| !scalar.is_float()) && values.iter().any(|v| v.abs() > MOST_WHOLE) {
+                    let rounded = "which are rounded to single precision, so that numbers beside each other become one";
+                    assembly.warn(format!("array `{}` has whole numbers beyond {MOST_WHOLE}, {rounded}", shown()));
+                }
                 // An empty piece does not require that an array is filled up.
                 if values.is_empty() {
                     continue;

@@ -41,3 +41,44 @@ fn arrays_left_out_say_why() {
     assert!(names.is_empty());
     assert_eq!(warnings, wanted.map(|w| format!("array {w}")));
 }
+
+/// Cells of a millimetre some 800 kilometres from another one: single precision leaves little of them.
+#[test]
+fn small_cells_far_from_others_are_remarked_on() {
+    let source = Source::new("far".as_ref(), Vec::new());
+    for (far, remarks) in [(8e5, 1), (8.0, 0)] {
+        let mut assembly = Assembly::new(&source, &LoadOptions::default(), "two tetrahedra".into());
+        let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        assembly.set_points(corner.iter().chain(&corner.map(|p| p.map(|x| far + 1e-3 * x))).copied().collect());
+        for first in [0, 4] {
+            assembly.push(crate::formats::cells::vtk(10).unwrap(), &[first, first + 1, first + 2, first + 3]).unwrap();
+        }
+        let warnings = assembly.finish().unwrap().1.warnings;
+        let found = warnings.iter().filter(|w| w.starts_with("1 of 2 tetrahedra are so small") && w.contains("the first of cell 1"));
+        assert_eq!(found.count(), remarks, "{warnings:?}");
+    }
+}
+
+#[test]
+fn fields_that_vary_little_are_remarked_on() {
+    let remark = |values: [f32; 4]| remark_on_resolution(&Array { name: "p".into(), on: On::Points, components: 1, values: values.into() });
+    assert!(remark([1e7, 1e7 + 1.0, f32::NAN, 1e7 + 2.0]).is_some_and(|w| w.contains("`p` goes from 10000000 to 10000002")));
+    assert_eq!([[1e7; 4], [0.0, 1.0, 2.0, 3.0], [1.0, 1.0001, 1.0, 1.0]].map(remark), [None, None, None]);
+}
+
+/// A chain of small cells, and one cell far away.
+#[test]
+fn many_small_cells_are_remarked_on() {
+    let source = Source::new("chain".as_ref(), Vec::new());
+    for (far, remarks) in [(1e6, 1), (1e3, 0)] {
+        let mut assembly = Assembly::new(&source, &LoadOptions::default(), "a chain".into());
+        let place = |i: u32| [f64::from(i % 3), f64::from(i / 3 % 5), f64::from(i / 15 % 11)];
+        assembly.set_points((0..6000).map(place).chain([[far, 0.0, 0.0]]).collect());
+        for i in 0..5000 {
+            assembly.push(crate::formats::cells::vtk(10).unwrap(), &[i, i + 1, i + 3, i + 15]).unwrap();
+        }
+        assembly.push(crate::formats::cells::vtk(10).unwrap(), &[0, 3, 15, 6000]).unwrap();
+        let warnings = assembly.finish().unwrap().1.warnings;
+        assert_eq!(warnings.iter().filter(|w| w.contains("smaller than 1/8192 of the mesh")).count(), remarks, "{warnings:?}");
+    }
+}

@@ -1,0 +1,78 @@
+//! Remarks on cells that are small beside the whole mesh, and on fields that vary little beside their size.
+
+use glam::DVec3;
+
+use super::Assembly;
+use crate::formats::array::Array;
+use crate::formats::source::excerpt;
+
+/// A field with a smaller range than this part of its largest value has less than 256 different values.
+const NARROW: f32 = 1.0 / 65536.0;
+
+/// How much of its volume a cell may gain or lose by rounding before it is remarked on.
+const CHANGE: f64 = 0.02;
+/// Cells smaller than this part of the mesh are small: the smallest leaves, of 1/1024, may have hundreds of them.
+const SMALL: f64 = 1.0 / 8192.0;
+/// Up to this many small cells make no long lists.
+const LEAST_SMALL: usize = 4096;
+/// Cells with less of the volume of their box than this are nearly flat; small distances change them much.
+const NEARLY_FLAT: f64 = 1e-3;
+
+impl Assembly {
+    /// A warning if most cells are much smaller than the smallest leaf of a tree, whose lists are then long.
+    pub(super) fn remark_on_small_cells(&self, lo: [f64; 3], hi: [f64; 3]) -> Option<String> {
+        let largest = |lo: DVec3, hi: DVec3| (hi - lo).max_element();
+        let most = SMALL * largest(DVec3::from_array(lo), DVec3::from_array(hi));
+        let is_small = |tet: &&[u32; 4]| {
+            let corners = tet.map(|v| DVec3::from_array(self.points[v as usize]));
+            largest(corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max)) < most
+        };
+        let small = self.tets.iter().filter(is_small).count();
+        (small > LEAST_SMALL && 2 * small > self.tets.len()).then(|| {
+            format!(
+                "{small} of {} tetrahedra are smaller than 1/{} of the mesh, so many of them share a leaf of the tree, and queries are \
+                 slow; cut the mesh into pieces, or remove parts that lie far away",
+                self.tets.len(),
+                1.0 / SMALL
+            )
+        })
+    }
+
+    /// A warning if rounding changes the shape of cells: those that are very small beside their distance from the
+    /// mesh's origin, as where another part lies far away.
+    pub(super) fn remark_on_rounding(&self, rounded: &[[f32; 3]], origin: [f64; 3]) -> Option<String> {
+        let origin = DVec3::from_array(origin);
+        let changes = |tet: &[u32; 4]| {
+            let exact = tet.map(|v| DVec3::from_array(self.points[v as usize]) - origin);
+            let there = volume(exact);
+            let (lo, hi) = (exact.into_iter().fold(exact[0], DVec3::min), exact.into_iter().fold(exact[0], DVec3::max));
+            let room = (hi - lo).element_product();
+            let here = volume(tet.map(|v| DVec3::from_array(rounded[v as usize].map(f64::from))));
+            there.abs() > NEARLY_FLAT * room && (here - there).abs() > CHANGE * there.abs()
+        };
+        let mut changed = self.tets.iter().zip(&self.ids).filter(|(tet, _)| changes(tet));
+        let (_, first) = changed.next()?;
+        let count = 1 + changed.count();
+        Some(format!(
+            "{count} of {} tetrahedra are so small beside the mesh that single precision changes their shape, the first of cell {first}: \
+             places in them are wrong by as much; remove parts that lie far away, or take them as a mesh of their own",
+            self.tets.len()
+        ))
+    }
+}
+
+/// A warning if single precision tells few of an array's values apart.
+pub(super) fn remark_on_resolution(array: &Array) -> Option<String> {
+    let finite = || array.values.iter().copied().filter(|v| v.is_finite());
+    let (lo, hi) = finite().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
+    let narrow = array.components == 1 && lo < hi && hi - lo < NARROW * lo.abs().max(hi.abs());
+    narrow.then(|| {
+        let name = excerpt(array.name.as_bytes());
+        format!("array `{name}` goes from {lo} to {hi}: single precision has few values between; subtract what they have in common")
+    })
+}
+
+/// Six times the signed volume.
+fn volume([a, b, c, d]: [DVec3; 4]) -> f64 {
+    (b - a).cross(c - a).dot(d - a)
+}
