@@ -245,10 +245,11 @@ impl Assembly {
         Ok(self.points.iter().map(|p| moved(p).map(|x| x as f32)).collect())
     }
 
-    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron. Points that no tetrahedron uses have no
-    /// value, lest theirs count in ranges: writers fill them with anything.
+    /// Converts arrays to scalar fields; arrays of cells get one value per tetrahedron. Where ghost cells were left out,
+    /// points that no tetrahedron uses have no value: writers fill them with anything.
     fn fields(&mut self, used_points: &[bool]) -> Vec<Field> {
         let mut fields = Vec::new();
+        let ghosts = self.counts.iter().any(|cells| cells.fate == Fate::Ghost);
         let mut used_cells = vec![false; self.n_cells];
         self.ids.iter().for_each(|&id| used_cells[id as usize] = true);
         let mut names = Names::default();
@@ -269,7 +270,7 @@ impl Assembly {
             for (tuple, &used) in array.values.chunks_exact_mut(array.components).zip(used) {
                 of += usize::from(used);
                 missing += usize::from(used && tuple.iter().any(|v| !v.is_finite()));
-                tuple.iter_mut().filter(|v| !used || !v.is_finite()).for_each(|v| *v = f32::NAN);
+                tuple.iter_mut().filter(|v| ghosts && !used || !v.is_finite()).for_each(|v| *v = f32::NAN);
             }
             if missing > 0 {
                 let none = "has no value, or none that is finite in single precision,";

@@ -21,8 +21,8 @@ use crate::error::{Error, Result};
 /// Lines that start with `#` are comments. A table without points is valid, even an empty file.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
-/// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl` are surfaces, whose
-/// vertices are taken in their order, in an `.stl` three of each triangle.
+/// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl`, and a `.vtk` with
+/// polygons, are surfaces, whose vertices are taken in their order, in an `.stl` three of each triangle.
 ///
 /// # Errors
 /// [`crate::Error::Io`] if the file cannot be read, [`crate::Error::File`] with the place if it is broken, and as
@@ -32,7 +32,10 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
     if let Some(made) = path.to_str().and_then(procedural::make) {
         return made.map(|(_, mesh)| mesh.points.iter().map(|p| p.map(f64::from)).collect());
     }
-    let source = Source::open(path, ".npy, a table of text, a surface, or a mesh")?;
+    of(Source::open(path, ".npy, a table of text, a surface, or a mesh")?)
+}
+
+fn of(source: Source) -> Result<Vec<[f64; 3]>> {
     if let Some(points) = surfaces::points(&source) {
         return points;
     }
@@ -46,8 +49,7 @@ pub fn load_points(path: impl AsRef<Path>) -> Result<Vec<[f64; 3]>> {
 pub fn read_points(mut stream: impl Read) -> Result<Vec<[f64; 3]>> {
     let (path, mut bytes) = (Path::new("-"), Vec::new());
     stream.read_to_end(&mut bytes).map_err(|source| Error::Io { path: path.into(), source })?;
-    let source = Source::new(path, bytes);
-    if detect::is_mesh(&source)? { of_mesh(&source) } else { points(&source) }
+    of(Source::new(path, bytes))
 }
 
 fn of_mesh(source: &Source) -> Result<Vec<[f64; 3]>> {

@@ -1,16 +1,23 @@
-//! Readers for the vertices of surfaces (`.obj`, `.ply`, `.stl`), whose points are located like those of a mesh.
+//! Readers for the vertices of surfaces (`.obj`, `.ply`, `.stl`, `.vtk` with polygons), whose points are located like those of
+//! a mesh.
 
 use super::scalar::Scalar;
 use super::source::{Source, ending, excerpt};
 use super::tokens::{Tokens, parse_float};
+use super::vtk;
 use crate::error::Result;
 
-/// The vertices of a surface, in the order of the file; `None` if it is not named like one.
+/// The vertices of a surface, in the order of the file; `None` if it is neither named like one nor begins like one, as what
+/// comes from a stream may.
 pub(crate) fn points(source: &Source) -> Option<Result<Vec<[f64; 3]>>> {
+    let begins = |with: &[u8]| source.start().starts_with(with);
     match ending(&source.path).as_str() {
         "obj" => Some(lines(source, b"v")),
         "ply" => Some(ply(source)),
         "stl" => Some(stl(source)),
+        _ if begins(b"# vtk DataFile") => vtk::surface_points(source),
+        _ if begins(b"ply\n") || begins(b"ply\r") => Some(ply(source)),
+        _ if begins(b"solid") => Some(stl(source)),
         _ => None,
     }
 }
@@ -131,6 +138,11 @@ mod tests {
             assert_eq!(read("a.ply", &bytes).unwrap(), WANTED);
             assert!(read("a.ply", &bytes[..bytes.len() - 1]).unwrap_err().contains("the file ends where a property of a vertex should be"));
         }
+        assert_eq!(read("-", (header("ascii") + "9 0 0.5 1\n9 1 0 2\n9 -1 3 0.25\n3 0 1 2\n").as_bytes()).unwrap(), WANTED);
+        let field = "FIELD FieldData 1\nTIME 1 1 double\n7\n";
+        let points = "POINTS 3 float\n0 0.5 1 1 0 2\n-1 3 0.25\nVERTICES 1 2\n1 0\n";
+        let vtk = format!("# vtk DataFile Version 3.0\na\nASCII\nDATASET POLYDATA\n{field}{points}");
+        assert_eq!(read("a.vtk", vtk.as_bytes()).unwrap(), WANTED);
         let text = "solid s\nfacet normal 0 0 1\nouter loop\n vertex 0 0.5 1\n vertex 1 0 2\n vertex -1 3 2.5e-1\nendloop\nendfacet\n";
         assert_eq!(read("a.stl", text.as_bytes()).unwrap(), WANTED);
         // The header of a binary file may begin like a text.

@@ -37,6 +37,25 @@ impl Cells<'_> {
     }
 }
 
+/// The points of a surface, a POLYDATA dataset; `None` if it is no such file.
+pub(crate) fn surface_points(source: &Source) -> Option<Result<Vec<[f64; 3]>>> {
+    let mut reader = Reader { source, tokens: Tokens::new(source, None), binary: false };
+    if !matches!(reader.dataset(), Ok((_, dataset, _)) if dataset == b"POLYDATA") {
+        return None;
+    }
+    let mut read = || {
+        while let Some((token, at)) = reader.tokens.next_token()? {
+            let keyword = token.to_ascii_uppercase();
+            if keyword == b"POINTS" {
+                return reader.points();
+            }
+            reader.attribute(&keyword, at, None)?; // fields of the whole file may come first
+        }
+        Err(source.error_line(source.len(), "the file ends, and there was no POINTS"))
+    };
+    Some(read())
+}
+
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let mut reader = Reader { source, tokens: Tokens::new(source, None), binary: false };
     let (format, dataset) = reader.header()?;
@@ -202,6 +221,19 @@ impl<'a> Reader<'a> {
 
     /// The format, and the kind of the grid.
     fn header(&mut self) -> Result<(String, GridKind)> {
+        let (version, dataset, at) = self.dataset()?;
+        let (what, kind) = match dataset.as_slice() {
+            b"UNSTRUCTURED_GRID" => ("unstructured grid", GridKind::Cells),
+            b"STRUCTURED_GRID" => ("structured grid", GridKind::Structured),
+            b"RECTILINEAR_GRID" => ("rectilinear grid", GridKind::Rectilinear),
+            b"STRUCTURED_POINTS" => ("image", GridKind::Image(Frame::default())),
+            _ => return Err(self.source.error_line(at, format!("a {} dataset, which has no volume cells", excerpt(&dataset)))),
+        };
+        Ok((format!("VTK legacy {what} {version}, {}", if self.binary { "binary" } else { "text" }), kind))
+    }
+
+    /// The version, and the type of the dataset with its position.
+    fn dataset(&mut self) -> Result<(String, Vec<u8>, usize)> {
         let (first, _) = self.tokens.line()?.unwrap_or_default();
         let first = first.trim_ascii();
         let Some(version) = first.strip_prefix(b"# vtk DataFile Version") else {
@@ -223,14 +255,7 @@ impl<'a> Reader<'a> {
             return Err(self.source.error_line(at, format!("`{}` where DATASET should be", excerpt(word))));
         }
         let (dataset, at) = self.tokens.word("the type of the dataset")?;
-        let (what, kind) = match dataset.to_ascii_uppercase().as_slice() {
-            b"UNSTRUCTURED_GRID" => ("unstructured grid", GridKind::Cells),
-            b"STRUCTURED_GRID" => ("structured grid", GridKind::Structured),
-            b"RECTILINEAR_GRID" => ("rectilinear grid", GridKind::Rectilinear),
-            b"STRUCTURED_POINTS" => ("image", GridKind::Image(Frame::default())),
-            _ => return Err(self.source.error_line(at, format!("a {} dataset, which has no volume cells", excerpt(dataset)))),
-        };
-        Ok((format!("VTK legacy {what} {version}, {}", if self.binary { "binary" } else { "text" }), kind))
+        Ok((version, dataset.to_ascii_uppercase(), at))
     }
 
     fn points(&mut self) -> Result<Vec<[f64; 3]>> {

@@ -1,6 +1,6 @@
 //! Measures of a whole mesh.
 
-use super::Mesh;
+use super::{Field, Mesh, On};
 use glam::DVec3;
 
 impl Mesh {
@@ -13,6 +13,21 @@ impl Mesh {
             (b - a).cross(c - a).dot(d - a).abs()
         };
         self.valid(valid).map(of).sum::<f64>() / 6.0
+    }
+
+    /// Smallest and largest finite value of a field in the tetrahedra that are `valid`: points that none of them uses do not
+    /// count. `None` if there is no such value.
+    pub fn range(&self, field: &Field, valid: impl Fn(u32) -> bool) -> Option<[f32; 2]> {
+        let mut used = Vec::new();
+        let values = &field.values;
+        if field.on == On::Points {
+            used = vec![false; self.points.len()];
+            self.valid(valid).flatten().for_each(|&v| used[v as usize] = true);
+        } else {
+            used.extend((0..self.tets.len() as u32).map(valid));
+        }
+        let counted = values.iter().zip(used).filter(|(v, used)| *used && v.is_finite()).map(|(v, _)| *v);
+        counted.fold(None, |range, v| Some(range.map_or([v, v], |[lo, hi]: [f32; 2]| [lo.min(v), hi.max(v)])))
     }
 
     /// The tetrahedra that are `valid`; never those with vertices that the mesh lacks.
@@ -59,7 +74,7 @@ fn root(parents: &mut [u32], mut v: u32) -> u32 {
 
 #[cfg(test)]
 mod tests {
-    use crate::mesh::kuhn;
+    use crate::mesh::{Field, On, kuhn};
 
     #[test]
     fn a_grid_and_a_copy_of_it() {
@@ -74,6 +89,11 @@ mod tests {
         assert_eq!((mesh.volume(|_| false), mesh.parts(|_| false)), (0.0, 0));
         mesh.tets.push([0, 1, n, n + 1]);
         assert_eq!(mesh.parts(|_| true), 1);
+        let field = |on, n: usize| Field { name: "i".into(), on, values: (0..n).map(|i| i as f32).collect() };
+        mesh.points.push([-9.0; 3]); // of no cell
+        let (points, cells) = (field(On::Points, mesh.points.len()), field(On::Cells, mesh.tets.len()));
+        assert_eq!((mesh.range(&points, |_| true), mesh.range(&points, |t| t < 144)), (Some([0.0, 119.0]), Some([0.0, 59.0])));
+        assert_eq!((mesh.range(&cells, |t| t > 143), mesh.range(&cells, |_| false)), (Some([144.0, 288.0]), None));
         mesh.tets.push([0, 1, 2, u32::MAX]);
         assert_eq!((mesh.volume(|t| t > 288), mesh.parts(|t| t > 288)), (0.0, 0), "a vertex that is not there");
     }

@@ -370,7 +370,7 @@ impl RenderSettings {
 
     /// The range of values that is asked for, or that of the field.
     fn range_for(&self, mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> [f32; 2] {
-        self.range.or(self.transfer.range()).or_else(|| used_range(mesh, valid, field)).unwrap_or([0.0, 1.0])
+        self.range.or(self.transfer.range()).or_else(|| mesh.range(field, valid.is_valid)).unwrap_or([0.0, 1.0])
     }
 }
 
@@ -382,18 +382,6 @@ fn used_points(mesh: &Mesh, valid: &ValidTets<'_>) -> Vec<DVec3> {
     }
     let points = mesh.points.iter().zip(used).filter(|(_, used)| *used);
     points.map(|(p, _)| DVec3::from_array(p.map(f64::from))).collect()
-}
-
-/// The smallest and the largest finite value in valid tetrahedra.
-fn used_range(mesh: &Mesh, valid: &ValidTets<'_>, field: &Field) -> Option<[f32; 2]> {
-    let mut range: Option<[f32; 2]> = None;
-    for (tet, ids) in valid.of(mesh) {
-        let ids = if field.on == On::Points { ids } else { [tet; 4] };
-        for v in ids.into_iter().filter_map(|i| field.values.get(i).copied()).filter(|v| v.is_finite()) {
-            range = Some(range.map_or([v, v], |[lo, hi]| [lo.min(v), hi.max(v)]));
-        }
-    }
-    range
 }
 
 /// The range of values, made wide enough for a constant field, which then lies in the middle.

@@ -71,7 +71,7 @@ fn json(args: &Args, engine: &dyn Engine, loaded: &Loaded, solid: &Solid, s: &Su
     let [lo, hi] = bounds(mesh, s);
     let field = |f: &Field| {
         let on = if f.on == On::Points { "points" } else { "cells" };
-        let [min, max] = [0, 1].map(|end| f.range().map(|range| single(range[end])));
+        let [min, max] = [0, 1].map(|end| mesh.range(f, |_| true).map(|range| single(range[end])));
         json!({ "name": f.name, "on": on, "min": min, "max": max })
     };
     let mut arrays: serde_json::Map<String, Value> = s.memory.arrays().into_iter().map(|(name, n)| (name.to_owned(), n.into())).collect();
@@ -174,7 +174,7 @@ fn add_mesh(page: &mut Page, args: &Args, loaded: &Loaded, solid: &Solid, s: &Su
 fn add_fields(page: &mut Page, mesh: &Mesh) {
     page.section(if mesh.fields.is_empty() { "No fields" } else { "Fields" });
     for f in &mesh.fields {
-        let range = f.range().map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
+        let range = mesh.range(f, |_| true).map_or_else(|| "no finite value".into(), |[lo, hi]| format!("{lo} to {hi}"));
         page.row(printable(&f.name), format_args!("{range}{}", if f.on == On::Points { "" } else { ", per cell" }));
     }
 }

@@ -49,7 +49,7 @@ pub struct Args {
     /// Mesh file, or a procedural mesh such as kuhn:NX,NY,NZ.
     mesh: PathBuf,
     /// File with the points, in the coordinates of the mesh: .npy (n×3 numbers), .csv (x,y,z), or another mesh or a
-    /// surface (.vtp, .obj, .ply, .stl), whose points are taken in the order of its file. `-`: standard input.
+    /// surface (.vtp, .obj, .ply, .stl), whose points are taken in the order of its file. `-`: standard input, with any of these but an .obj.
     points: PathBuf,
     /// Output file; its extension selects the format: .csv, .npy, .npz, .vtu or .json (with --all .csv, .npy or .json).
     /// `-`: a .csv on standard output, while the summary goes to standard error.

@@ -143,8 +143,9 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mesh = &loaded.mesh;
     let options = suited_to_picture(options, settings.size, mesh);
     let field = args.field(mesh, common)?;
-    let expects_something = remark_on_iso(&settings.iso, &field, common);
-    remark_on_range(settings.range.or(settings.transfer.range()), &field, common);
+    let values = mesh.range(&field, |_| true);
+    let expects_something = remark_on_iso(&settings.iso, &field, values, common);
+    remark_on_range(settings.range.or(settings.transfer.range()), &field, values, common);
     let suited = suited_step(&mesh.points, &mesh.tets);
     settings.step = settings.step.or(suited.and_then(|suited| suited.step));
     let start = Instant::now();
@@ -155,7 +156,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     if expects_something && picture.rendered.colors.iter().all(|color| color[3] < FAINT) {
         let no_volume = picture.rendered.stats.found_samples == 0 && loaded.report.flat == loaded.report.tetrahedra;
-        remark_on_emptiness(&field, no_volume, common);
+        remark_on_emptiness(&field, values, no_volume, common);
     }
     if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(picture.plan.step)) {
         common.remark(format_args!(
@@ -286,8 +287,8 @@ impl Args {
 }
 
 /// Remarks on a range in which the field has no values.
-fn remark_on_range(range: Option<[f32; 2]>, field: &Field, common: &Common) {
-    if let (Some([lo, hi]), Some([least, most])) = (range, field.range())
+fn remark_on_range(range: Option<[f32; 2]>, field: &Field, values: Option<[f32; 2]>, common: &Common) {
+    if let (Some([lo, hi]), Some([least, most])) = (range, values)
         && (most < lo || least > hi)
     {
         let name = printable(&field.name);
@@ -296,8 +297,8 @@ fn remark_on_range(range: Option<[f32; 2]>, field: &Field, common: &Common) {
 }
 
 /// Remarks on a picture in which nothing is to be seen.
-fn remark_on_emptiness(field: &Field, no_volume: bool, common: &Common) {
-    let why = if field.range().is_none() {
+fn remark_on_emptiness(field: &Field, values: Option<[f32; 2]>, no_volume: bool, common: &Common) {
+    let why = if values.is_none() {
         format!("{} has no value", printable(&field.name))
     } else if no_volume {
         "all cells are flat".into()
@@ -308,9 +309,9 @@ fn remark_on_emptiness(field: &Field, no_volume: bool, common: &Common) {
 }
 
 /// Remarks on iso-values that show nothing, or little. Returns whether something may be seen.
-fn remark_on_iso(iso: &[f32], field: &Field, common: &Common) -> bool {
+fn remark_on_iso(iso: &[f32], field: &Field, values: Option<[f32; 2]>, common: &Common) -> bool {
     // Those of a field of cells are an error, which says more.
-    let Some([lo, hi]) = field.range().filter(|_| !iso.is_empty() && field.on == On::Points) else { return true };
+    let Some([lo, hi]) = values.filter(|_| !iso.is_empty() && field.on == On::Points) else { return true };
     let name = printable(&field.name);
     if lo == hi {
         common.remark(format_args!("no surface to be seen: all values of {name} are {lo}"));

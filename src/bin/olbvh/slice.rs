@@ -10,7 +10,7 @@ use crate::slice_placement::Placement;
 use crate::text::{counted, grouped, in_blocks, milliseconds};
 use olbvh::blocks::{InBlocks, SliceRequest};
 use olbvh::formats::{OutputFormat, printable};
-use olbvh::mesh::{Bounds, Field, On, valid_grid};
+use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
 use olbvh::options::{BuildOptions, Fineness};
 use olbvh::render::TransferFunction;
 use olbvh::render::transfer::DEFAULT_MAP;
@@ -118,7 +118,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let bounds = Bounds::from(&valid_grid(mesh));
     let voxels = args.voxels(format, &bounds, mesh.origin, common)?;
-    let look = args.look(format, &colors, field, common);
+    let look = args.look(format, &colors, mesh, field, common);
     let placement = Placement::new(&voxels, mesh);
     let mut layers = Layers::create(&args.output, format, &placement, mesh, args.owners, look)?;
     let progress = Progress::new(common, "slicing");
@@ -189,8 +189,8 @@ impl Args {
     }
 
     /// How values of a field are shown.
-    fn look(&self, format: OutputFormat, colors: &TransferFunction, field: Option<&Field>, common: &Common) -> Appearance {
-        let range = self.range.or(colors.range()).or_else(|| field.and_then(Field::range)).unwrap_or([0.0, 1.0]);
+    fn look(&self, format: OutputFormat, colors: &TransferFunction, mesh: &Mesh, field: Option<&Field>, common: &Common) -> Appearance {
+        let range = self.range.or(colors.range()).or_else(|| mesh.range(field?, |_| true)).unwrap_or([0.0, 1.0]);
         let materials = field.and_then(materials);
         if let (OutputFormat::Svx, None, Some(Field { name, on: On::Cells, .. })) = (format, &materials, field) {
             common.remark(format_args!(
