@@ -67,7 +67,8 @@ fn padded(name: &str, bytes: &[u8], n: usize) -> Option<Vec<u8>> {
     let n = n.max(16);
     let filler = match name.rsplit('.').next()? {
         "msh" => format!("$Comments\n{}\n$EndComments\n", ".".repeat(n)).into_bytes(),
-        "mesh" | "ele" | "node" | "tet" => format!("#{}\n", ".".repeat(n)).into_bytes(),
+        "mesh" | "ele" | "node" | "tet" | "veg" => format!("#{}\n", ".".repeat(n)).into_bytes(),
+        "inp" => format!("**{}\n", ".".repeat(n)).into_bytes(),
         "vtu" => {
             let start = if bytes.starts_with(b"<?xml") { bytes.iter().position(|&b| b == b'\n')? + 1 } else { 0 };
             let comment = format!("<!--{}-->", ".".repeat(n));

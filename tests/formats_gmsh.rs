@@ -5,7 +5,7 @@
 mod formats_small;
 
 use formats_small::{POINTS, TETS, open_bytes, small};
-use olbvh::formats::{LoadOptions, load_bytes};
+use olbvh::formats::{LoadOptions, TimeStep, load_bytes};
 use olbvh::mesh::Mesh;
 
 /// Gmsh writes the mesh again with each view that is appended to a file.
@@ -53,4 +53,31 @@ fn gmsh_nodes_may_have_parameters() {
     let points: Vec<[f32; 3]> = POINTS.iter().map(|p| p.map(|x| x as f32)).collect();
     assert_eq!((&mesh.points, &other.points), (&points, &points));
     assert_eq!((mesh.tets.as_slice(), other.tets.as_slice()), (&TETS[..], &TETS[..]));
+}
+
+/// A series has a view for each step; what has only one belongs to all.
+#[test]
+fn gmsh_views_of_several_time_steps() {
+    let text = String::from_utf8(small("v22.msh")).unwrap();
+    let nodes: Vec<&str> = text.lines().skip_while(|line| *line != "$Nodes").skip(2).take(8).collect();
+    let tags: Vec<&str> = nodes.iter().filter_map(|node| node.split(' ').next()).collect();
+    let view = |name: &str, step: u32, value: u32| {
+        let values: String = tags.iter().zip(1..).map(|(tag, i)| format!("{tag} {}\n", value + i)).collect();
+        format!("$NodeData\n1\n\"{name}\"\n1\n0.5\n3\n{step}\n1\n8\n{values}$EndNodeData\n")
+    };
+    let (mesh, _) = text.split_once("$NodeData").unwrap();
+    let text = [mesh, &view("t", 10, 100), &view("still", 0, 0), &view("t", 9, 90), &view("t", 11, 110)].concat();
+    let open = |step: TimeStep| load_bytes("a.msh", text.clone().into_bytes(), &LoadOptions { step, ..LoadOptions::default() });
+    for (step, first, read) in [(TimeStep::Number(0), 91.0, 0), (TimeStep::Number(1), 101.0, 1), (TimeStep::Last, 111.0, 2)] {
+        let loaded = open(step).unwrap();
+        let fields: Vec<_> = loaded.mesh.fields.iter().map(|f| (f.name.as_str(), f.values[0])).filter(|f| !f.0.contains(':')).collect();
+        assert!(
+            fields.contains(&("t", first)) && fields.contains(&("still", 1.0)) && fields.len() == 2,
+            "{fields:?} {:?}",
+            loaded.report.warnings
+        );
+        let remark = format!("time step {read} of 0 to 2 is read");
+        assert!(loaded.report.warnings.iter().any(|w| w.starts_with(&remark)), "{:?}", loaded.report.warnings);
+    }
+    assert!(open(TimeStep::Number(3)).unwrap_err().to_string().contains("there is no time step 3; the steps are 0 to 2"));
 }

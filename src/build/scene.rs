@@ -55,7 +55,7 @@ impl ScenePlan {
     /// [`crate::gpu::ALIGNMENT`].
     ///
     /// # Errors
-    /// [`Error::Invalid`] for options or a capacity out of their limits, [`Error::TooLarge`] for too many tetrahedra.
+    /// [`crate::Error::Invalid`] for options or a capacity out of their limits, [`crate::Error::TooLarge`] for too many tetrahedra.
     pub fn bytes(&self, gpu: &Gpu) -> Result<SceneBytes> {
         self.check()?;
         Ok(SceneBytes { memory: Arena::measure(|a| self.memory(a))?, scratch: Arena::measure(|a| self.scratch(gpu, a))? })
@@ -65,7 +65,7 @@ impl ScenePlan {
     /// built.
     ///
     /// # Errors
-    /// As [`ScenePlan::bytes`], and [`Error::Invalid`] for parts that are too small.
+    /// As [`ScenePlan::bytes`], and [`crate::Error::Invalid`] for parts that are too small.
     pub fn place(&self, gpu: &Gpu, positions: BufferRef, cells: BufferRef, memory: BufferRef, scratch: BufferRef) -> Result<PlacedScene> {
         let Self { points, stride, tets, options, .. } = *self;
         self.check()?;

@@ -14,18 +14,23 @@ pub(crate) enum Format {
     MeditBinary,
     TetGen,
     Isaac,
+    Abaqus,
+    Vega,
 }
 
 /// File name extensions of the formats that can be read.
 pub(crate) const READABLE: &str =
-    ".vtu, .pvtu, .vts, .vtr, .vti, .vtm, .pvd, .vtk, .msh, .mesh, .meshb, .node with .ele, .tet of Isaac Gym";
+    ".vtu, .pvtu, .vts, .vtr, .vti, .vtm, .pvd, .vtk, .msh, .mesh, .meshb, .node with .ele, .inp of Abaqus, .veg, .tet of Isaac Gym";
 const CONVERT: &str = "convert it to .vtu, for example with meshio (`meshio convert IN OUT.vtu`) or ParaView";
 /// For what meshio cannot read.
 const SAVE_AS: &str = "save it as .vtu, for example with ParaView (File, Save Data)";
 
+/// Keywords that input files of Abaqus begin with.
+const ABAQUS: [&[u8]; 6] = [b"*HEADING", b"*NODE", b"*PART", b"*INCLUDE", b"*PREPRINT", b"*ASSEMBLY"];
+
 /// The format that the content of a file tells.
 fn told(source: &Source) -> Result<Option<Format>> {
-    let bytes = source.start();
+    let (bytes, ending) = (source.start(), ending(&source.path));
     let start = &bytes[skip_comments(bytes)..];
     let is = |prefix: &[u8]| start.get(..prefix.len()).is_some_and(|b| b.eq_ignore_ascii_case(prefix));
     Ok(if bytes.trim_ascii_start().starts_with(b"# vtk DataFile") {
@@ -36,6 +41,10 @@ fn told(source: &Source) -> Result<Option<Format>> {
         Some(Format::Gmsh)
     } else if is(b"MeshVersionFormatted") {
         Some(Format::Medit)
+    } else if is(b"*VERTICES") || is(b"*ELEMENTS") || ending == "veg" && is(b"*") {
+        Some(Format::Vega)
+    } else if ABAQUS.iter().any(|keyword| is(keyword)) || ending == "inp" && is(b"*") {
+        Some(Format::Abaqus)
     } else if is(b"v ") && isaac::has_tetrahedra(source)? {
         Some(Format::Isaac)
     } else {
@@ -124,10 +133,6 @@ fn foreign_text(is: &dyn Fn(&[u8]) -> bool, has_dollar: bool, ending: &str) -> O
     let save = || format!("save it in a format that can be read ({READABLE}) with the program that made it");
     let (found, advice) = if any(&["MFEM "]) {
         ("an MFEM mesh, which cannot be read", save())
-    } else if any(&["*VERTICES", "*ELEMENTS"]) || (ending == "veg" && any(&["*"])) {
-        ("a Vega FEM mesh, which cannot be read", save())
-    } else if any(&["*HEADING", "*NODE", "*PART", "*INCLUDE", "*PREPRINT"]) {
-        ("an Abaqus input file, which cannot be read", CONVERT.into())
     } else if any(&["*KEYWORD"]) {
         ("an LS-DYNA keyword file, which cannot be read", save())
     } else if ["bdf", "nas"].contains(&ending) || (ending == "dat" && (has_dollar || any(&["SOL ", "CEND", "BEGIN BULK", "GRID"]))) {

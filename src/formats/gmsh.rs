@@ -5,7 +5,7 @@ use std::collections::HashMap;
 
 use super::array::Array;
 use super::assemble::Assembly;
-use super::gmsh_data::{View, of_step};
+use super::gmsh_data::{View, keep_step};
 use super::gmsh_elements::{Elements, kinds};
 use super::gmsh_reader::{Reader, Version, old};
 use super::scalar::Scalar;
@@ -139,9 +139,8 @@ impl Content {
         }
         self.marks(assembly);
         let cells = Tags::new(&self.elements.tags, true).unwrap_or(Tags::Dense { first: 0, table: Vec::new() });
-        let (views, series) = of_step(std::mem::take(&mut self.views), step, source)?;
-        assembly.warnings.extend(series.map(|(read, count)| TimeStep::remark(read, count)));
-        for view in views {
+        assembly.warnings.extend(keep_step(&mut self.views, step, source)?);
+        for view in std::mem::take(&mut self.views) {
             let (tags, count) = if view.on == On::Points { (&points, assembly.n_points()) } else { (&cells, self.elements.types.len()) };
             match view.array(tags, count, &mut assembly.padding) {
                 Ok(array) => assembly.arrays.push(array),

@@ -45,11 +45,11 @@ impl View {
     }
 }
 
-/// The views of one time step, and those that the file has at one step only. Returns the number of that step and of all
-/// steps, if there are several.
-pub(crate) fn of_step(views: Vec<View>, step: TimeStep, source: &Source) -> Result<(Vec<View>, Option<(usize, usize)>)> {
+/// Keeps the views of one time step, and those that the file has at one step only. If there are several steps, returns a
+/// remark on that.
+pub(crate) fn keep_step(views: &mut Vec<View>, step: TimeStep, source: &Source) -> Result<Option<String>> {
     let mut steps_of: HashMap<(On, &str), BTreeSet<i64>> = HashMap::new();
-    for view in &views {
+    for view in views.iter() {
         steps_of.entry((view.on, &view.name)).or_default().insert(view.step);
     }
     let is_series = |view: &View| steps_of[&(view.on, view.name.as_str())].len() > 1;
@@ -57,12 +57,13 @@ pub(crate) fn of_step(views: Vec<View>, step: TimeStep, source: &Source) -> Resu
     all.sort_unstable();
     all.dedup();
     if all.len() < 2 {
-        return Ok((views, None));
+        return Ok(None);
     }
     let chosen = step.chosen(source, &mut all)?;
     let kept: Vec<bool> = views.iter().map(|view| !is_series(view) || view.step.to_string() == all[chosen]).collect();
-    let views = views.into_iter().zip(kept).filter(|(_, kept)| *kept).map(|(view, _)| view).collect();
-    Ok((views, Some((chosen, all.len()))))
+    let mut kept = kept.into_iter();
+    views.retain(|_| kept.next().unwrap_or(true));
+    Ok(Some(TimeStep::remark(chosen, all.len())))
 }
 
 impl Reader<'_> {

@@ -12,6 +12,8 @@
 //! base64, flate2, `lz4_flex` and lzma-rust2, and check every count against the size of the file before they allocate
 //! memory.
 
+mod abaqus;
+mod abaqus_model;
 mod array;
 mod assemble;
 mod budget;
@@ -40,6 +42,7 @@ mod tags;
 mod tetgen;
 mod tokens;
 mod unpack;
+mod vega;
 mod vtk;
 mod vtk_attributes;
 mod vtk_reader;
@@ -153,8 +156,8 @@ pub fn load(spec: impl AsRef<Path>, options: &LoadOptions) -> Result<Loaded> {
 }
 
 /// Reads a mesh from the content of a file. `name` is the path used in messages, and its extension helps to recognise
-/// the format. The second file of a TetGen pair and the files that a `.pvtu` or the like lists are searched for next to
-/// `name`.
+/// the format. The second file of a TetGen pair and the files that a `.pvtu` or the like lists, or an `.inp` includes, are
+/// searched for next to `name`.
 ///
 /// # Errors
 /// As [`load`].
@@ -182,5 +185,7 @@ fn assembled(source: &Source, options: &LoadOptions) -> Result<Assembly> {
             tetgen::read(source, &companion, options)
         }
         Format::Isaac => isaac::read(source, options),
+        Format::Abaqus => abaqus::read(source, options),
+        Format::Vega => vega::read(source, options),
     }
 }

@@ -54,6 +54,8 @@ pub fn all() -> Vec<(&'static str, Vec<u8>)> {
         ("zero.ele", tetgen(0).1),
         ("zero.node", tetgen(0).0),
         ("isaac.tet", isaac()),
+        ("cube.inp", abaqus()),
+        ("cube.veg", vega()),
         ("quoted.vtu", vtu_quoted()),
         ("texts.vtk", vtk_texts()),
     ]
@@ -104,6 +106,18 @@ fn isaac() -> Vec<u8> {
     let points: String = POINTS.iter().map(|p| line("v", join(p))).collect();
     let tets: String = TETS.iter().map(|t| line("t", join(t))).collect();
     format!("# a cube\n{points}\n{tets}").into_bytes()
+}
+
+fn abaqus() -> Vec<u8> {
+    let nodes: String = (1..).zip(POINTS).map(|(i, p)| format!("{i}, {}\n", join(p).replace(' ', ", "))).collect();
+    let tets: String = (1..).zip(TETS).map(|(i, t)| format!("{i}, {}\n", join(t.map(|v| v + 1)).replace(' ', ", "))).collect();
+    format!("*HEADING\na cube\n** of six tetrahedra\n*NODE\n{nodes}*ELEMENT, TYPE=C3D4\n{tets}*STEP\n*END STEP\n").into_bytes()
+}
+
+fn vega() -> Vec<u8> {
+    let nodes: String = (1..).zip(POINTS).map(|(i, p)| format!("{i} {}\n", join(p))).collect();
+    let tets: String = (1..).zip(TETS).map(|(i, t)| format!("{i} {}\n", join(t.map(|v| v + 1)))).collect();
+    format!("# a cube\n*VERTICES\n8 3 0 0\n{nodes}\n*ELEMENTS\nTET\n6 4 0\n{tets}*MATERIAL a\nENU, 1000, 1E7, 0.45\n").into_bytes()
 }
 
 fn base64(bytes: &[u8]) -> Vec<u8> {

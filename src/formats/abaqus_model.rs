@@ -1,0 +1,222 @@
+//! Nodes and elements of an Abaqus input file, by parts, and their assembly to a mesh.
+
+use std::collections::HashMap;
+
+use glam::{DQuat, DVec3};
+
+use super::array::Array;
+use super::assemble::Assembly;
+use super::cells::{CellType, vtk};
+use super::report::Fate;
+use super::source::Source;
+use super::tags::Tags;
+use crate::error::Result;
+use crate::mesh::On;
+
+/// A type of elements.
+#[derive(Clone, Copy)]
+pub(super) struct Element {
+    /// `None`: elements without volume, which are only counted.
+    pub kind: Option<CellType>,
+    /// Number of nodes in the file.
+    pub nodes: usize,
+}
+
+/// What precedes `3D` in the names of solids: stress, heat, acoustic, convection, coupled, Eulerian, fluid, cohesive.
+const SOLIDS: [&str; 8] = ["C", "DC", "AC", "DCC", "Q", "EC", "F", "COH"];
+
+impl Element {
+    /// The type of this name, such as `C3D10M`.
+    pub fn of(name: &str) -> Self {
+        let name = name.to_uppercase();
+        let nodes = match name.split_once("3D") {
+            Some((solid, rest)) if SOLIDS.contains(&solid) => rest,
+            // Shells that are described like solids.
+            _ => name.strip_prefix("SC").or_else(|| name.strip_prefix("CSS")).unwrap_or_default(),
+        };
+        let digits = nodes.find(|c: char| !c.is_ascii_digit()).unwrap_or(nodes.len());
+        let nodes = nodes[..digits].parse().unwrap_or(0);
+        // The order of nodes is that of VTK.
+        let number = match nodes {
+            4 => 10,
+            5 => 14,
+            6 => 13,
+            8 => 12,
+            10 => 24,
+            13 => 27,
+            15 => 26,
+            20 | 27 => 25,
+            _ => -1,
+        };
+        Self { kind: vtk(number), nodes }
+    }
+}
+
+/// Elements of one type.
+pub(super) struct Block {
+    pub element: Element,
+    set: Option<String>,
+    pub count: usize,
+    /// Numbers of the elements, and of the nodes of each.
+    tags: Vec<i64>,
+    nodes: Vec<i64>,
+}
+
+impl Block {
+    pub fn new(element: Element, set: Option<&str>) -> Self {
+        Self { element, set: set.map(str::to_uppercase), count: 0, tags: Vec::new(), nodes: Vec::new() }
+    }
+
+    /// Adds an element: its number, then its nodes.
+    pub fn add(&mut self, numbers: &[i64]) {
+        self.count += 1;
+        self.tags.push(numbers[0]);
+        self.nodes.extend(&numbers[1..]);
+    }
+}
+
+/// The nodes and elements of the model itself, a part, or an instance.
+#[derive(Default)]
+pub(super) struct Body {
+    pub tags: Vec<i64>,
+    pub points: Vec<[f64; 3]>,
+    pub blocks: Vec<Block>,
+}
+
+/// A part at a place.
+pub(super) struct Instance {
+    /// The part, and what the instance adds.
+    bodies: [usize; 2],
+    shift: DVec3,
+    /// Two points of an axis, and a rotation about it.
+    turn: Option<(DVec3, DQuat)>,
+}
+
+impl Instance {
+    pub fn new(bodies: [usize; 2]) -> Self {
+        Self { bodies, shift: DVec3::ZERO, turn: None }
+    }
+
+    /// Takes a line of data: first a shift, then two points of an axis and an angle in degrees. False if it is neither.
+    pub fn place(&mut self, lines: usize, numbers: &[f64]) -> bool {
+        match (lines, numbers) {
+            (0, &[x]) => self.shift = DVec3::new(x, 0.0, 0.0),
+            (0, &[x, y]) => self.shift = DVec3::new(x, y, 0.0),
+            (0, &[x, y, z]) => self.shift = DVec3::new(x, y, z),
+            (1, &[ax, ay, az, bx, by, bz, degrees]) => {
+                let (a, b) = (DVec3::new(ax, ay, az), DVec3::new(bx, by, bz));
+                let Some(axis) = (b - a).try_normalize() else { return false };
+                self.turn = Some((a, DQuat::from_axis_angle(axis, degrees.to_radians())));
+            }
+            _ => return false,
+        }
+        true
+    }
+
+    /// Where a point of the part is: the shift comes before the rotation.
+    fn moved(&self, point: [f64; 3]) -> [f64; 3] {
+        let shifted = DVec3::from_array(point) + self.shift;
+        self.turn.map_or(shifted, |(a, turn)| a + turn * (shifted - a)).to_array()
+    }
+}
+
+/// The bodies of a file; the first is the model itself.
+pub(super) struct Model {
+    pub bodies: Vec<Body>,
+    pub parts: HashMap<String, usize>,
+    pub instances: Vec<Instance>,
+}
+
+impl Default for Model {
+    fn default() -> Self {
+        Self { bodies: vec![Body::default()], parts: HashMap::new(), instances: Vec::new() }
+    }
+}
+
+impl Model {
+    /// Adds the model, and the instances of its parts, or else the parts.
+    pub fn assemble(mut self, source: &Source, assembly: &mut Assembly) -> Result<()> {
+        if self.instances.is_empty() {
+            let mut parts: Vec<usize> = self.parts.values().copied().collect();
+            parts.sort_unstable();
+            self.instances = parts.into_iter().map(|part| Instance::new([part, part])).collect();
+        }
+        let itself = Instance::new([0, 0]);
+        let placed: Vec<&Instance> = [&itself].into_iter().chain(&self.instances).collect();
+        let bodies = |instance: &Instance| if instance.bodies[0] == instance.bodies[1] { 1 } else { 2 };
+        let mut points = Vec::new();
+        let mut starts = Vec::new();
+        for &instance in &placed {
+            starts.push(points.len());
+            for &body in &instance.bodies[..bodies(instance)] {
+                points.extend(self.bodies[body].points.iter().map(|&point| instance.moved(point)));
+            }
+        }
+        if self.instances.is_empty() {
+            assembly.point_tags.clone_from(&self.bodies[0].tags);
+        }
+        assembly.set_points(points);
+        let mut sets = Sets::default();
+        for (&instance, &start) in placed.iter().zip(&starts) {
+            let bodies: Vec<&Body> = instance.bodies[..bodies(instance)].iter().map(|&body| &self.bodies[body]).collect();
+            let tags: Vec<i64> = bodies.iter().flat_map(|body| &body.tags).copied().collect();
+            let nodes = Tags::new(&tags, false).map_err(|tag| source.error(format!("two nodes have the number {tag}")))?;
+            for block in bodies.iter().flat_map(|body| &body.blocks) {
+                block.push(source, assembly, &nodes, start)?;
+                sets.add(block);
+            }
+        }
+        sets.give(assembly);
+        Ok(())
+    }
+}
+
+impl Block {
+    /// Adds the elements, whose nodes are found by their numbers from point number `start` on.
+    fn push(&self, source: &Source, assembly: &mut Assembly, nodes: &Tags, start: usize) -> Result<()> {
+        let Some(kind) = self.element.kind else {
+            (0..self.count).for_each(|_| assembly.skip("element without volume", Fate::Boundary));
+            return Ok(());
+        };
+        assembly.reserve(self.count);
+        let mut found = Vec::with_capacity(self.element.nodes);
+        for (tag, cell) in self.tags.iter().zip(self.nodes.chunks_exact(self.element.nodes)) {
+            found.clear();
+            // The 27th node and those of faces have an order of their own.
+            for &node in &cell[..kind.nodes.unwrap_or(cell.len()).min(cell.len())] {
+                let place = nodes.get(node).map(|place| start as i64 + i64::from(place));
+                found.push(place.ok_or_else(|| source.error_in(format!("element {tag}"), format!("node {node} does not exist")))?);
+            }
+            assembly.push(kind, &found)?;
+        }
+        Ok(())
+    }
+}
+
+/// The set that each element is in by its keyword, as a number from 1; 0: none.
+#[derive(Default)]
+struct Sets {
+    names: Vec<String>,
+    values: Vec<f32>,
+}
+
+impl Sets {
+    fn add(&mut self, block: &Block) {
+        let number = block.set.as_ref().map_or(0, |set| {
+            let known = self.names.iter().position(|name| name == set);
+            1 + known.unwrap_or_else(|| {
+                self.names.push(set.clone());
+                self.names.len() - 1
+            })
+        });
+        self.values.resize(self.values.len() + block.count, number as f32);
+    }
+
+    /// Makes a field of cells of them, if there are several.
+    fn give(self, assembly: &mut Assembly) {
+        let first = self.values.first().copied();
+        if self.values.iter().any(|&value| Some(value) != first) {
+            assembly.arrays.push(Array { name: "elset".into(), on: On::Cells, components: 1, values: self.values });
+        }
+    }
+}
