@@ -434,7 +434,7 @@ bool olbvh_is_empty_tree(uint level) { return level == 0u ? olbvh_entry_range(0u
 
 // Whether the surface of the mesh may pass through a node's cell. The including kernel declares flags.
 bool olbvh_is_boundary_node(uint node) { return (olbvh_flags.at[node >> 5u] >> (node & 31u) & 1u) != 0u; }
-// Candidate owners of a point. Twin of src/reference/candidates.rs. Needs grid.glsl and vertices.
+// Candidate owners of a point. Twin of src/reference/best_owner.rs. Needs grid.glsl and vertices.
 // Vertices and tetrahedra as 02_normalise_vertices leaves them. The including kernel declares `vertices`: normalised
 // coordinates, and the cell of the finest grid.
 
@@ -668,7 +668,7 @@ uint olbvh_decide(olbvh_Best best, uint leaf, float tolerance) {
 // neighbours.
 
 // Walking to a point across shared faces (SPEC 2.6). Twin of src/reference/walk.rs, which explains it; the operations
-// and their order are the same. Needs candidates.glsl, cells and neighbours.
+// and their order are the same. Needs best_owner.glsl, cells and neighbours.
 const uint olbvh_STAR = 128u;   // Most tetrahedra of a star. A vertex of more is crowded, and never walked to; see corners.glsl.
 const uint olbvh_STEPS = 512u;  // Most steps of part 1.
 const uint olbvh_HINTED = 16u;  // Most steps of a stride from a hint.
@@ -684,7 +684,7 @@ const uint olbvh_ROUND = olbvh_STAR;
 // rounding, and the nearest tetrahedron owns it.
 const float olbvh_GAP = -7.62939453125e-6;
 
-// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs candidates.glsl, cells,
+// Strides, the hot part of a walk (SPEC 2.6). Twin of `Stand` in src/reference/walk.rs. Needs best_owner.glsl, cells,
 // vertices and neighbours.
 
 // The tetrahedron that a stride has reached. Its corners are kept in ascending index, so that what is computed from

@@ -25,7 +25,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("kernels", &["error", "gpu", "named"]),
     ("primitives", &["error", "gpu", "kernels"]),
     ("build", &["error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "tree"]),
-    ("glsl", &["build", "gpu", "layout", "options"]),
+    ("glsl", &["build", "error", "gpu", "layout", "options"]),
     ("query", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "reference", "render", "slicing"]),
     ("blocks", &["build", "error", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "primitives", "query", "reference", "render", "slicing"]),

@@ -63,7 +63,7 @@ impl TreeArrays {
         (expected.level, expected.first_leaf) = (level, self.grid.first_leaf);
         expected.ids = id_mask(self.lists, topology.neighbours.len());
         expected.slabs = if self.slabs.is_empty() { 0 } else { self.po.len() as u32 };
-        expected.longest = longest_list(&self.po);
+        expected.longest = self.grid.longest;
         rule(self.grid == expected, || format!("grid: {:?} is not that of the mesh, {expected:?}", self.grid))
     }
 
@@ -138,7 +138,7 @@ impl TreeArrays {
         Ok(codes)
     }
 
-    /// PO: offsets ascend over the leaves, up to the number of entries.
+    /// PO: offsets ascend over the leaves, up to the number of entries; the grid knows the longest list.
     fn check_offsets(&self) -> Rule {
         let n_m = self.p.len() as u64;
         rule(self.po[0] == 0, || format!("PO[0] = {}, entries begin at 0", self.po[0]))?;
@@ -149,7 +149,9 @@ impl TreeArrays {
             rule(room, || format!("PO[{}] = {end}: leaf {leaf} has no entry, the one before ends at {begin}", i + 1))?;
         }
         let end = self.po[self.po.len() - 1];
-        rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))
+        rule(u64::from(end) == n_m, || format!("the leaves end at entry {end}, P has {n_m} entries"))?;
+        let (told, longest) = (self.grid.longest, longest_list(&self.po));
+        rule(told == longest, || format!("the grid says that the longest list has {told} entries, PO that it has {longest}"))
     }
 
     /// P and the quarters of its entries: ids ascend in every leaf, and the entries are exactly the pairs of

@@ -90,6 +90,7 @@ fn quarters() {
 fn offsets() {
     breaks(Assign::Aabb, "PO[0] = 1", |t| t.po[0] = 1);
     breaks(Assign::Aabb, "PO[12]", |t| t.po[12] = t.po[11]);
+    breaks(Assign::Aabb, "the longest list has", |t| t.grid.longest += 1);
     breaks(Assign::Aabb, "the leaves end at entry", |t| *t.po.last_mut().unwrap() += 1);
 }
 
