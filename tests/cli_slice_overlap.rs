@@ -108,11 +108,25 @@ fn remarks() {
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "7,9"], "no surface to be seen"),
         (&["render", "kuhn:4,3,2", "-o", "a.png", "--size", "8", "--iso", "0.2,9"], ""),
         (&["slice", "kuhn:4,3,2", "-o", "a.svx", "--size", "8"], ""),
+        (
+            &["overlap", "kuhn:4,3,2", "kuhn:1,1,1", "--move-b", "0,0,9", "-o", "a.json"],
+            "no cells intersect; A reaches from (0, 0, 0) to (4, 3, 2), B from (0, 0, 9) to (1, 1, 10)",
+        ),
+        (&["overlap", "kuhn:4,3,2", "kuhn:1,1,1", "-o", "a.json"], ""),
         (&["devices"], "these are all devices"),
     ] {
         let (code, _, text) = olbvh(folder.path(), arguments);
         assert!(code == 0 && text.contains(wanted) && text.is_empty() == wanted.is_empty(), "{arguments:?}: {text}");
     }
+}
+
+#[test]
+fn results_larger_than_the_disk_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let huge = ["slice", "kuhn:4,3,2", "-o", "a.npy", "--size", "1000000x1000000"];
+    let (code, _, text) = olbvh(folder.path(), &huge);
+    assert!(code == 1 && text.contains("a.npy: the result takes 4.55 TiB, and its disk has "), "{code} {text}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Input files of Abaqus and CalculiX, and meshes of Vega FEM: what the cube in `formats_small` does not have.
 #![cfg(feature = "formats")]
-#![allow(clippy::unwrap_used, reason = "helpers of tests")]
+#![allow(clippy::unwrap_used, clippy::format_collect)] // also in helpers of tests
 
 mod formats_small;
 

@@ -6,7 +6,7 @@ use crate::output::Progress;
 use crate::text::counted;
 use olbvh::error::Error;
 use olbvh::formats::{Curved, LoadOptions, Loaded, Merge, TimeStep, load, printable};
-use olbvh::mesh::{Field, Mesh, On};
+use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
 use olbvh::render::TransferFunction;
 use std::io::ErrorKind;
@@ -64,7 +64,7 @@ pub struct ReadArgs {
     merge: Merge,
     /// Time step to read, counted from 0, or `last`: of a .pvd, or of a .vtu or .msh with several. What has no time steps is the
     /// same at all of them.
-    #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last")]
+    #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last", allow_hyphen_values = true)]
     time_step: TimeStep,
     /// What becomes of curved cells. corners: edges are straight, and fields are linear in a cell. split: quadratic cells,
     /// which have a node in the middle of each edge, become 8 to 48 tetrahedra that use all nodes and the values there; cells
@@ -198,6 +198,13 @@ pub fn remark_on_bad_cells(path: &Path, bad: u32, common: &Common) {
         let cells = counted(bad.into(), "bad cell");
         common.remark(format_args!("{}: {cells} {are} left out (`olbvh info --bad-cells` lists {them})", path.display()));
     }
+}
+
+/// Where the valid cells of a mesh are, in words: `from (…) to (…)`.
+pub fn reach(mesh: &Mesh) -> String {
+    let (Bounds { lo, hi }, [x, y, z]) = (Bounds::from(&valid_grid(mesh)), mesh.origin);
+    let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
+    format!("from {} to {}", corner(lo), corner(hi))
 }
 
 /// The field with this name; without a name, the first field of points, or else the first field of cells.

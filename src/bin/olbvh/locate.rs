@@ -10,7 +10,7 @@ use olbvh::formats::{
     Fate, LoadOptions, Loaded, Located, Merge, OutputFile, OutputFormat, load, load_points, read_points, without_lengths, write_json,
     write_located, write_npy,
 };
-use olbvh::mesh::{Bounds, Field, Mesh, valid_grid};
+use olbvh::mesh::{Field, Mesh};
 use olbvh::options::Fineness;
 use olbvh::query::{self, LocateMethod, LocateOptions};
 use olbvh::reference::locate::Location;
@@ -124,7 +124,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     };
     drop(progress);
     if found + beside == 0 && !points.is_empty() {
-        remark_on_bounds(mesh, common);
+        common.remark(format_args!("no point lies in the mesh, which reaches {}", input::reach(mesh)));
     }
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);
     let seconds = seconds - took.build_seconds;
@@ -216,13 +216,6 @@ impl Done<'_> {
 /// Number of points that have an owner.
 fn with_owner(located: &query::Located) -> usize {
     located.owners.iter().filter(|&&tet| tet != u32::MAX).count()
-}
-
-/// Remarks on points of which none lies in the mesh.
-fn remark_on_bounds(mesh: &Mesh, common: &Common) {
-    let (Bounds { lo, hi }, [x, y, z]) = (Bounds::from(&valid_grid(mesh)), mesh.origin);
-    let corner = |p: [f32; 3]| format!("({}, {}, {})", f64::from(p[0]) + x, f64::from(p[1]) + y, f64::from(p[2]) + z);
-    common.remark(format_args!("no point lies in the mesh, which reaches from {} to {}", corner(lo), corner(hi)));
 }
 
 /// The mesh whose points were located, if it has volume cells.

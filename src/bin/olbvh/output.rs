@@ -1,6 +1,7 @@
 //! Output of results on standard output and in files, and progress bars.
 
 use crate::common::{Common, Failure, Outcome};
+use crate::text;
 use indicatif::{ProgressBar, ProgressStyle};
 use olbvh::error::Error;
 use olbvh::formats::{OutputFile, OutputFormat, destination, is_part, listed_files};
@@ -138,6 +139,19 @@ pub fn announce_file(path: &Path, inputs: &[&Path]) -> Outcome {
     begin(path);
     drop(OutputFile::create(path)?); // better refused now than after the work
     Ok(())
+}
+
+/// Refuses a result of about this many bytes if its disk has no room for them. Where that cannot be told, nothing is refused.
+pub fn check_room(path: &Path, bytes: u64) -> Outcome {
+    match fs4::available_space(folder(&destination(path))) {
+        Ok(free) if free < bytes => Err(Failure::Failed(format!(
+            "{}: the result takes {}, and its disk has {} left; make room, or take another path",
+            path.display(),
+            text::bytes(bytes),
+            text::bytes(free)
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// Registers a file of a result that consists of several files, before it is written.

@@ -71,6 +71,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     for (path, bad) in [&args.a, &args.b].into_iter().zip(took.bad_cells) {
         input::remark_on_bad_cells(path, bad, common);
     }
+    if overlap.a.is_empty() {
+        let [a, b] = [&a, &b].map(input::reach);
+        common.remark(format_args!("no cells intersect; A reaches {a}, B {b}"));
+    }
     let cells = Cells::of(&overlap, [&a, &b]);
     match output.format {
         OutputFormat::Vtu => write_mesh(output.path(), &part(&a, &overlap.a))?,

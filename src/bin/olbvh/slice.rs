@@ -118,6 +118,10 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     }
     let bounds = Bounds::from(&valid_grid(mesh));
     let voxels = args.voxels(format, &bounds, mesh.origin, common)?;
+    if let OutputFormat::Npy | OutputFormat::Vti = format {
+        // A value and a kind per voxel; pictures and packages are compressed.
+        output::check_room(&args.output, voxels.voxels() * if args.owners { 9 } else { 5 })?;
+    }
     let look = args.look(format, &colors, mesh, field, common);
     let placement = Placement::new(&voxels, mesh);
     let mut layers = Layers::create(&args.output, format, &placement, mesh, args.owners, look)?;
