@@ -110,8 +110,8 @@ pub(super) fn each(
     let mut job = Job { gpu, points, done: 0.0, took: InBlocks::default(), ask, report };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.place(gpu, mesh, options, 0);
-        let asked = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
-        if asked.is_some() {
+        let answered = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
+        if answered.is_some() {
             return Ok(job.end());
         }
         job.done = 0.0;

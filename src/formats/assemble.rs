@@ -157,8 +157,7 @@ impl Assembly {
             let remedy = "--merge all (Merge::All) makes coinciding points one";
             self.warnings.push(format!("each cell has points of its own, so every face counts as boundary and queries are slow; {remedy}"));
         }
-        self.warnings.extend(self.remark_on_rounding(&points, origin));
-        self.warnings.extend(self.remark_on_small_cells(lo, hi));
+        self.warnings.extend(self.remark_on_small_cells(&points, origin, [lo, hi]));
         self.remove_replaced(&merged, &mut points, &mut used);
         let fields = self.fields(&used);
         if self.straightened > 0 {

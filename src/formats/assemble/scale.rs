@@ -1,6 +1,7 @@
 //! Remarks on cells that are small beside the whole mesh, and on fields that vary little beside their size.
 
 use glam::DVec3;
+use rayon::prelude::*;
 
 use super::Assembly;
 use crate::formats::array::Array;
@@ -19,45 +20,46 @@ const LEAST_SMALL: usize = 4096;
 const NEARLY_FLAT: f64 = 1e-3;
 
 impl Assembly {
-    /// A warning if most cells are much smaller than the smallest leaf of a tree, whose lists are then long.
-    pub(super) fn remark_on_small_cells(&self, lo: [f64; 3], hi: [f64; 3]) -> Option<String> {
-        let largest = |lo: DVec3, hi: DVec3| (hi - lo).max_element();
-        let most = SMALL * largest(DVec3::from_array(lo), DVec3::from_array(hi));
-        let is_small = |tet: &&[u32; 4]| {
+    /// Warnings if most cells are much smaller than the smallest leaf of a tree, whose lists are then long, and if rounding
+    /// changes the shape of cells: those that are very small beside their distance from the mesh's origin, as where
+    /// another part lies far away.
+    pub(super) fn remark_on_small_cells(&self, rounded: &[[f32; 3]], origin: [f64; 3], [lo, hi]: [[f64; 3]; 2]) -> Vec<String> {
+        let [origin, lo, hi] = [origin, lo, hi].map(DVec3::from_array);
+        let small = SMALL * (hi - lo).max_element();
+        let farthest = (hi - origin).abs().max((lo - origin).abs()).max_element();
+        let of = |tet: &[u32; 4]| {
             let corners = tet.map(|v| DVec3::from_array(self.points[v as usize]));
-            largest(corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max)) < most
+            let (lo, hi) = (corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max));
+            let size = hi - lo;
+            // Rounding moves corners by 2^-24 of the distance at most.
+            let changed = size.min_element() < farthest / 4096.0 && {
+                let there = volume(corners.map(|p| p - origin));
+                let here = volume(tet.map(|v| DVec3::from_array(rounded[v as usize].map(f64::from))));
+                there.abs() > NEARLY_FLAT * size.element_product() && (here - there).abs() > CHANGE * there.abs()
+            };
+            (size.max_element() < small, changed)
         };
-        let small = self.tets.iter().filter(is_small).count();
-        (small > LEAST_SMALL && 2 * small > self.tets.len()).then(|| {
+        let count = |(tet, &id): (&[u32; 4], &u32)| {
+            let (small, changed) = of(tet);
+            (usize::from(small), usize::from(changed), if changed { id } else { u32::MAX })
+        };
+        let add = |a: (usize, usize, u32), b: (usize, usize, u32)| (a.0 + b.0, a.1 + b.1, a.2.min(b.2));
+        let (small, changed, first) = self.tets.par_iter().zip(&self.ids).map(count).reduce(|| (0, 0, u32::MAX), add);
+        let all = self.tets.len();
+        let slow = (small > LEAST_SMALL && 2 * small > all).then(|| {
             format!(
-                "{small} of {} tetrahedra are smaller than 1/{} of the mesh, so many of them share a leaf of the tree, and queries are \
+                "{small} of {all} tetrahedra are smaller than 1/{} of the mesh, so many of them share a leaf of the tree, and queries are \
                  slow; cut the mesh into pieces, or remove parts that lie far away",
-                self.tets.len(),
                 1.0 / SMALL
             )
-        })
-    }
-
-    /// A warning if rounding changes the shape of cells: those that are very small beside their distance from the
-    /// mesh's origin, as where another part lies far away.
-    pub(super) fn remark_on_rounding(&self, rounded: &[[f32; 3]], origin: [f64; 3]) -> Option<String> {
-        let origin = DVec3::from_array(origin);
-        let changes = |tet: &[u32; 4]| {
-            let exact = tet.map(|v| DVec3::from_array(self.points[v as usize]) - origin);
-            let there = volume(exact);
-            let (lo, hi) = (exact.into_iter().fold(exact[0], DVec3::min), exact.into_iter().fold(exact[0], DVec3::max));
-            let room = (hi - lo).element_product();
-            let here = volume(tet.map(|v| DVec3::from_array(rounded[v as usize].map(f64::from))));
-            there.abs() > NEARLY_FLAT * room && (here - there).abs() > CHANGE * there.abs()
-        };
-        let mut changed = self.tets.iter().zip(&self.ids).filter(|(tet, _)| changes(tet));
-        let (_, first) = changed.next()?;
-        let count = 1 + changed.count();
-        Some(format!(
-            "{count} of {} tetrahedra are so small beside the mesh that single precision changes their shape, the first of cell {first}: \
-             places in them are wrong by as much; remove parts that lie far away, or take them as a mesh of their own",
-            self.tets.len()
-        ))
+        });
+        let wrong = (changed > 0).then(|| {
+            format!(
+                "{changed} of {all} tetrahedra are so small beside the mesh that single precision changes their shape, the first of cell \
+                 {first}: places in them are wrong by as much; remove parts that lie far away, or take them as a mesh of their own"
+            )
+        });
+        slow.into_iter().chain(wrong).collect()
     }
 }
 
