@@ -224,7 +224,7 @@ pub fn prepare_picture(device: &DeviceMesh, mesh: &Mesh, field: &Field, settings
 /// let tree = Tree::build(&gpu, &device, &BuildOptions { fineness: Fineness::Pictures, slabs: true, ..Default::default() })?;
 /// let picture = query::prepare_picture(&device, &mesh, field, &RenderSettings { size: [800, 600], ..Default::default() })?;
 /// let drawn = query::render(&tree, &picture.plan, (&field.values, field.on), Some(&picture.normals), query::SILENT)?;
-/// formats::write_png("jet.png".as_ref(), 800, 600, &picture.plan.pixels(&drawn.colors, 1))
+/// formats::write_png("jet.png", 800, 600, &picture.plan.pixels(&drawn.colors, 1))
 /// # }
 /// ```
 ///
