@@ -5,7 +5,7 @@
 mod formats_small;
 
 use formats_small::shared;
-use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, TimeStep, load};
+use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, TimeStep, listed_files, load};
 use olbvh::mesh::{Mesh, On};
 use std::fs;
 use tempfile::TempDir;
@@ -277,4 +277,26 @@ fn a_shared_list_is_the_file_with_its_pieces() {
         ["bracket_5k.pvtu", "bracket_5k_twopieces.vtu"].map(|name| load(folder.join(name), &LoadOptions::default()).unwrap());
     assert_eq!(fields(&list.mesh), fields(&file.mesh));
     assert_eq!((list.mesh.points, list.mesh.tets), (file.mesh.points, file.mesh.tets));
+}
+
+/// ParaView's own list of the files of time steps.
+#[test]
+fn a_series_in_json() {
+    let folder = folder();
+    let entries = r#"{"name": "c/grid.vtu", "time": 10}, {"name": "a & b/grid.vtu", "time": 9.5}"#;
+    let series = format!(r#"{{ "file-series-version": "1.0", "files": [{entries}] }}"#);
+    let path = folder.path().join("run.vtu.series");
+    fs::write(&path, &series).unwrap();
+    for (step, value, number) in [(TimeStep::Number(0), 7.0, 0), (TimeStep::Last, 8.0, 1)] {
+        let Loaded { mesh, report } = load(&path, &LoadOptions { step, ..LoadOptions::default() }).unwrap();
+        assert_eq!(mesh.field("s").unwrap().values, [value]);
+        assert!(report.warnings[0].starts_with(&format!("time step {number} of 0 to 1 is read")), "{:?}", report.warnings);
+    }
+    let error = read(&folder, "run.vtu.series", &series.replace("a & b/", "d/")).unwrap_err();
+    assert!(error.contains("`d/grid.vtu`: there is no such file"), "{error}");
+    let error = read(&folder, "run.vtu.series", "{\n\"files\": 3}").unwrap_err();
+    assert!(error.starts_with("run.vtu.series: as a series in JSON: invalid type: integer `3`, expected a sequence at line 2"), "{error}");
+    assert_eq!(listed_files(&path).len(), 0, "a broken list names nothing");
+    fs::write(&path, &series).unwrap();
+    assert_eq!(listed_files(&path), ["c/grid.vtu", "a & b/grid.vtu"].map(|name| folder.path().join(name)));
 }

@@ -1,4 +1,5 @@
-//! The grids of a VTK XML file: its own, or those of the files that it lists (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`).
+//! The grids of a VTK XML file: its own, or those of the files that it lists (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`,
+//! `.series`).
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::{Path, PathBuf};
@@ -7,6 +8,7 @@ use super::budget::Budget;
 use super::lattice::GridKind;
 use super::source::ending;
 use super::source::{Source, excerpt};
+use super::vtk_series;
 use super::vtu_data::Codec;
 use super::vtu_parser::{Document, List, Piece, Skeleton, parse};
 use super::{LoadOptions, TimeStep};
@@ -17,7 +19,7 @@ const MOST_FILES: usize = 1 << 16;
 /// Most lists within each other.
 const MOST_DEEP: usize = 4;
 /// Endings of lists.
-const LISTS: [&str; 8] = ["pvtu", "pvts", "pvtr", "pvti", "vtm", "vtpd", "vtpc", "pvd"];
+const LISTS: [&str; 9] = ["pvtu", "pvts", "pvtr", "pvti", "vtm", "vtpd", "vtpc", "pvd", "series"];
 /// Endings of files of VTK with surfaces and tables.
 const NO_VOLUMES: [&str; 3] = ["vtp", "pvtp", "vtt"];
 /// Endings of files of VTK with volumes of another kind.
@@ -68,10 +70,15 @@ pub(crate) struct Files<'a> {
     pub warnings: Vec<String>,
 }
 
+/// What a file is: a grid, or a list.
+fn document(source: &Source, step: TimeStep) -> Result<Document> {
+    if vtk_series::is_series(source) { vtk_series::read(source).map(Document::List) } else { parse(source, step) }
+}
+
 /// Finds the grids of a file.
 pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Files<'a>> {
     let bytes = source.len();
-    let list = match parse(source, options.step)? {
+    let list = match document(source, options.step)? {
         Document::Grid(mut skeleton) => {
             let (format, warnings) = (std::mem::take(&mut skeleton.format), std::mem::take(&mut skeleton.warnings));
             return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, 0, bytes, options)], bytes, warnings });
@@ -99,7 +106,7 @@ pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Fil
     Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
 }
 
-/// The files that a list (`.pvtu` and the like, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`) names, of all time steps, and those that lists
+/// The files that a list (`.pvtu` and the like, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`, `.series`) names, of all time steps, and those that lists
 /// among these name; none if the file is no list, or cannot be read. Tells whether a result would replace one of them.
 pub fn listed_files(path: &Path) -> Vec<PathBuf> {
     let mut found = Vec::new();
@@ -111,7 +118,7 @@ fn collect(path: &Path, deep: usize, found: &mut Vec<PathBuf>) {
     if deep > MOST_DEEP || !LISTS.contains(&ending(path).as_str()) {
         return;
     }
-    let Ok(Document::List(list)) = Source::open(path, ".vtu").and_then(|source| parse(&source, TimeStep::Last)) else { return };
+    let Ok(Document::List(list)) = Source::open(path, ".vtu").and_then(|source| document(&source, TimeStep::Last)) else { return };
     let folder = path.parent().unwrap_or(Path::new(""));
     for listed in list.files.iter().map(|file| folder.join(&file.path)).take(MOST_FILES) {
         collect(&listed, deep + 1, found);
@@ -180,7 +187,7 @@ impl Found<'_, '_> {
                 Err(error) => return fail(format!("the listed file cannot be read ({error})")),
             };
             self.bytes += opened.len();
-            match parse(&opened, self.options.step)? {
+            match document(&opened, self.options.step)? {
                 Document::Grid(mut skeleton) => {
                     self.warnings.extend(std::mem::take(&mut skeleton.warnings));
                     let grid = Grid::new(Origin::Listed(path), skeleton, self.blocks, opened.len(), self.options);
