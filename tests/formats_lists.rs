@@ -283,7 +283,8 @@ fn a_shared_list_is_the_file_with_its_pieces() {
 #[test]
 fn a_series_in_json() {
     let folder = folder();
-    let entries = r#"{"name": "c/grid.vtu", "time": 10}, {"name": "a & b/grid.vtu", "time": 9.5}"#;
+    let entries = r#"{"name": "c/grid.vtu", "time": 10},
+        {"name": "a & b/grid.vtu", "time": 9.5}"#;
     let series = format!(r#"{{ "file-series-version": "1.0", "files": [{entries}] }}"#);
     let path = folder.path().join("run.vtu.series");
     fs::write(&path, &series).unwrap();
@@ -293,7 +294,7 @@ fn a_series_in_json() {
         assert!(report.warnings[0].starts_with(&format!("time step {number} of 0 to 1 is read")), "{:?}", report.warnings);
     }
     let error = read(&folder, "run.vtu.series", &series.replace("a & b/", "d/")).unwrap_err();
-    assert!(error.contains("`d/grid.vtu`: there is no such file"), "{error}");
+    assert!(error.contains("line 2: `d/grid.vtu`: there is no such file"), "{error}");
     let error = read(&folder, "run.vtu.series", "{\n\"files\": 3}").unwrap_err();
     assert!(error.starts_with("run.vtu.series: as a series in JSON: invalid type: integer `3`, expected a sequence at line 2"), "{error}");
     assert_eq!(listed_files(&path).len(), 0, "a broken list names nothing");

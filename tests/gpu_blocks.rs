@@ -58,7 +58,15 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     assert_eq!(locate_all(gpu, memory, &asked, SILENT).unwrap().answer, whole);
     for within in [0.7, f32::INFINITY] {
         let whole = query::nearest(&tree, &points, within, SILENT).unwrap();
-        let found = nearest(gpu, memory, &asked, within, SILENT).unwrap();
+        let told = RefCell::new(Vec::new());
+        let report = |done, all| {
+            told.borrow_mut().push((done, all));
+            Ok(())
+        };
+        let found = nearest(gpu, memory, &asked, within, &report).unwrap();
+        // Every block is asked about every point, so the first block is no more than a part of the work.
+        assert!(told.borrow()[0].0 < points.len() as u64 / 2, "{told:?}");
+        rises(&told, points.len() as u64);
         assert!(found.answer.owners == whole.owners && found.answer.barycentrics == whole.barycentrics && found.trees > 4);
         assert_eq!(bits(&found.answer.distances()), bits(&whole.distances()));
         assert!(whole.owners.iter().filter(|&&owner| owner != u32::MAX).count() > 500);

@@ -1,6 +1,7 @@
 #version 460
-// Splits, 2 of 3, before and after their scan: plans the nodes. STAGE 0 computes the length of the table of splits from the number of entries. STAGE 1 computes NO
-// and the dispatches over the leaves and over the nodes of each level from the scanned table.
+// Splits, 2 of 3, before and after their scan: plans the nodes. STAGE 0 computes the length of the table of splits from
+// the number of entries. STAGE 1 computes NO and the dispatches over the leaves and over the nodes of each level from the
+// scanned table.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

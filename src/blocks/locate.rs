@@ -107,7 +107,7 @@ pub(super) fn each(
     let LocateRequest { mesh, ref options, points, .. } = *asked;
     let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
-    let mut job = Job { gpu, points, done: 0.0, took: InBlocks::default(), ask, report };
+    let mut job = Job { gpu, points, done: 0.0, told: 0, took: InBlocks::default(), ask, report };
     if least_bytes(gpu, mesh, options)? <= memory {
         let whole = job.took.place(gpu, mesh, options, 0);
         let answered = unless_too_large(whole.and_then(|placed| job.ask(&placed, None, &all, 1.0)))?;
@@ -155,6 +155,8 @@ struct Job<'a> {
     points: &'a [[f32; 3]],
     /// Points done so far; of one that several blocks are asked about, their shares.
     done: f64,
+    /// The most that was reported: a block that turns out not to fit is done again, and progress waits until then.
+    told: u64,
     took: InBlocks,
     ask: Ask<'a>,
     report: Progress<'a>,
@@ -183,7 +185,8 @@ impl Job<'_> {
     /// Reports that a share of the work on some points is done.
     fn advance(&mut self, points: usize, share: f64) -> Result<()> {
         self.done += share * points as f64;
-        (self.report)(self.done as u64, self.points.len() as u64)
+        self.told = self.told.max(self.done as u64);
+        (self.report)(self.told, self.points.len() as u64)
     }
 
     fn end(&self) -> InBlocks {

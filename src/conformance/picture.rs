@@ -63,7 +63,7 @@ pub(crate) fn check(gpu: &Gpu, case: &PictureCase, twin: &mut Twin, device: &Dev
         let scene = Drawing::new(&twin.mesh, &twin.topology, built.tree(), &field, &settings)?;
         let plan = scene.plan();
         let tree = Tree::build(gpu, device, &options)?;
-        let normals = &scene.prepared.normals;
+        let normals = &scene.prepared().normals;
         let normals = (!normals.is_empty()).then_some(normals.as_slice());
         let drawn = render(&tree, plan, (&field.values, field.on), normals, SILENT)?;
         let pixels = plan.pixels(&drawn.colors, 1);

@@ -27,7 +27,8 @@ pub(super) fn read(source: &Source) -> Result<List> {
     let series: Series = serde_json::from_slice(&text).map_err(|error| source.error(format!("as a series in JSON: {error}")))?;
     let listed = |(i, file): (usize, Entry)| {
         let step = file.time.map_or_else(|| i.to_string(), |time| time.to_string());
-        Listed { path: file.name, step: Some(step), block: 0, at: 0 }
+        let at = memchr::memmem::find(&text, file.name.as_bytes()).unwrap_or(0);
+        Listed { path: file.name, step: Some(step), block: 0, at }
     };
     Ok(List { format: "ParaView series".into(), files: series.files.into_iter().enumerate().map(listed).collect() })
 }

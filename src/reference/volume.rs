@@ -44,7 +44,7 @@ pub struct Drawing<'a> {
     pub(crate) topology: &'a Topology,
     pub(crate) tree: &'a TreeArrays,
     pub(crate) field: &'a Field,
-    pub(crate) prepared: Prepared,
+    prepared: Prepared,
     /// One bit per node, set if something is visible there; `None` if no value of the field is transparent.
     pub(crate) visible: Option<Vec<u32>>,
     pub(crate) ranges_ms: f64,
