@@ -4,6 +4,7 @@
 mod assign;
 mod boundary;
 mod build;
+mod grid;
 mod lists;
 mod locate;
 mod nearest;

@@ -118,8 +118,11 @@ fn table(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
         write!(file, ",{}", csv_field(name))?;
     }
     writeln!(file)?;
-    for (i, (([x, y, z], owner), [a, b, c, d])) in located.points.iter().zip(located.owner).zip(located.bary).enumerate() {
-        write!(file, "{x},{y},{z},{owner},{a},{b},{c},{d}")?;
+    for (i, (([x, y, z], owner), bary)) in located.points.iter().zip(located.owner).zip(located.bary).enumerate() {
+        write!(file, "{x},{y},{z},{owner}")?;
+        for b in bary {
+            write!(file, ",{}", b + 0.0)?; // 0 instead of -0
+        }
         for (_, values) in located.values {
             write!(file, ",{}", values[i])?;
         }
