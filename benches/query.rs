@@ -65,15 +65,12 @@ fn location(c: &mut Criterion) {
     let lbvh = Lbvh::build(&gpu, &on_device).expect("a tree");
     let locate = || lbvh.locate(&points, TOLERANCE).expect("owners");
     let run = |iterations: u64| -> Duration {
-        let milliseconds = (0..iterations).flat_map(|_| locate().stages).map(|s| s.milliseconds).sum::<f64>();
+        let milliseconds = (0..iterations).map(|_| locate().times.total()).sum::<f64>();
         Duration::from_secs_f64(milliseconds * 1e-3)
     };
     assert!(expected.as_ref() == Some(&locate().owners), "the LBVH finds other owners");
     group.bench_function(BenchmarkId::new("lbvh", "Apetrei 2014"), |b| b.iter_custom(run));
 }
-
-/// A figure taken from a finished picture.
-type Part = fn(&query::Rendered) -> f64;
 
 fn rendering(c: &mut Criterion) {
     let (gpu, mesh) = setting();
@@ -89,15 +86,14 @@ fn rendering(c: &mut Criterion) {
     let first = draw();
     assert!(first.stats.found_samples > 0 && first.colors == draw().colors, "two pictures differ");
     let mut group = c.benchmark_group("render");
-    assert!(first.stats.march_ms > 0.0, "this device has no timestamps, which every figure here is taken from");
+    assert!(first.times.milliseconds("query.march") > 0.0, "this device has no timestamps, which every figure here is taken from");
     group.sample_size(10);
     // Rays and samples.
     let rays = u64::from(settings.size[0] * settings.size[1]);
-    for (name, items, part) in
-        [("intervals", rays, (|d| d.stats.interval_ms) as Part), ("march", first.stats.samples, |d| d.stats.march_ms)]
-    {
+    for (name, items) in [("intervals", rays), ("march", first.stats.samples)] {
         group.throughput(Throughput::Elements(items));
-        let run = |iterations: u64| -> Duration { (0..iterations).map(|_| Duration::from_secs_f64(part(&draw()) * 1e-3)).sum() };
+        let took = || Duration::from_secs_f64(draw().times.milliseconds(&format!("query.{name}")) * 1e-3);
+        let run = |iterations: u64| -> Duration { (0..iterations).map(|_| took()).sum() };
         group.bench_function(BenchmarkId::new(name, "256x256"), |b| b.iter_custom(run));
     }
 }

@@ -121,6 +121,7 @@ pub mod query;
 pub mod reference;
 pub mod render;
 pub mod slicing;
+pub mod times;
 pub mod tree;
 #[cfg(feature = "cli")]
 pub mod tune;

@@ -94,7 +94,7 @@ named!(Lists, "kind of lists", [All = "all", Boundary = "boundary"]);
 named!(Fineness, "fineness", [Alpha = "alpha", Points = "points", Pictures = "pictures"]);
 
 /// Options of a build.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct BuildOptions {
     /// The paper's α in 0…10: how many levels coarser than the cells' size the leaves are.
     pub alpha: f32,
@@ -132,22 +132,6 @@ pub const LEAST_USUAL: u32 = 1 << 20;
 /// listed by hundreds of leaves.
 pub fn usual_capacity(tets: u32) -> u32 {
     tets.saturating_mul(USUAL_ENTRIES).max(LEAST_USUAL)
-}
-
-impl Default for BuildOptions {
-    fn default() -> Self {
-        Self {
-            alpha: 0.0,
-            assign: Assign::default(),
-            lists: Lists::default(),
-            boxes: false,
-            slabs: false,
-            capacity: None,
-            budget: None,
-            level: None,
-            fineness: Fineness::Alpha,
-        }
-    }
 }
 
 impl BuildOptions {

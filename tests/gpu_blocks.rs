@@ -38,12 +38,12 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
     let how = LocateOptions { tolerance, method };
     let device = DeviceMesh::upload(gpu, mesh, BadCells::Skip).unwrap();
     let tree = Tree::build(gpu, &device, options).unwrap();
-    let asked = LocateRequest { mesh, options: *options, points: &points, how };
+    let asked = LocateRequest { mesh, options: *options, points: &points };
     let mut most = 0;
     for field in mesh.fields.iter().filter(|f| f.on == on) {
         let field = (&field.values[..], field.on);
         let whole = query::locate(&tree, &points, Some(field), &how, SILENT).unwrap();
-        let found = locate(gpu, memory, &asked, Some(field), SILENT).unwrap();
+        let found = locate(gpu, memory, &asked, Some(field), &how, SILENT).unwrap();
         let first = (0..points.len()).find(|&i| found.answer.owners[i] != whole.owners[i]);
         let first = first.map(|i| (points[i], found.answer.owners[i], whole.owners[i]));
         assert_eq!(first, None, "{options:?}");
@@ -55,7 +55,7 @@ fn check(gpu: &Gpu, mesh: &Mesh, options: &BuildOptions, memory: u64, (tolerance
         most = most.max(found.trees);
     }
     let whole = query::locate_all(&tree, &points, how.tolerance, SILENT).unwrap();
-    assert_eq!(locate_all(gpu, memory, &asked, SILENT).unwrap().answer, whole);
+    assert_eq!(locate_all(gpu, memory, &asked, tolerance, SILENT).unwrap().answer.owners, whole.owners);
     for within in [0.7, f32::INFINITY] {
         let whole = query::nearest(&tree, &points, within, SILENT).unwrap();
         let told = RefCell::new(Vec::new());
@@ -120,16 +120,16 @@ fn located(gpu: &Gpu, mesh: &Mesh) {
 fn refused(gpu: &Gpu, mesh: &Mesh) {
     let options = BuildOptions::default();
     let points = points(mesh, 100);
-    let asked = LocateRequest { mesh, options, points: &points, how: LocateOptions::default() };
-    let found = locate(gpu, 64 << 20, &asked, None, SILENT).unwrap();
+    let asked = LocateRequest { mesh, options, points: &points };
+    let found = locate(gpu, 64 << 20, &asked, None, &LocateOptions::default(), SILENT).unwrap();
     assert_eq!((found.trees, found.bad_cells), (1, [mesh.tets.len().div_ceil(997) as u32, 0]));
-    let refused = locate(gpu, 1 << 14, &asked, None, SILENT).unwrap_err();
+    let refused = locate(gpu, 1 << 14, &asked, None, &LocateOptions::default(), SILENT).unwrap_err();
     assert!(matches!(&refused, Error::TooLarge(why) if why.contains("16384 bytes")), "{refused}");
     // Blocks as small as these are not cut, so they are asked for few points at a time.
     let small = kuhn_jittered([3; 3], 0.1, 1).unwrap();
     let points: Vec<[f32; 3]> = (0..20_000).map(|i| [i as f32 * 1.5e-4, 1.5, 1.5]).collect();
-    let asked = LocateRequest { mesh: &small, options, points: &points, how: LocateOptions::default() };
-    let found = locate(gpu, 200 << 10, &asked, None, SILENT).unwrap();
+    let asked = LocateRequest { mesh: &small, options, points: &points };
+    let found = locate(gpu, 200 << 10, &asked, None, &LocateOptions::default(), SILENT).unwrap();
     assert!(found.trees == 1 && !found.answer.owners.contains(&u32::MAX), "{} trees", found.trees);
 }
 
@@ -141,9 +141,7 @@ fn remedied(gpu: &Gpu) {
     let settings = RenderSettings { size: [300, 20], ..RenderSettings::default() };
     let voxels = &SliceSettings { size: [500, 0], ..SliceSettings::default() }.voxels([0.0; 3], [1.0; 3], [0.0; 3]).unwrap();
     let queries: [&dyn Fn(u64) -> olbvh::Result<u32>; 4] = [
-        &|memory| {
-            Ok(locate(gpu, memory, &LocateRequest { mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)?.trees)
-        },
+        &|memory| Ok(locate(gpu, memory, &LocateRequest { mesh, options, points: &points }, None, &LocateOptions::default(), SILENT)?.trees),
         &|memory| Ok(render(gpu, memory, &RenderRequest { mesh, options, field, settings: &settings }, SILENT)?.trees),
         &|memory| {
             let asked = SliceRequest { mesh, options, field: Some(field), voxels, extrapolate: Extrapolate::Nearest };
@@ -170,7 +168,7 @@ fn flat(gpu: &Gpu) {
         mesh.tets.iter().map(|ids| [0, 1, 2].map(|c| ids.iter().map(|&v| 0.25 * mesh.points[v as usize][c]).sum())).collect();
     let ask = |fineness| {
         let options = BuildOptions { fineness, ..BuildOptions::default() };
-        locate(gpu, 768 << 10, &LocateRequest { mesh: &mesh, options, points: &points, how: LocateOptions::default() }, None, SILENT)
+        locate(gpu, 768 << 10, &LocateRequest { mesh: &mesh, options, points: &points }, None, &LocateOptions::default(), SILENT)
     };
     assert!(matches!(ask(Fineness::Alpha), Err(Error::TooLarge(_))));
     let found = ask(Fineness::Points).unwrap();
@@ -272,7 +270,7 @@ fn sliced(gpu: &Gpu, mesh: &Mesh) {
         println!("{settings:?}: {whole:?}, {} trees, peak {}", found.trees, found.peak);
         let first = (0..all[0].len()).find(|&i| all[0].get(i) != all[1].get(i));
         assert_eq!(first.map(|i| (i, all[0][i], all[1].get(i).copied())), None, "{settings:?}");
-        assert!(whole.inside > 100 && whole.touched > 50 && found.answer == whole, "{whole:?}");
+        assert!(whole.inside > 100 && whole.touched > 50 && found.answer.tally == whole, "{whole:?}");
         assert!(found.trees > 2 && found.peak <= memory, "{} trees, {} bytes", found.trees, found.peak);
         assert_eq!(found.bad_cells, [device.status().bad, 0]);
     }
@@ -297,8 +295,8 @@ fn far(gpu: &Gpu, mesh: &Mesh) {
         };
         let (whole, owners) = of(64 << 20);
         let (found, in_blocks) = of(640 << 10);
-        assert!(whole.trees == 1 && whole.answer.inside > 500 && found.trees > 1, "{whole:?}, {found:?}");
-        assert!(whole.answer == found.answer && owners == in_blocks, "{:?}, in blocks {:?}", whole.answer, found.answer);
+        assert!(whole.trees == 1 && whole.answer.tally.inside > 500 && found.trees > 1, "{whole:?}, {found:?}");
+        assert!(whole.answer.tally == found.answer.tally && owners == in_blocks, "{:?}, in blocks {:?}", whole.answer, found.answer);
     }
 }
 
@@ -314,7 +312,7 @@ fn passed_over(gpu: &Gpu) {
         slice(gpu, 1 << 20, &asked, SILENT, &mut |_| Ok(()))
     };
     let below = ask(2.0).unwrap();
-    assert!(below.trees > 1 && below.answer.inside > 300, "{below:?}");
+    assert!(below.trees > 1 && below.answer.tally.inside > 300, "{below:?}");
     assert!(matches!(ask(11.5), Err(Error::TooLarge(_))));
 }
 
@@ -462,5 +460,5 @@ fn crowded_vertices_are_known_to_every_block() {
     };
     let found = slice(gpu, 440_000, &asked, SILENT, &mut sink).unwrap();
     let other = (0..owners[0].len()).filter(|&i| owners[0][i] != owners[1][i]).count();
-    assert!(found.trees > 2 && found.answer.inside > 10_000 && other == 0, "{} trees: {other} other owners", found.trees);
+    assert!(found.trees > 2 && found.answer.tally.inside > 10_000 && other == 0, "{} trees: {other} other owners", found.trees);
 }

@@ -271,7 +271,7 @@ fn check(binding: Binding) {
                 continue;
             }
             // A point outside of the surface is owned by the nearest tetrahedron, and no tetrahedron contains it.
-            assert!(owners as usize == all[i].len() || owners == 0, "{what}: {owners} owners of {:?}", all[i]);
+            assert!(owners as usize == all.owners[i].len() || owners == 0, "{what}: {owners} owners of {:?}", all.owners[i]);
             assert_eq!(weights.to_vec(), bits(&expected.barycentrics[i]), "{what}");
             assert_eq!(value, expected.values[i].to_bits(), "{what}");
             let p = points[i];

@@ -91,7 +91,7 @@ impl Subject {
             }
         }
         let lists = locate_all(&tree, &points, TOLERANCE, SILENT).unwrap();
-        for (i, list) in lists.iter().enumerate() {
+        for (i, list) in lists.owners.iter().enumerate() {
             assert_eq!(&locator.owners(points[i]), list, "all owners: {}", what(i));
         }
         // Every point has the owner of the point before as its hint.

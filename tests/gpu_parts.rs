@@ -10,12 +10,12 @@ use olbvh::gpu::{Arena, BufferRef, Gpu, GpuOptions, Recorder};
 use olbvh::kernels::DeviceClass;
 use olbvh::layout::ViewUniforms;
 use olbvh::mesh::{On, kuhn};
-use olbvh::options::BuildOptions;
+use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::{Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput,
-    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, cmd_count_owners, cmd_interpolate, cmd_list_owners, cmd_list_pairs, cmd_locate,
-    cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
+    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
+    cmd_list_pairs, cmd_locate, cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
 };
 use olbvh::render::TABLE_SIZE;
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -186,6 +186,33 @@ fn searches_begin_with_a_round() {
     lab.rehearse(|r| cmd_overlap(r, &scene, &scene, &memory, Rounds::begin(1))).unwrap();
     let memory = PairMemory::carve(&lab.gpu, &mut Arena::new(lab.memory.all()), lab.device.input().tets).unwrap();
     too_few_rounds(&lab.rehearse(|r| cmd_list_pairs(r, &scene, &scene, &memory, lab.part(64), Rounds::begin(0))));
+}
+
+/// Overlaps take memory for these two meshes, in this order.
+#[test]
+fn overlaps() {
+    let lab = Lab::new();
+    let scene = Scene::of(&lab.tree);
+    let with = |points: u32, tets: u32| {
+        let mut more = scene;
+        (more.mesh.input.points, more.mesh.input.tets) = (scene.mesh.input.points + points, scene.mesh.input.tets + tets);
+        more
+    };
+    let memory = OverlapMemory::carve(&mut Arena::new(lab.memory.all()), &scene, &scene).unwrap();
+    let overlap = |a: &Scene, b: &Scene| lab.rehearse(|r| cmd_overlap(r, a, b, &memory, Rounds::begin(1)));
+    overlap(&scene, &scene).unwrap();
+    refused(overlap(&with(1, 0), &scene), "places of vertices");
+    refused(overlap(&scene, &with(1, 0)), "places of vertices");
+    refused(overlap(&with(0, 1), &scene), "tetrahedra to be searched for");
+    refused(overlap(&scene, &with(0, 32)), "tetrahedra around vertices");
+
+    let whole = Tree::build(&lab.gpu, &lab.device, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
+    let (whole, more) = (Scene::of(&whole), with(0, 1));
+    let memory = PairMemory::carve(&lab.gpu, &mut Arena::new(lab.memory.all()), scene.mesh.input.tets).unwrap();
+    let count = |a: &Scene| lab.rehearse(|r| cmd_count_pairs(r, a, &whole, &memory, Rounds::begin(1)));
+    let list = |a: &Scene| lab.rehearse(|r| cmd_list_pairs(r, a, &whole, &memory, lab.part(64), Rounds::begin(1)));
+    count(&scene).and_then(|()| list(&scene)).unwrap();
+    [count(&more), list(&more)].into_iter().for_each(|result| refused(result, "counts of pairs"));
 }
 
 /// Keys have 32 bits, so that a sort by more of them sorts by all, in the place that it says.

@@ -172,7 +172,7 @@ fn all_owners_of_points_on_a_crowded_edge() {
     let all = points.len() as u64;
     assert_eq!(told.into_inner(), [at_once as u64, 2 * at_once as u64, all].map(|done| (done, all)));
     assert_eq!((0..points.len()).filter(|&i| on_edge(i)).count(), 5);
-    for (i, owners) in found.iter().enumerate() {
+    for (i, owners) in found.owners.iter().enumerate() {
         assert!(if on_edge(i) { owners.iter().copied().eq(0..n) } else { owners.is_empty() }, "point {i}: {} owners", owners.len());
     }
 }
@@ -192,7 +192,7 @@ fn long_lists_are_searched_to_their_end() {
     let owners = found(&single);
     assert!(owners == found(&fine) && owners.iter().all(|&owner| owner != u32::MAX), "{owners:?}");
     let all = locate_all(&single, &points, 0.0, SILENT).unwrap();
-    assert!(all.iter().zip(&owners).all(|(all, owner)| all.first() == Some(owner)), "{all:?}");
+    assert!(all.owners.iter().zip(&owners).all(|(all, owner)| all.first() == Some(owner)), "{all:?}");
     let other = Mesh::new(
         points
             .iter()

@@ -95,7 +95,7 @@ fn what_rays_find_is_right(binding: Binding, method: RayMethod) {
         let surface = device.neighbours().unwrap().iter().flatten().filter(|&&n| n == u32::MAX).count();
         assert_eq!(2 * rays.faces() as usize, 4 * mesh.tets.len() + surface);
         assert!(structure.bytes() <= structure.built_bytes() + 4096 && rays.bytes() > structure.bytes());
-        let stages: Vec<&str> = rays.stages().iter().map(|s| s.name.as_str()).collect();
+        let stages: Vec<&str> = rays.times().stages.iter().map(|s| s.name.as_str()).collect();
         let faces = "rays.faces";
         assert_eq!(stages, [faces, faces, "acceleration.build", "acceleration.compact", "acceleration.scene"]);
     }

@@ -49,9 +49,9 @@ fn walks_count_as_work() {
     let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
     let plan = PicturePlan::new(&settings, &tree.grid().into(), mesh.origin, field.range()).unwrap();
     let all = PicturePlan { visible_values: vec![[f32::NEG_INFINITY, f32::INFINITY]], termination: 2.0, ..plan };
-    let stats = query::render(&tree, &all, (&field.values, field.on), None, SILENT).unwrap().stats;
+    let drawn = query::render(&tree, &all, (&field.values, field.on), None, SILENT).unwrap();
     // Each of these rays takes 800 samples in the mesh, each of which tests some forty tetrahedra.
-    assert!(stats.found_samples > 40_000 && (10..100).contains(&stats.submissions), "{stats:?}");
+    assert!(drawn.stats.found_samples > 40_000 && (10..100).contains(&drawn.times.submissions), "{:?}, {}", drawn.stats, drawn.times);
 }
 
 /// A caller that has had enough ends a call at its first report, and what the call used is free for the next one.
@@ -75,7 +75,7 @@ fn calls_can_be_cancelled() {
     let memory = 1 << 30;
     let how = LocateOptions::default();
     let options = BuildOptions::default();
-    let asked = blocks::LocateRequest { mesh: &mesh, options, points: &mesh.points, how };
+    let asked = blocks::LocateRequest { mesh: &mesh, options, points: &mesh.points };
     let ends: [(&str, Result<()>); 8] = [
         ("locate", query::locate(&tree, &mesh.points, None, &how, &enough).map(drop)),
         ("locate_all", query::locate_all(&tree, &mesh.points, 0.0, &enough).map(drop)),
@@ -83,7 +83,7 @@ fn calls_can_be_cancelled() {
         ("overlap", query::overlap(&tree, &tree, false, &enough).map(drop)),
         ("pairs", query::overlap(&tree, &whole, true, &enough).map(drop)),
         ("slice", query::slice(&tree, None, &voxels, Extrapolate::Nearest, &enough, &mut |_| Ok(())).map(drop)),
-        ("blocks", blocks::locate(&gpu, memory, &asked, None, &enough).map(drop)),
+        ("blocks", blocks::locate(&gpu, memory, &asked, None, &how, &enough).map(drop)),
         ("render", {
             let plan = query::prepare_picture(&device, &mesh, field, &settings).unwrap();
             query::render(&tree, &plan.plan, (&field.values, field.on), Some(&plan.normals), &enough).map(drop)

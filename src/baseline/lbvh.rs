@@ -2,7 +2,7 @@
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder, StageTime};
+use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Groups, Recorder};
 use crate::kernels::{DeviceClass, LbvhCodes, LbvhCodesSpec, LbvhLocate, LbvhLocateSpec, LbvhMerge, LbvhMergeSpec};
 use crate::layout::{Grid, LbvhNode};
 use crate::mesh::On;
@@ -11,6 +11,7 @@ use crate::query::searched::{BinaryTree, Searched, Structure};
 use crate::query::{LocateOutput, Located, PointInput, Progress, Rendered, Rounds, Sliced, numbered, render_in, slice_in};
 use crate::render::PicturePlan;
 use crate::slicing::{Band, Extrapolate, VoxelGrid};
+use crate::times::StageTimes;
 
 /// Bits of a code: ten per axis, and one that sorts bad tetrahedra last.
 const CODE_BITS: u32 = 31;
@@ -26,7 +27,7 @@ pub struct Lbvh {
     pub(super) grid: Grid,
     pub(super) tree: BinaryTree,
     pub(super) valid: u32,
-    stages: Vec<StageTime>,
+    times: StageTimes,
     memory: Buffer,
 }
 
@@ -171,9 +172,9 @@ impl Lbvh {
         let (memory, tree) = Arena::reserve(gpu, "olbvh.lbvh.tree", carve)?;
         let carve = |a: &mut Arena| LbvhScratch::carve(gpu, a, tets);
         let (_buffer, scratch) = Arena::reserve(gpu, "olbvh.lbvh.scratch", carve)?;
-        let ((), time) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
+        let ((), times) = gpu.submit("olbvh.lbvh.build", |r| cmd_build_lbvh(r, &view, &tree, &scratch))?;
         let valid = tets - mesh.status().bad;
-        Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), grid: *mesh.grid(), tree, valid, stages: time.stages, memory })
+        Ok(Self { gpu: gpu.clone(), mesh: mesh.kept(), grid: *mesh.grid(), tree, valid, times, memory })
     }
 
     /// Bytes of the tree: a node of 32 bytes per split, a word per valid tetrahedron.
@@ -181,9 +182,9 @@ impl Lbvh {
         u64::from(self.valid.saturating_sub(1)) * size_of::<LbvhNode>() as u64 + 4 * u64::from(self.valid)
     }
 
-    /// Device time of every stage, in order.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
+    /// What the build took.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
     }
 
     /// Reads the tree back to host memory.
@@ -215,7 +216,7 @@ impl Lbvh {
         let (mut located, mut rounds) = (Located::default(), Rounds::begin(1));
         loop {
             let record = |r: &mut Recorder<'_>| cmd_locate_lbvh(r, (&view, &self.tree), asked, &output, unfinished, tolerance, rounds);
-            located.stages.extend(gpu.submit("olbvh.lbvh.locate", record)?.1.stages);
+            located.times.add(gpu.submit("olbvh.lbvh.locate", record)?.1);
             rounds = Rounds::resume(1);
             if gpu.download::<u32>(&memory, unfinished.part(0, 4))?.first() == Some(&0) {
                 break;

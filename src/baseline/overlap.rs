@@ -86,7 +86,7 @@ impl Lbvh {
         let statuses = loop {
             let ((), time) = gpu.submit("olbvh.lbvh.overlap", |r| {
                 for direction in &directions {
-                    if done.submissions == 0 {
+                    if done.times.submissions == 0 {
                         for part in [direction.places, direction.hits, direction.status] {
                             r.fill(part, 0);
                         }
@@ -97,8 +97,7 @@ impl Lbvh {
                 r.barrier("lbvh.clear → lbvh.overlap");
                 r.stage("lbvh.overlap", |r| directions.iter().try_for_each(|w| w.cmd_search(r)))
             })?;
-            done.submissions += 1;
-            done.stages.extend(time.stages);
+            done.times.add(time);
             let mut statuses = [OverlapStatus::default(); 2];
             for (status, direction) in statuses.iter_mut().zip(&directions) {
                 *status = gpu.download_one(&memory, direction.status)?;

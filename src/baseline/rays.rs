@@ -8,11 +8,12 @@
 
 use crate::build::{DeviceMesh, KeptMesh, MeshArrays, MeshInput, MeshView};
 use crate::error::Result;
-use crate::gpu::{AccelerationStructure, Arena, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, StageTime, Triangles};
+use crate::gpu::{AccelerationStructure, Arena, Buffer, BufferRef, Gpu, Groups, RayPipeline, Recorder, Triangles};
 use crate::kernels::{FaceHit, FaceMissed, ListFaces, ListFacesSpec, LocateByPipeline, LocateByQuery, LocateByQuerySpec};
 use crate::layout::constants::locate_by_ray::SCALE;
 use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::query::{LocateOutput, Located, PointInput, numbered};
+use crate::times::StageTimes;
 
 /// The way in which rays are traced.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -45,7 +46,7 @@ pub struct Rays {
     faces: u32,
     sides: Buffer,
     longest: BufferRef,
-    stages: Vec<StageTime>,
+    times: StageTimes,
     _memory: Buffer,
 }
 
@@ -74,26 +75,25 @@ impl Rays {
             let spec = ListFacesSpec { workgroup, fill, ..Default::default() };
             r.stage("rays.faces", |r| r.dispatch(&arguments, spec, Groups::Count(tets.div_ceil(workgroup))))
         };
-        let ((), time) = gpu.submit("olbvh.rays.count", |r| {
+        let ((), mut times) = gpu.submit("olbvh.rays.count", |r| {
             r.fill(longest, 0);
             r.barrier("clear → rays.faces");
             list(r, 0, gpu.nothing(), gpu.nothing())?;
             cmd_exclusive_scan(r, places, places, total, Count::host(tets), &scan)
         })?;
-        let mut stages = time.stages;
         let faces: u32 = gpu.download_one(&counts, total)?;
         let indices = gpu.buffer("olbvh.rays.indices", 12 * u64::from(faces))?;
         let sides = gpu.buffer("olbvh.rays.sides", 8 * u64::from(faces))?;
         let ((), time) = gpu.submit("olbvh.rays.list", |r| list(r, 1, indices.all(), sides.all()))?;
-        stages.extend(time.stages);
+        times.add(time);
         let triangles = Triangles { vertices, points, indices: indices.all(), count: faces, scale: SCALE };
         let structure = AccelerationStructure::build(gpu, &triangles)?;
-        stages.extend_from_slice(structure.stages());
+        times.add(structure.times().clone());
         let pipeline = match method {
             RayMethod::Query => None,
             RayMethod::Pipeline => Some(Box::new(RayPipeline::new::<LocateByPipeline, FaceMissed, FaceHit>(gpu)?)),
         };
-        Ok(Some(Self { gpu: gpu.clone(), mesh: mesh.kept(), pipeline, structure, faces, sides, longest, stages, _memory: memory }))
+        Ok(Some(Self { gpu: gpu.clone(), mesh: mesh.kept(), pipeline, structure, faces, sides, longest, times, _memory: memory }))
     }
 
     /// The acceleration structure.
@@ -111,9 +111,9 @@ impl Rays {
         self.structure.bytes() + self.sides.size()
     }
 
-    /// Device time of every stage, in order.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
+    /// What the build took.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
     }
 
     /// Records point location in the mesh of the structure, without hints. The result is a tetrahedron that contains the
@@ -156,11 +156,11 @@ impl Rays {
         let (memory, (owners, barycentrics)) = Arena::reserve(&self.gpu, "olbvh.rays.located", carve)?;
         let input = PointInput { points: uploaded.all(), stride: 3, count, hints: None, order: None };
         let output = LocateOutput { owners, barycentrics };
-        let ((), time) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, &input, &output))?;
+        let ((), times) = self.gpu.submit("olbvh.rays.locate", |r| self.cmd_locate(r, &input, &output))?;
         Ok(Located {
             owners: self.gpu.download(&memory, owners.part(0, 4 * n))?,
             barycentrics: self.gpu.download(&memory, barycentrics.part(0, 16 * n))?,
-            stages: time.stages,
+            times,
             ..Located::default()
         })
     }

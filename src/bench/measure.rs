@@ -2,7 +2,7 @@
 
 use super::load::Load;
 use crate::error::Result;
-use crate::gpu::StageTime;
+use crate::times::{StageTime, StageTimes};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::time::Instant;
@@ -62,7 +62,7 @@ impl Timing {
 #[derive(Clone, Debug, Default)]
 pub(super) struct Runs {
     walls: Vec<f64>,
-    stages: Vec<Vec<StageTime>>,
+    device: Vec<StageTimes>,
 }
 
 impl Runs {
@@ -73,13 +73,13 @@ impl Runs {
     /// The times of one stage, or of all stages together.
     pub(super) fn timing(&self, stage: Option<&str>) -> Timing {
         let chosen = |s: &&StageTime| stage.is_none_or(|name| s.name == name);
-        let sums = self.stages.iter().map(|run| StageTime::sum(run.iter().filter(chosen)));
+        let sums = self.device.iter().map(|run| StageTime::sum(run.stages.iter().filter(chosen)));
         let mut by_name: BTreeMap<String, Vec<f64>> = BTreeMap::new();
-        for (i, run) in self.stages.iter().enumerate() {
-            for s in run.iter().filter(chosen) {
+        for (i, run) in self.device.iter().enumerate() {
+            for s in run.stages.iter().filter(chosen) {
                 let times = by_name.entry(s.name.clone()).or_default();
-                times.resize(self.stages.len(), 0.0);
-                times[i] += s.milliseconds;
+                times.resize(self.device.len(), 0.0);
+                times[i] = s.milliseconds;
             }
         }
         let none = Spread { min: 0.0, median: 0.0, max: 0.0 };
@@ -92,16 +92,16 @@ impl Runs {
     }
 }
 
-/// Repeats `once`, which returns the times of its stages, within a budget. The caller has run the same work before, so
+/// Repeats `once`, which returns what it took, within a budget. The caller has run the same work before, so
 /// that no repetition includes the costs of a first run. `load` keeps the device at its clock before each repetition.
-pub(super) fn repeat(load: &Load, budget: &Budget, mut once: impl FnMut() -> Result<Vec<StageTime>>) -> Result<Runs> {
+pub(super) fn repeat(load: &Load, budget: &Budget, mut once: impl FnMut() -> Result<StageTimes>) -> Result<Runs> {
     let (start, mut runs) = (Instant::now(), Runs::default());
     while runs.is_empty() || (runs.walls.len() < budget.repetitions as usize && start.elapsed().as_secs_f64() < budget.seconds) {
         load.run()?;
         let begin = Instant::now();
-        let stages = once()?;
+        let times = once()?;
         runs.walls.push(begin.elapsed().as_secs_f64() * 1e3);
-        runs.stages.push(stages);
+        runs.device.push(times);
     }
     Ok(runs)
 }
@@ -116,13 +116,15 @@ mod tests {
         assert_eq!(Spread::of(times.to_vec()), Some(Spread { min: 1.0, median: 3.5, max: 10.0 }));
         assert_eq!(Spread::of(times[..3].to_vec()).map(|s| s.median), Some(3.0));
         let mut next = times.iter();
-        let stage = |name: &str, milliseconds| StageTime { name: name.into(), milliseconds };
-        let once = || Ok(vec![stage("a", *next.next().unwrap()), stage("b", 1.0), stage("b", 1.0)]);
+        let once = || {
+            let stage = |name: &str, milliseconds| StageTime { name: name.into(), milliseconds };
+            Ok(StageTimes { stages: vec![stage("a", *next.next().unwrap()), stage("b", 2.0)], submissions: 1 })
+        };
         let runs = repeat(&Load::none(), &Budget { repetitions: 3, seconds: 10.0 }, once).unwrap();
         let all = runs.timing(None);
         assert_eq!((all.repetitions, all.device_ms.unwrap().median, all.stages_ms["b"]), (3, 5.0, 2.0));
         assert_eq!(runs.timing(Some("a")).milliseconds(), 3.0);
-        let none = repeat(&Load::none(), &Budget { repetitions: 9, seconds: 0.0 }, || Ok(Vec::new())).unwrap().timing(None);
+        let none = repeat(&Load::none(), &Budget { repetitions: 9, seconds: 0.0 }, || Ok(StageTimes::default())).unwrap().timing(None);
         assert!(none.repetitions == 1 && none.device_ms.is_none());
     }
 }

@@ -52,9 +52,10 @@ pub use structure_report::{Figure, Lost, MemoryFigures, StageFigure, StructureRe
 pub use suite::{Settings, Suite};
 
 use crate::error::{Error, Result};
-use crate::gpu::{Gpu, StageTime};
+use crate::gpu::Gpu;
 use crate::mesh::Mesh;
 use crate::reference::boundary::{Topology, topology};
+use crate::times::StageTimes;
 use measure::{Runs, repeat};
 use structure::Structure;
 use subject::Subject;
@@ -128,7 +129,7 @@ fn measure(
         }
     };
     let (gpu, load) = (subject.gpu, &subject.load);
-    let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(Vec::new(), |s| s.stages().to_vec()));
+    let rebuilt = || Ok(Structure::build(gpu, &subject.device, kind)?.map_or(StageTimes::default(), |s| s.times().clone()));
     rebuilt()?; // `structure` still holds its memory, so the first one gets memory that the system has yet to give
     add(Quantity::Build, Some(repeat(load, budget, rebuilt)?), None, Some(u64::from(subject.device.input().tets)));
     for ((quantity, points), owners) in subject.points.iter().zip(&answers.owners) {
@@ -139,34 +140,22 @@ fn measure(
             if traversed == Some(quantity) && locate()?.owners != *owners {
                 return Err(Error::Mismatch(format!("{kind}: the traversal finds other owners than the descent")));
             }
-            let runs = repeat(load, budget, || Ok(locate()?.stages))?;
+            let runs = repeat(load, budget, || Ok(locate()?.times))?;
             add(quantity, Some(runs), None, Some(found as u64));
         }
     }
     if let Some((found, _)) = &answers.picture {
-        let drawn = || {
-            Ok(subject
-                .render(structure)?
-                .map_or(Vec::new(), |d| vec![time("intervals", d.stats.interval_ms), time("march", d.stats.march_ms)]))
-        };
-        let runs = repeat(load, budget, drawn)?;
-        add(Quantity::Intervals, Some(runs.clone()), Some("intervals"), None);
-        add(Quantity::March, Some(runs), Some("march"), Some(*found));
+        let runs = repeat(load, budget, || Ok(subject.render(structure)?.map_or(StageTimes::default(), |drawn| drawn.times)))?;
+        add(Quantity::Intervals, Some(runs.clone()), Some("query.intervals"), None);
+        add(Quantity::March, Some(runs), Some("query.march"), Some(*found));
     }
     if let Some((kinds, _)) = &answers.voxels {
-        let sliced = || {
-            let sliced = subject.slice(structure, &mut |_| Ok(()))?.unwrap_or_default();
-            Ok(vec![time("locate", sliced.locate_ms), time("touch", sliced.touch_ms), time("values", sliced.values_ms)])
-        };
+        let sliced = || Ok(subject.slice(structure, &mut |_| Ok(()))?.unwrap_or_default().times);
         add(Quantity::Slice, Some(repeat(load, budget, sliced)?), None, Some(kinds.len() as u64));
     }
     if let Some(moved) = moved {
-        let runs = repeat(load, budget, || Ok(structure.overlap(moved)?.map_or(Vec::new(), |found| found.stages)))?;
+        let runs = repeat(load, budget, || Ok(structure.overlap(moved)?.map_or(StageTimes::default(), |found| found.times)))?;
         add(Quantity::Overlap, Some(runs), None, None);
     }
     Ok(report)
-}
-
-fn time(name: &str, milliseconds: f64) -> StageTime {
-    StageTime { name: name.into(), milliseconds }
 }

@@ -4,9 +4,10 @@ use super::quantity::Quantity;
 use crate::baseline::{Lbvh, RayMethod, Rays};
 use crate::build::{DeviceMesh, Tree};
 use crate::error::Result;
-use crate::gpu::{Gpu, StageTime};
+use crate::gpu::Gpu;
 use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
 use crate::query::{self, LocateMethod, LocateOptions, Located, MOST_TRAVERSED, Overlapped, SILENT};
+use crate::times::StageTimes;
 
 /// A kind of structure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -93,11 +94,11 @@ impl Structure {
     }
 
     /// Device times of the stages of the construction.
-    pub(super) fn stages(&self) -> &[StageTime] {
+    pub(super) fn times(&self) -> &StageTimes {
         match self {
-            Self::Octree(tree) => tree.stages(),
-            Self::Lbvh(lbvh) => lbvh.stages(),
-            Self::Rays(rays) => rays.stages(),
+            Self::Octree(tree) => tree.times(),
+            Self::Lbvh(lbvh) => lbvh.times(),
+            Self::Rays(rays) => rays.times(),
         }
     }
 

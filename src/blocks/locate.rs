@@ -9,8 +9,9 @@ use crate::grid::CellRange;
 use crate::layout::NONE;
 use crate::mesh::{Mesh, On};
 use crate::options::{BuildOptions, POINT_CHUNK};
-use crate::query::{self, LocateOptions, Located, Progress, SILENT, numbered};
+use crate::query::{self, AllOwners, LocateOptions, Located, Progress, SILENT, numbered};
 use crate::reference::locate::place;
+use crate::times::StageTimes;
 use std::slice::from_ref;
 
 /// Bytes of device memory per point during point location, with a reserve.
@@ -27,8 +28,6 @@ pub struct LocateRequest<'a> {
     pub options: BuildOptions,
     /// The points, relative to the mesh's origin.
     pub points: &'a [[f32; 3]],
-    /// Options of the location.
-    pub how: LocateOptions,
 }
 
 /// Finds the owner of each point, as [`query::locate`] does, within `memory` bytes of device memory. `report` receives
@@ -42,41 +41,43 @@ pub fn locate(
     memory: u64,
     asked: &LocateRequest<'_>,
     field: Option<(&[f32], On)>,
+    how: &LocateOptions,
     report: Progress<'_>,
 ) -> Result<InBlocks<Located>> {
     let (mesh, n) = (asked.mesh, asked.points.len());
     check_field(mesh, field)?;
     let nan = f32::from_bits(0x7fc0_0000);
     let values = vec![nan; if field.is_some() { n } else { 0 }];
-    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, stages: Vec::new() };
+    let mut all = Located { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], values, times: StageTimes::default() };
     let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
         let here = field.map(|(values, on)| (placed.values(values, on), on));
         let here = here.as_ref().map(|(values, on)| (&values[..], *on));
-        let found = query::locate(&placed.tree, points, here, &asked.how, SILENT)?;
+        let found = query::locate(&placed.tree, points, here, how, SILENT)?;
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             (all.owners[i], all.barycentrics[i]) = (placed.tet(found.owners[k]), found.barycentrics[k]);
             if field.is_some() {
                 all.values[i] = found.values[k];
             }
         }
-        all.stages.extend(found.stages);
+        all.times.add(found.times);
         Ok(())
     })?;
     Ok(took.with(all))
 }
 
-/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does; of [`LocateRequest::how`] only the
-/// tolerance is used. `report` receives the number of points done, and of all.
+/// Finds every tetrahedron that contains each point, as [`query::locate_all`] does, within `memory` bytes of device
+/// memory. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`locate`].
-pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, report: Progress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
-    let mut all = vec![Vec::new(); asked.points.len()];
+pub fn locate_all(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, tolerance: f32, report: Progress<'_>) -> Result<InBlocks<AllOwners>> {
+    let mut all = AllOwners { owners: vec![Vec::new(); asked.points.len()], ..AllOwners::default() };
     let took = each(gpu, memory, asked, Blocks::OfPoint, report, &mut |ids, points, placed, _| {
-        let found = query::locate_all(&placed.tree, points, asked.how.tolerance, SILENT)?;
-        for (&i, owners) in ids.iter().zip(found) {
-            all[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
+        let found = query::locate_all(&placed.tree, points, tolerance, SILENT)?;
+        for (&i, owners) in ids.iter().zip(found.owners) {
+            all.owners[i as usize] = owners.into_iter().map(|t| placed.tet(t)).collect();
         }
+        all.times.add(found.times);
         Ok(())
     })?;
     Ok(took.with(all))
@@ -104,7 +105,7 @@ pub(super) fn each(
     report: Progress<'_>,
     ask: Ask<'_>,
 ) -> Result<InBlocks> {
-    let LocateRequest { mesh, ref options, points, .. } = *asked;
+    let LocateRequest { mesh, ref options, points } = *asked;
     let gpu = &gpu.with_memory(memory);
     let all: Vec<u32> = (0..numbered(points.len())?).collect();
     let mut job = Job { gpu, points, done: 0.0, told: 0, took: InBlocks::default(), ask, report };

@@ -6,18 +6,21 @@ use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::NONE;
 use crate::query::{Nearest, Progress, SILENT, nearest_in};
+use crate::times::StageTimes;
 
 /// Finds the place of the surface that is closest to each point, at most `within` away, as [`crate::query::nearest`] does, within
-/// `memory` bytes of device memory; [`LocateRequest::how`] is not used. `report` receives the number of points done, and of all.
+/// `memory` bytes of device memory. `report` receives the number of points done, and of all.
 ///
 /// # Errors
 /// Those of [`super::locate`].
 pub fn nearest(gpu: &Gpu, memory: u64, asked: &LocateRequest<'_>, within: f32, report: Progress<'_>) -> Result<InBlocks<Nearest>> {
     let n = asked.points.len();
-    let mut all = Nearest { owners: vec![NONE; n], barycentrics: vec![[0.0; 4]; n], squares: vec![f32::INFINITY; n], scale: 1.0 };
+    let (owners, barycentrics, squares) = (vec![NONE; n], vec![[0.0; 4]; n], vec![f32::INFINITY; n]);
+    let mut all = Nearest { owners, barycentrics, squares, scale: 1.0, times: StageTimes::default() };
     let took = each(gpu, memory, asked, Blocks::All, report, &mut |ids, points, placed, cells| {
         let found = nearest_in(&placed.tree, points, within, cells, SILENT)?;
         all.scale = found.scale;
+        all.times.add(found.times);
         for (k, i) in ids.iter().map(|&i| i as usize).enumerate() {
             let (owner, square) = (placed.tet(found.owners[k]), found.squares[k]);
             if owner != NONE && (square, owner) < (all.squares[i], all.owners[i]) {

@@ -170,8 +170,7 @@ fn visit(
 }
 
 fn merge(all: &mut Overlapped, found: Overlapped) {
-    all.stages.extend(found.stages);
-    all.submissions += found.submissions;
+    all.times.add(found.times);
     all.overlap.a.extend(found.overlap.a);
     all.overlap.b.extend(found.overlap.b);
     if let Some(pairs) = &mut all.overlap.pairs {

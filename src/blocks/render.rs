@@ -8,11 +8,12 @@ use super::{InBlocks, Refused, Tried, check_field, pieces, smaller, try_block, u
 use crate::error::Result;
 use crate::gpu::Gpu;
 use crate::layout::Grid;
-use crate::mesh::{Bounds, Field, Mesh, On};
+use crate::mesh::{Field, Mesh, On};
 use crate::options::BuildOptions;
 use crate::query::{self, Canvas, Progress, Rays, Rendered};
 use crate::reference::ranges::visible;
-use crate::render::{Camera, PicturePlan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
+use crate::render::{PicturePlan, Prepared, RayGrid, RenderSettings, RenderStats, ValidTets};
+use crate::times::StageTimes;
 use rayon::prelude::*;
 use std::ops::Range;
 use std::slice::from_ref;
@@ -35,19 +36,13 @@ pub struct RenderRequest<'a> {
     pub settings: &'a RenderSettings,
 }
 
-/// A picture, and how it was made.
+/// A picture, and what it was drawn by.
 #[derive(Clone, Debug)]
 pub struct Picture {
-    /// The colours, and what they cost.
+    /// The colours, and what they took.
     pub rendered: Rendered,
-    /// The plan that it was rendered with.
-    pub plan: PicturePlan,
-    /// The camera that sees it, in coordinates of the mesh.
-    pub camera: Camera,
-    /// The bounds of the mesh.
-    pub bounds: Bounds,
-    /// The field's values at the ends of the transfer function.
-    pub range: [f32; 2],
+    /// What they were drawn by.
+    pub prepared: Prepared,
 }
 
 /// Renders a picture as [`query::render`] does, within `memory` bytes of device memory. `report` receives the number of
@@ -76,7 +71,8 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
     drop(neighbours);
     let mut rays = Rays::new(prepared.plan.size)?;
     let order = Order::new(&prepared.plan, &source.grid);
-    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, order, stats: RenderStats::default(), took };
+    let (stats, times) = (RenderStats::default(), StageTimes::default());
+    let mut job = Job { gpu, memory, source: &source, field, prepared: &prepared, order, stats, times, took };
     let mut waiting = vec![(source.whole(), 1.0)];
     let mut done = 0.0;
     while let Some((block, share)) = waiting.pop() {
@@ -88,17 +84,16 @@ pub fn render(gpu: &Gpu, memory: u64, asked: &RenderRequest<'_>, report: Progres
             Some([near, far]) => waiting.extend([(far, share / 2.0), (near, share / 2.0)]),
         }
     }
-    let Job { stats, took, .. } = job;
-    let rendered = Rendered { colors: rays.colors, stats };
-    let Prepared { plan, camera, bounds, range, .. } = prepared;
-    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, plan, camera, bounds, range }))
+    let Job { stats, times, took, .. } = job;
+    let rendered = Rendered { colors: rays.colors, stats, times };
+    Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(Picture { rendered, prepared }))
 }
 
 fn render_whole(placed: &Placed, asked: &RenderRequest<'_>, report: Progress<'_>) -> Result<Picture> {
     let (Placed { mesh, tree, .. }, RenderRequest { field, settings, .. }) = (placed, asked);
-    let Prepared { plan, camera, bounds, normals, range } = query::prepare_picture(mesh, asked.mesh, field, settings)?;
-    let rendered = query::render(tree, &plan, (&field.values, field.on), Some(&normals), report)?;
-    Ok(Picture { rendered, plan, camera, bounds, range })
+    let prepared = query::prepare_picture(mesh, asked.mesh, field, settings)?;
+    let rendered = query::render(tree, &prepared.plan, (&field.values, field.on), Some(&prepared.normals), report)?;
+    Ok(Picture { rendered, prepared })
 }
 
 /// The state of rendering a picture in blocks.
@@ -110,6 +105,7 @@ struct Job<'a> {
     prepared: &'a Prepared,
     order: Order,
     stats: RenderStats,
+    times: StageTimes,
     took: InBlocks,
 }
 
@@ -140,9 +136,10 @@ impl Job<'_> {
         let placed = self.took.build(|| block.place(self.gpu, self.source))?;
         let (values, normals) = (placed.values(values, *on), (!normals.is_empty()).then(|| placed.values(normals, On::Points)));
         let canvas = Canvas::new(self.gpu, &(&placed.tree).into(), plan, (&values, *on), normals.as_deref(), true)?;
-        let part = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;
-        self.stats += part;
-        log::debug!("a block of {} tetrahedra, {} samples", block.tets.len(), part.samples);
+        let (stats, times) = canvas.draw_part(block.cells.finest(self.source.level), met, rays)?;
+        self.stats += stats;
+        self.times.add(times);
+        log::debug!("a block of {} tetrahedra, {} samples", block.tets.len(), stats.samples);
         Ok(())
     }
 

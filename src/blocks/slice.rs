@@ -11,10 +11,11 @@ use crate::gpu::Gpu;
 use crate::mesh::{Field, Mesh};
 use crate::options::BuildOptions;
 use crate::query::searched::Searched;
-use crate::query::{self, Progress, Slicing};
+use crate::query::{self, Progress, Sliced, Slicing};
 use crate::reference::separate::closest;
 use crate::reference::tet::sub;
 use crate::slicing::{Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VoxelGrid, bands};
+use crate::times::StageTimes;
 use rayon::prelude::*;
 use std::cell::Cell;
 use std::rc::Rc;
@@ -53,7 +54,7 @@ pub fn slice(
     asked: &SliceRequest<'_>,
     report: Progress<'_>,
     sink: &mut dyn FnMut(Band) -> Result<()>,
-) -> Result<InBlocks<Tally>> {
+) -> Result<InBlocks<Sliced>> {
     let SliceRequest { mesh, ref options, field, voxels, extrapolate } = *asked;
     let values = field.map(|f| (f.values.as_slice(), f.on));
     check_field(mesh, values)?;
@@ -71,19 +72,20 @@ pub fn slice(
         let sliced = whole.and_then(|Placed { tree, .. }| query::slice(&tree, values, voxels, extrapolate, report, &mut sink));
         // Once the sink has voxels, it is too late to begin again.
         let sliced = if tally.get() == Tally::default() { unless_too_large(sliced)? } else { Some(sliced?) };
-        if sliced.is_some() {
-            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(tally.get()));
+        if let Some(sliced) = sliced {
+            return Ok(InBlocks { peak: gpu.memory_peak(), ..took }.with(sliced));
         }
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
     took.bad_cells[0] = source.bad_cells();
     voxels.plan(&source.grid)?;
-    let mut job = Job { gpu, memory, asked, source: &source, blocks: vec![source.whole()], placed: None, took, done: 0.0, report };
+    let (blocks, times) = (vec![source.whole()], StageTimes::default());
+    let mut job = Job { gpu, memory, asked, source: &source, blocks, placed: None, took, times, done: 0.0, report };
     for rows in bands(voxels, BATCH) {
         sink(job.batch(rows)?)?;
     }
     let took = InBlocks { peak: gpu.memory_peak(), ..job.took };
-    Ok(took.with(tally.get()))
+    Ok(took.with(Sliced { tally: tally.get(), times: job.times }))
 }
 
 /// The state of slicing a stack in blocks.
@@ -96,6 +98,7 @@ struct Job<'a> {
     blocks: Vec<Block>,
     placed: Option<(Rc<Vec<u32>>, Placed)>,
     took: InBlocks,
+    times: StageTimes,
     /// Voxels done, counted in part while only some of the blocks have been queried.
     done: f64,
     report: Progress<'a>,
@@ -162,6 +165,7 @@ impl Job<'_> {
             }
             at += n;
         }
+        self.times.add(slicing.sliced.times);
         log::debug!("slice: a block of {} tetrahedra", block.tets.len());
         Ok(())
     }

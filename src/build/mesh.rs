@@ -2,11 +2,12 @@
 
 use super::prepare::{Given, MeshArrays, MeshInput, MeshScratch, MeshView, Stage0, check_tets};
 use crate::error::{Error, Result};
-use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder, StageTime};
+use crate::gpu::{Arena, Buffer, BufferRef, Gpu, Recorder};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{Grid, MeshStatus, set_bits};
 use crate::mesh::{Mesh, fault_of};
 use crate::reference::corners::MOST_THIN;
+use crate::times::StageTimes;
 use std::sync::Arc;
 
 /// Meshes of this many tetrahedra are prepared in several submissions, since a system may end one that takes seconds.
@@ -44,7 +45,7 @@ pub struct DeviceMesh {
     kept: KeptMesh,
     grid: Grid,
     status: MeshStatus,
-    stages: Vec<StageTime>,
+    times: StageTimes,
 }
 
 impl DeviceMesh {
@@ -54,17 +55,7 @@ impl DeviceMesh {
     /// # Errors
     /// [`Error::Memory`], [`Error::TooLarge`], or [`Error::BadCells`] if the policy rejects them.
     pub fn upload(gpu: &Gpu, mesh: &Mesh, policy: BadCells) -> Result<Self> {
-        Self::upload_in(gpu, mesh, policy, None)
-    }
-
-    /// Uploads a mesh as [`DeviceMesh::upload`] does, optionally into a given grid, whose bounds must contain the mesh
-    /// and whose level does not matter. Parts of a mesh that are uploaded into the same grid have the same octree cells and
-    /// normalised points.
-    ///
-    /// # Errors
-    /// Those of [`DeviceMesh::upload`].
-    pub fn upload_in(gpu: &Gpu, mesh: &Mesh, policy: BadCells, grid: Option<&Grid>) -> Result<Self> {
-        let made = Self::upload_arrays(gpu, &mesh.points, &mesh.tets, grid, &[])?;
+        let made = Self::upload_slices(gpu, &mesh.points, &mesh.tets)?;
         if policy == BadCells::Reject && made.status.bad > 0 {
             let list = made.bad_cells()?;
             let named = |&t: &u32| fault_of(mesh, t).map(|fault| format!("cell {}: {fault}", mesh.cell_id(t)));
@@ -83,64 +74,62 @@ impl DeviceMesh {
         Self::upload_arrays(gpu, points, tets, None, &[])
     }
 
-    /// Uploads the points and the vertices of the tetrahedra of a mesh, as [`DeviceMesh::upload_in`] does; bad
-    /// tetrahedra are left out. `crowded` points count as crowded, however many tetrahedra meet there.
-    pub(crate) fn upload_arrays(
-        gpu: &Gpu,
-        places: &[[f32; 3]],
-        corners: &[[u32; 4]],
-        grid: Option<&Grid>,
-        crowded: &[u32],
-    ) -> Result<Self> {
+    /// [`DeviceMesh::upload_slices`], optionally into a given grid, whose bounds must contain the mesh and whose level does
+    /// not matter: parts of a mesh in one grid have the same octree cells and normalised points. `crowded` points count
+    /// as crowded, however many tetrahedra meet there.
+    pub(crate) fn upload_arrays(gpu: &Gpu, points: &[[f32; 3]], tets: &[[u32; 4]], grid: Option<&Grid>, crowded: &[u32]) -> Result<Self> {
         let number = |n: usize| u32::try_from(n).map_err(|_| Error::TooLarge(format!("{n} points or tetrahedra; 32 bits number 2^32")));
-        let (points, tets) = (number(places.len())?, number(corners.len())?);
-        check_tets(tets)?;
+        let (n_points, n_tets) = (number(points.len())?, number(tets.len())?);
+        check_tets(n_tets)?;
         // Level and ids are those of a tree; each tree over the mesh sets its own.
         let finest = |grid: &Grid| Grid { level: MAX_LEVEL, first_leaf: 0, ids: u32::MAX, slabs: 0, longest: 0, ..*grid };
         let grid = grid.map(|grid| gpu.upload("olbvh.mesh.grid", &[finest(grid)])).transpose()?;
         let thin = || {
-            let mut thin = vec![0; places.len()];
+            let mut thin = vec![0; points.len()];
             crowded.iter().for_each(|&v| thin[v as usize] = MOST_THIN + 1);
             gpu.upload("olbvh.mesh.thin", &thin)
         };
         let thin = (!crowded.is_empty()).then(thin).transpose()?;
         let given = Given { grid: grid.as_ref().map(Buffer::all), thin: thin.as_ref().map(|thin| (thin.all(), crowded.len() as u32)) };
-        let positions = gpu.upload("olbvh.mesh.positions", places)?;
-        let cells = gpu.upload("olbvh.mesh.cells", corners)?;
-        let input = MeshInput { positions: positions.all(), stride: 3, points, cells: cells.all(), tets };
-        let carve = |a: &mut Arena| MeshArrays::carve(a, points, tets);
+        let positions = gpu.upload("olbvh.mesh.positions", points)?;
+        let cells = gpu.upload("olbvh.mesh.cells", tets)?;
+        let input = MeshInput { positions: positions.all(), stride: 3, points: n_points, cells: cells.all(), tets: n_tets };
+        let carve = |a: &mut Arena| MeshArrays::carve(a, n_points, n_tets);
         let (memory, arrays) = Arena::reserve(gpu, "olbvh.mesh.arrays", carve)?;
         let (_memory, scratch) = Self::scratch(gpu, &input)?;
-        let stages = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given)?;
+        let times = Self::prepare(gpu, &Stage0::new(&input, &arrays, &scratch)?, given)?;
         let status: MeshStatus = gpu.download_one(&memory, arrays.status)?;
         let grid: Grid = gpu.download_one(&memory, arrays.grid)?;
         if status.overflow != 0 {
             return Err(Error::TooLarge(format!(
-                "the table of faces is full: too few of the {tets} tetrahedra share faces; they can be taken in blocks, see `blocks`"
+                "the table of faces is full: too few of the {n_tets} tetrahedra share faces; they can be taken in blocks, see `blocks`"
             )));
         }
         let memory = Arc::new(MeshMemory { _positions: positions, _cells: cells, arrays: memory });
         let kept = KeptMesh { view: MeshView { input, arrays }, memory };
-        Ok(Self { gpu: gpu.clone(), kept, grid, status, stages })
+        Ok(Self { gpu: gpu.clone(), kept, grid, status, times })
     }
 
     fn scratch(gpu: &Gpu, input: &MeshInput) -> Result<(Buffer, MeshScratch)> {
         Arena::reserve(gpu, "olbvh.mesh.scratch", |a: &mut Arena| MeshScratch::carve(a, input.points, input.tets))
     }
 
-    /// Runs stage 0, and returns the times of its parts.
-    fn prepare(gpu: &Gpu, stage0: &Stage0<'_>, given: Given) -> Result<Vec<StageTime>> {
-        let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), time)| time.stages);
+    /// Runs stage 0, and returns what it took.
+    fn prepare(gpu: &Gpu, stage0: &Stage0<'_>, given: Given) -> Result<StageTimes> {
+        let submit = |record: &dyn Fn(&mut Recorder<'_>) -> Result<()>| gpu.submit("olbvh.mesh", record).map(|((), times)| times);
         if stage0.tets() < LARGE {
             return submit(&|r| stage0.prepare(r, given));
         }
-        Ok([submit(&|r| stage0.begin(r, given))?, submit(&|r| stage0.match_faces(r))?, submit(&|r| stage0.boundary(r, 1))?].concat())
+        let mut times = submit(&|r| stage0.begin(r, given))?;
+        times.add(submit(&|r| stage0.match_faces(r))?);
+        times.add(submit(&|r| stage0.boundary(r, 1))?);
+        Ok(times)
     }
 
-    /// A function that does all of stage 0 again in the memory of before, with the same results, and returns the times of
-    /// its parts. For meshes that were uploaded without a given grid.
+    /// A function that does all of stage 0 again in the memory of before, with the same results, and returns what it
+    /// took. For meshes that were uploaded without a given grid.
     #[cfg(feature = "cli")]
-    pub(crate) fn again(&self) -> Result<impl FnMut() -> Result<Vec<StageTime>>> {
+    pub(crate) fn again(&self) -> Result<impl FnMut() -> Result<StageTimes>> {
         let (memory, scratch) = Self::scratch(&self.gpu, self.input())?;
         Ok(move || {
             let _held = &memory;
@@ -225,9 +214,9 @@ impl DeviceMesh {
         &self.status
     }
 
-    /// Device time of every part of stage 0, in order.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
+    /// What stage 0 took.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
     }
 
     /// Bytes of the neighbour table, which the sizes of a tree do not include.

@@ -5,13 +5,14 @@ use super::mesh::{DeviceMesh, KeptMesh};
 use super::plan::{Capacity, CountScratch, FilterScratch, MAX_ENTRIES, SortedScratch, TreeMemory, filtered};
 use super::stages::Build;
 use crate::error::Result;
-use crate::gpu::{Arena, Buffer, BufferRef, Gpu, StageTime};
+use crate::gpu::{Arena, Buffer, BufferRef, Gpu};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid, wide};
 use crate::options::BuildOptions;
 use crate::reference::depth::{finer, too_large};
 use crate::reference::quarters::split_entries;
 use crate::reference::slabs::split_slabs;
+use crate::times::StageTimes;
 use crate::tree::{TreeArrays, TreeBytes};
 
 /// An OLBVH in device memory.
@@ -23,7 +24,7 @@ pub struct Tree {
     memory: TreeMemory,
     status: BuildStatus,
     grid: Grid,
-    stages: Vec<StageTime>,
+    times: StageTimes,
     scratch_bytes: u64,
     entry_buffer: Buffer,
     node_buffer: Buffer,
@@ -48,9 +49,9 @@ impl Tree {
             }
             match Self::build_once(gpu, mesh, &BuildOptions { level: Some(level), ..finer }) {
                 Ok(finer) => {
-                    let stages = tree.stages.iter().chain(&finer.stages).cloned().collect();
+                    tree.times.add(finer.times);
                     room = if finer.status.level < level { finer.status.level } else { room };
-                    tree = Self { stages, ..finer };
+                    tree = Self { times: tree.times, ..finer };
                 }
                 Err(e) if e.is_lack_of_room() => room = level - 1,
                 Err(e) => return Err(e),
@@ -69,7 +70,7 @@ impl Tree {
         mesh.check_device(gpu)?;
         let view = mesh.view();
         let tets = view.input.tets;
-        let mut stages = Vec::new();
+        let mut times = StageTimes::default();
 
         // First submission: the level, and the number of candidates.
         let (head, (status, grid)) = Arena::reserve(gpu, "olbvh.build.head", TreeMemory::carve_head)?;
@@ -80,7 +81,7 @@ impl Tree {
             build.depth(r, if filtered(options) { u32::MAX } else { MAX_ENTRIES }, MAX_LEVEL)?;
             build.count(r)
         })?;
-        stages.extend(time.stages);
+        times.add(time);
         let measured: BuildStatus = gpu.download_one(&head, status)?;
         refuse_overflow(&measured, options)?;
         let level = measured.level;
@@ -92,7 +93,7 @@ impl Tree {
         let build = Build { filter: filter.as_ref(), ..build };
         if let Some(filter) = &filter {
             let ((), time) = gpu.submit("olbvh.build.filter", |r| build.filter(r, false))?;
-            stages.extend(time.stages);
+            times.add(time);
             capacity.entries = gpu.download_one(&filter_buffer, filter.entries)?;
         }
 
@@ -104,7 +105,7 @@ impl Tree {
             build.codes(r, entry_buffer.all(), &capacity, &sorted)?;
             build.count_splits(r, &capacity, &sorted)
         })?;
-        stages.extend(time.stages);
+        times.add(time);
         let planned: BuildStatus = gpu.download_one(&head, status)?;
         refuse_overflow(&planned, options)?;
         capacity.nodes = planned.nodes;
@@ -126,7 +127,7 @@ impl Tree {
             build.slabs(r, &memory, &sorted)?;
             build.levels(r, &memory, &sorted)
         })?;
-        stages.extend(time.stages);
+        times.add(time);
         let status: BuildStatus = gpu.download_one(&node_buffer, memory.status)?;
         refuse_overflow(&status, options)?;
         let grid: Grid = gpu.download_one(&node_buffer, memory.grid)?;
@@ -138,7 +139,7 @@ impl Tree {
             memory,
             status,
             grid,
-            stages,
+            times,
             scratch_bytes,
             entry_buffer,
             node_buffer,
@@ -207,9 +208,9 @@ impl Tree {
         &self.options
     }
 
-    /// Device time of every stage, in order.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
+    /// What the build took, coarser trees before this one included.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
     }
 
     /// Bytes of each array.

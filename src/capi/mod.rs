@@ -18,7 +18,7 @@ mod tests;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::{Error, Result};
 use crate::glsl::SceneBuffers;
-use crate::gpu::{Buffer, Gpu, GpuOptions, StageTime};
+use crate::gpu::{Buffer, Gpu, GpuOptions};
 use crate::grid::MAX_LEVEL;
 use crate::mesh::{Bounds, Mesh, On};
 use crate::options::{Assign, BuildOptions, Fineness, Lists, TOLERANCE};
@@ -391,7 +391,7 @@ pub extern "C" fn olbvh_tree_info(tree: *const OlbvhTree, out: *mut OlbvhTreeInf
             lo,
             hi,
             bad_cells: mesh.device.status().bad,
-            build_ms: StageTime::sum(tree.stages()),
+            build_ms: tree.times().total(),
             address: addresses.all().address,
         };
         put(out, info)

@@ -98,7 +98,7 @@ pub(crate) fn check(gpu: &Gpu, case: &LocateCase, twin: &mut Twin, device: &Devi
         How::Hints => hints(gpu, mesh, device, &tree, &locator, points),
         How::All => {
             let lists: Vec<_> = points.iter().map(|&p| locator.owners(p)).collect();
-            compare("query.locate_all", "owners", &lists, &locate_all(&tree, points, TOLERANCE, SILENT)?)
+            compare("query.locate_all", "owners", &lists, &locate_all(&tree, points, TOLERANCE, SILENT)?.owners)
         }
         How::Values => {
             // Values are whole numbers below 2^12, so products and sums differ at most by the rounding of the division

@@ -6,9 +6,9 @@ use super::context::Gpu;
 use super::memory::Buffer;
 use super::ray_functions::Acceleration;
 use super::recorder::Recorder;
-use super::submit::StageTime;
 use super::{debug, failed};
 use crate::error::{Error, Result};
+use crate::times::StageTimes;
 use ash::vk;
 use gpu_allocator::MemoryLocation;
 
@@ -99,7 +99,7 @@ fn build(
     ty: vk::AccelerationStructureTypeKHR,
     geometry: vk::AccelerationStructureGeometryKHR<'_>,
     count: u32,
-) -> Result<(Structure, u64, Vec<StageTime>)> {
+) -> Result<(Structure, u64, StageTimes)> {
     let Acceleration { functions, scratch_alignment, .. } = extension(gpu)?;
     let geometries = [geometry];
     let flags = vk::BuildAccelerationStructureFlagsKHR::PREFER_FAST_TRACE | vk::BuildAccelerationStructureFlagsKHR::ALLOW_COMPACTION;
@@ -114,7 +114,7 @@ fn build(
     info.dst_acceleration_structure = structure.handle;
     info.scratch_data.device_address = scratch.all().address.next_multiple_of(*scratch_alignment);
     let range = [vk::AccelerationStructureBuildRangeInfoKHR::default().primitive_count(count)];
-    let ((), time) = gpu.submit("olbvh.acceleration.build", |r| {
+    let ((), times) = gpu.submit("olbvh.acceleration.build", |r| {
         barrier_before(r);
         r.stage(names[1], |r| {
             // SAFETY: structure and scratch memory have the sizes that the device reported; the barrier makes the
@@ -125,11 +125,11 @@ fn build(
         barrier_after(r);
         Ok(())
     })?;
-    Ok((structure, scratch.size(), time.stages))
+    Ok((structure, scratch.size(), times))
 }
 
 /// Makes a compacted copy. Also returns the times.
-fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime>)> {
+fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, StageTimes)> {
     let functions = &extension(gpu)?.functions;
     let kind = vk::QueryType::ACCELERATION_STRUCTURE_COMPACTED_SIZE_KHR;
     let info = vk::QueryPoolCreateInfo::default().query_type(kind).query_count(1);
@@ -155,7 +155,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
     read?;
     let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
     let smaller = Structure::new(gpu, "olbvh.acceleration.compacted", ty, bytes[0])?;
-    let ((), time) = gpu.submit("olbvh.acceleration.compact", |r| {
+    let ((), times) = gpu.submit("olbvh.acceleration.compact", |r| {
         r.stage("acceleration.compact", |r| {
             let info = vk::CopyAccelerationStructureInfoKHR::default().src(structure.handle).dst(smaller.handle);
             // SAFETY: the copy has the size that the device reported.
@@ -167,7 +167,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, Vec<StageTime
         barrier_after(r);
         Ok(())
     })?;
-    Ok((smaller, time.stages))
+    Ok((smaller, times))
 }
 
 /// A scene of triangles in which `GL_EXT_ray_query` and `GL_EXT_ray_tracing` trace rays.
@@ -176,7 +176,7 @@ pub struct AccelerationStructure {
     triangles: Structure,
     built_bytes: u64,
     scratch_bytes: u64,
-    stages: Vec<StageTime>,
+    times: StageTimes,
     _instance: Buffer,
 }
 
@@ -209,9 +209,9 @@ impl AccelerationStructure {
             .flags(vk::GeometryFlagsKHR::OPAQUE);
         let names = ["olbvh.acceleration.built", "acceleration.build"];
         let bottom = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
-        let (built, scratch_bytes, mut stages) = build(gpu, names, bottom, geometry, input.count)?;
+        let (built, scratch_bytes, mut times) = build(gpu, names, bottom, geometry, input.count)?;
         let (triangles, time) = compact(gpu, &built)?;
-        stages.extend(time);
+        times.add(time);
         // The words of a VkAccelerationStructureInstanceKHR: transform, mask and index, flags and offset, reference.
         let mut words: Vec<u32> = scaled(1.0).map(f32::to_bits).to_vec();
         words.extend([0xff00_0000, 0, triangles.address as u32, (triangles.address >> 32) as u32]);
@@ -222,8 +222,8 @@ impl AccelerationStructure {
             .geometry(vk::AccelerationStructureGeometryDataKHR { instances });
         let names = ["olbvh.acceleration.scene", "acceleration.scene"];
         let (scene, _, time) = build(gpu, names, vk::AccelerationStructureTypeKHR::TOP_LEVEL, geometry, 1)?;
-        stages.extend(time);
-        Ok(Self { scene, triangles, built_bytes: built.memory.size(), scratch_bytes, stages, _instance: instance })
+        times.add(time);
+        Ok(Self { scene, triangles, built_bytes: built.memory.size(), scratch_bytes, times, _instance: instance })
     }
 
     /// Device address of the scene, low word first, for `accelerationStructureEXT(uvec2)` in shaders. The scene is
@@ -247,9 +247,9 @@ impl AccelerationStructure {
         self.scratch_bytes
     }
 
-    /// Device time of build, compaction and scene, in order.
-    pub fn stages(&self) -> &[StageTime] {
-        &self.stages
+    /// What build, compaction and scene took.
+    pub fn times(&self) -> &StageTimes {
+        &self.times
     }
 }
 

@@ -42,7 +42,6 @@ pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
 pub use requirements::{DeviceKind, DeviceReport, RayTracing, Requirements};
-pub use submit::{StageTime, StageTimes};
 
 use crate::error::Error;
 use ash::vk;

@@ -8,6 +8,7 @@ use super::memory::Buffer;
 use super::recorder::Recorder;
 use super::submission::{READ_BACK, Submission};
 use crate::error::{Error, Result};
+use crate::times::{StageTime, StageTimes};
 use ash::vk;
 use bytemuck::Pod;
 use gpu_allocator::MemoryLocation;
@@ -16,36 +17,6 @@ use gpu_allocator::MemoryLocation;
 const STAGING: u64 = 32 << 20;
 /// Where memory is limited, a staging buffer takes one part in this many of the limit.
 const STAGING_SHARE: u64 = 16;
-
-/// Device time of a recorded stage.
-#[derive(Clone, Debug)]
-pub struct StageTime {
-    /// Name of the stage.
-    pub name: String,
-    /// Milliseconds between the timestamps at its start and end.
-    pub milliseconds: f64,
-}
-
-impl StageTime {
-    /// Sum of the milliseconds of these stages.
-    pub fn sum<'a>(stages: impl IntoIterator<Item = &'a Self>) -> f64 {
-        stages.into_iter().map(|s| s.milliseconds).sum()
-    }
-}
-
-/// Device times of the stages of a submission.
-#[derive(Clone, Debug, Default)]
-pub struct StageTimes {
-    /// Stages in the order in which they ended; empty if the queue does not support timestamps.
-    pub stages: Vec<StageTime>,
-}
-
-impl StageTimes {
-    /// Sum of the milliseconds of all stages with this name.
-    pub fn milliseconds(&self, name: &str) -> f64 {
-        StageTime::sum(self.stages.iter().filter(|s| s.name == name))
-    }
-}
 
 impl Gpu {
     /// Records work, submits it, and waits until it has been executed.
@@ -103,10 +74,10 @@ impl Gpu {
         }
         submission.start()?;
         submission.wait().map_err(|e| named(e, label))?;
-        Ok(StageTimes { stages: self.read_timestamps(queries, recorder.timed_stages())? })
+        self.read_timestamps(queries, recorder.timed_stages())
     }
 
-    fn read_timestamps(&self, queries: vk::QueryPool, stages: &[(String, u32, u32)]) -> Result<Vec<StageTime>> {
+    fn read_timestamps(&self, queries: vk::QueryPool, stages: &[(String, u32, u32)]) -> Result<StageTimes> {
         let used = stages.iter().map(|s| s.2 + 1).max().unwrap_or(0);
         let mut ticks = vec![0u64; used as usize];
         if used > 0 {
@@ -116,11 +87,12 @@ impl Gpu {
         }
         let mask = if self.timestamp_bits() >= 64 { u64::MAX } else { (1 << self.timestamp_bits()) - 1 };
         let period = f64::from(self.limits().timestamp_period) * 1e-6;
-        let time = |(name, b, e): &(String, u32, u32)| {
-            let span = ticks[*e as usize].wrapping_sub(ticks[*b as usize]) & mask;
-            StageTime { name: name.clone(), milliseconds: span as f64 * period }
-        };
-        Ok(stages.iter().map(time).collect())
+        let mut times = StageTimes { submissions: 1, ..StageTimes::default() };
+        for (name, begin, end) in stages {
+            let span = ticks[*end as usize].wrapping_sub(ticks[*begin as usize]) & mask;
+            times.add_stage(StageTime { name: name.clone(), milliseconds: span as f64 * period });
+        }
+        Ok(times)
     }
 
     /// A device-local buffer with this content.

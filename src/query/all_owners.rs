@@ -9,6 +9,7 @@ use crate::kernels::{LocateAll, LocateAllSpec};
 use crate::options::POINT_CHUNK;
 use crate::primitives::{Count, ScanScratch, cmd_exclusive_scan};
 use crate::reference::walk::STAR;
+use crate::times::StageTimes;
 
 /// Answers and scratch memory for all owners: 28 bytes per point, and the scratch memory of a scan.
 #[derive(Clone, Copy, Debug)]
@@ -128,34 +129,45 @@ fn cmd_walk_lists(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, memor
     })
 }
 
-/// Every tetrahedron that contains each point, ascending; for a point that none contains, the owner within the
-/// tolerance alone, if there is one. `report` receives the number of points done and their total.
+/// All owners in host memory.
+#[derive(Clone, Debug, Default)]
+pub struct AllOwners {
+    /// The owners of each point, ascending.
+    pub owners: Vec<Vec<u32>>,
+    /// What it took.
+    pub times: StageTimes,
+}
+
+/// Finds every tetrahedron that contains each point; for a point that none contains, the owner within the tolerance alone,
+/// if there is one. `report` receives the number of points done and their total.
 ///
 /// # Errors
 /// As [`super::locate`].
-pub fn locate_all(tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<Vec<Vec<u32>>> {
+pub fn locate_all(tree: &Tree, points: &[[f32; 3]], tolerance: f32, report: Progress<'_>) -> Result<AllOwners> {
     let gpu = tree.gpu();
     let (scene, options) = (Scene::of(tree), LocateOptions { tolerance, ..LocateOptions::default() });
-    let mut all = Vec::with_capacity(points.len());
+    let mut all = AllOwners { owners: Vec::with_capacity(points.len()), ..AllOwners::default() };
     for chunk in points.chunks(POINT_CHUNK.min(OwnersMemory::most_points(scene.longest_leaf) as usize)) {
         let asked = gpu.upload("olbvh.query.points", chunk)?;
         let count = chunk.len() as u32;
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
         let carve = |a: &mut Arena| OwnersMemory::carve(gpu, a, count);
         let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.lists", carve)?;
-        gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
+        let ((), times) = gpu.submit("olbvh.query.count_owners", |r| cmd_count_owners(r, &scene, &input, &memory, &options))?;
+        all.times.add(times);
         let total: u32 = gpu.download_one(&buffer, memory.total)?;
         let found = gpu.buffer("olbvh.query.found", 4 * u64::from(total))?;
-        gpu.submit("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
+        let ((), times) = gpu.submit("olbvh.query.list_owners", |r| cmd_list_owners(r, &scene, &input, &memory, found.all()))?;
+        all.times.add(times);
         let ends: Vec<u32> = gpu.download(&buffer, memory.ends.part(0, 4 * u64::from(count)))?;
         let found: Vec<u32> = gpu.download(&found, found.all())?;
         let mut begin = 0;
-        all.extend(ends.into_iter().map(|end| {
+        all.owners.extend(ends.into_iter().map(|end| {
             let owners = found.get(begin..end as usize).unwrap_or_default().to_vec();
             begin = end as usize;
             owners
         }));
-        report(all.len() as u64, points.len() as u64)?;
+        report(all.owners.len() as u64, points.len() as u64)?;
     }
     Ok(all)
 }

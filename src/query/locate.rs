@@ -4,12 +4,13 @@ use super::order::{PointOrder, cmd_sort_points};
 use super::{Progress, Scene, list_parts, upload_field};
 use crate::build::{Tree, check_field, check_points};
 use crate::error::{Error, Result};
-use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder, StageTime};
+use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder};
 use crate::grid::MAX_LEVEL;
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
 use crate::mesh::On;
 use crate::options::{POINT_CHUNK, POINT_RUN, TOLERANCE};
 use crate::reference::traverse::full_stack;
+use crate::times::StageTimes;
 
 /// Size of the largest useful short stack: at most seven siblings per level wait on it, so it never drops a node.
 const MAX_STACK: u32 = full_stack(MAX_LEVEL) as u32;
@@ -286,8 +287,8 @@ pub struct Located {
     pub barycentrics: Vec<[f32; 4]>,
     /// Values of the given field; empty if none was given.
     pub values: Vec<f32>,
-    /// Device time per stage.
-    pub stages: Vec<StageTime>,
+    /// What it took.
+    pub times: StageTimes,
 }
 
 /// Locates points, whose coordinates are relative to the mesh's origin. `field` has values and says whether they belong
@@ -324,7 +325,7 @@ pub fn locate(
         let n = u64::from(count);
         let input = PointInput { points: input.all(), stride: 3, count, hints: None, order: order.map(|o| o.order) };
         let output = LocateOutput { owners: owners.all().part(0, 4 * n), barycentrics: barycentrics.all().part(0, 16 * n) };
-        let ((), time) = gpu.submit("olbvh.query.locate", |r| {
+        let ((), times) = gpu.submit("olbvh.query.locate", |r| {
             if let Some(order) = &order {
                 cmd_sort_points(r, scene.tree.grid, &input, order)?;
                 r.barrier("sort_points → locate");
@@ -341,7 +342,7 @@ pub fn locate(
         if let Some(values) = &values {
             all.values.extend(gpu.download::<f32>(values, values.all().part(0, 4 * n))?);
         }
-        all.stages.extend(time.stages);
+        all.times.add(times);
         report(all.owners.len() as u64, points.len() as u64)?;
     }
     Ok(all)

@@ -11,7 +11,7 @@ mod slice;
 mod visible;
 mod volume;
 
-pub use all_owners::{OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
+pub use all_owners::{AllOwners, OwnersMemory, cmd_count_owners, cmd_list_owners, locate_all};
 pub(crate) use locate::numbered;
 pub use locate::{LocateMethod, LocateOptions, LocateOutput, Located, MOST_TRAVERSED, PointInput, cmd_interpolate, cmd_locate, locate};
 pub(crate) use nearest::nearest_in;

@@ -1,6 +1,5 @@
 //! The place of the mesh's surface that is closest to each point, wherever the point lies.
 
-use super::locate::numbered;
 use super::{PointInput, Progress, Rounds, Scene};
 use crate::build::Tree;
 use crate::error::Result;
@@ -10,6 +9,7 @@ use crate::kernels::{Nearest as NearestKernel, NearestSpec};
 use crate::layout::{NONE, NearState};
 use crate::options::POINT_CHUNK;
 use crate::reference::nearest::distance;
+use crate::times::StageTimes;
 
 /// Points of one submission. Each may take thousands of tests, so they are fewer than in other queries.
 const AT_ONCE: usize = POINT_CHUNK / 8;
@@ -128,6 +128,8 @@ pub struct Nearest {
     pub squares: Vec<f32>,
     /// [`crate::layout::Grid::scale`] of the tree.
     pub scale: f32,
+    /// What it took.
+    pub times: StageTimes,
 }
 
 impl Nearest {
@@ -149,7 +151,6 @@ pub fn nearest(tree: &Tree, points: &[[f32; 3]], within: f32, report: Progress<'
 
 /// [`nearest`]; a block of a mesh is searched in these cells, whole leaves of its tree, only.
 pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: Option<CellRange>, report: Progress<'_>) -> Result<Nearest> {
-    numbered(points.len())?;
     let (gpu, scene, scale) = (tree.gpu(), Scene::of(tree), tree.grid().scale);
     let most = points.len().min(AT_ONCE) as u32;
     let (buffer, memory) = Arena::reserve(gpu, "olbvh.query.nearest", |a| NearestMemory::carve(a, most))?;
@@ -160,7 +161,8 @@ pub(crate) fn nearest_in(tree: &Tree, points: &[[f32; 3]], within: f32, cells: O
         let input = PointInput { points: asked.all(), stride: 3, count, hints: None, order: None };
         let mut rounds = Rounds::begin(1);
         loop {
-            gpu.submit("olbvh.query.nearest", |r| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds))?;
+            let ((), times) = gpu.submit("olbvh.query.nearest", |r| cmd_nearest_in(r, &scene, &input, (within, cells), &memory, rounds))?;
+            all.times.add(times);
             let unfinished: u32 = gpu.download_one(&buffer, memory.unfinished)?;
             report(all.owners.len() as u64 + u64::from(count - unfinished.min(count)), points.len() as u64)?;
             if unfinished == 0 {

@@ -21,24 +21,23 @@ pub use sets::{OverlapMemory, cmd_overlap};
 use super::{Progress, Rounds, Scene};
 use crate::build::Tree;
 use crate::error::{Error, Result};
-use crate::gpu::{Arena, Gpu, Recorder, StageTime};
+use crate::gpu::{Arena, Gpu, Recorder};
 use crate::layout::{OverlapStatus, set_bits, wide};
 use crate::reference::overlap::{Effort, Overlap, members};
+use crate::times::StageTimes;
 
 /// Rounds of the search per submission; for large meshes one, so that no submission takes long.
 fn rounds_at_once(tets: u32) -> u32 {
     if tets < 1 << 20 { 3 } else { 1 }
 }
 
-/// Overlap of two meshes, and what it cost.
+/// Overlap of two meshes.
 #[derive(Clone, Debug, Default)]
 pub struct Overlapped {
     /// Which tetrahedra intersect the other mesh, or which pairs intersect.
     pub overlap: Overlap,
-    /// Device time per stage.
-    pub stages: Vec<StageTime>,
-    /// Number of submissions.
-    pub submissions: u32,
+    /// What it took.
+    pub times: StageTimes,
 }
 
 /// The effort of one direction.
@@ -58,9 +57,8 @@ struct Job<'a> {
 impl Job<'_> {
     /// Submits what `record` records, and waits for it.
     fn submit(&mut self, record: impl FnOnce(&mut Recorder<'_>, &[Scene; 2]) -> Result<()>) -> Result<()> {
-        let ((), time) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
-        self.done.submissions += 1;
-        self.done.stages.extend(time.stages);
+        let ((), times) = self.gpu.submit("olbvh.query.overlap", |r| record(r, &self.scenes))?;
+        self.done.times.add(times);
         Ok(())
     }
 
@@ -153,8 +151,6 @@ pub fn overlap(a: &Tree, b: &Tree, pairs: bool, report: Progress<'_>) -> Result<
     } else {
         job.sets()?;
     }
-    for stage in &job.done.stages {
-        log::debug!("{}: {:.1} ms", stage.name, stage.milliseconds);
-    }
+    log::debug!("overlap: {}", job.done.times);
     Ok(job.done)
 }

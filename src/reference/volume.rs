@@ -22,20 +22,23 @@ use crate::error::{Error, Result};
 use crate::grid::CellRange;
 use crate::mesh::{Field, Mesh, On};
 use crate::render::{MAX_SAMPLES, PicturePlan, Prepared, RenderSettings, RenderStats, ValidTets};
+use crate::times::{StageTime, StageTimes};
 use crate::tree::TreeArrays;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
 
-/// What rays gather, and what it cost.
+/// What rays gather.
 #[derive(Clone, Debug, Default)]
 pub struct Picture {
     /// Premultiplied colour and opacity per ray, row 0 on top.
     pub colors: Vec<[f32; 4]>,
     /// Per ray what a depth buffer has where it became opaque; `None` if it did not.
     pub depths: Vec<Option<f32>>,
-    /// Numbers of samples, and times.
+    /// Numbers of samples.
     pub stats: RenderStats,
+    /// Times of the stages, named as on the device.
+    pub times: StageTimes,
 }
 
 /// What is drawn: a mesh, its tree, a field.
@@ -47,7 +50,7 @@ pub struct Drawing<'a> {
     prepared: Prepared,
     /// One bit per node, set if something is visible there; `None` if no value of the field is transparent.
     pub(crate) visible: Option<Vec<u32>>,
-    pub(crate) ranges_ms: f64,
+    ranges_ms: f64,
     part: CellRange,
     depths: Option<&'a [f32]>,
     /// It has tolerance 0, because with another one it would depend on the leaf whether a point just outside the mesh
@@ -122,6 +125,11 @@ impl<'a> Drawing<'a> {
     pub fn prepared(&self) -> &Prepared {
         &self.prepared
     }
+
+    /// [`Drawing::prepared`], to keep.
+    pub fn into_prepared(self) -> Prepared {
+        self.prepared
+    }
 }
 
 /// The colours and depths of a row.
@@ -166,12 +174,10 @@ pub fn render(scene: &Drawing<'_>, report: &(dyn Fn(u64, u64) -> Result<()> + Sy
         part.load(Ordering::Relaxed) as f64 / (all.max(1)) as f64
     };
     let ms = Duration::as_secs_f64(&start.elapsed()) * 1e3;
-    let (interval_ms, march_ms) = (ms * share(&interval_ns), ms * share(&march_ns));
+    let mut times = StageTimes::default();
+    let stages =
+        [("query.visible", scene.ranges_ms), ("query.intervals", ms * share(&interval_ns)), ("query.march", ms * share(&march_ns))];
+    stages.into_iter().for_each(|(name, milliseconds)| times.add_stage(StageTime { name: name.into(), milliseconds }));
     let [samples, skipped_samples, found_samples] = [samples, skipped, found].map(AtomicU64::into_inner);
-    let ranges_ms = scene.ranges_ms;
-    Ok(Picture {
-        colors,
-        depths,
-        stats: RenderStats { samples, skipped_samples, found_samples, ranges_ms, interval_ms, march_ms, submissions: 0 },
-    })
+    Ok(Picture { colors, depths, stats: RenderStats { samples, skipped_samples, found_samples }, times })
 }

@@ -4,8 +4,8 @@ use super::profile::Gain;
 use super::tunables::{TUNABLES, other_sort};
 use crate::bench::Spread;
 use crate::error::{Error, Result};
-use crate::gpu::StageTime;
 use crate::kernels::{Target, WorkgroupLimits};
+use crate::times::StageTime;
 use std::time::{Duration, Instant};
 
 /// Number of times that are taken of a candidate and of the best so far, in turns, for a decision.

@@ -4,7 +4,7 @@ use super::search::Work;
 use crate::bench::Load;
 use crate::build::{BadCells, DeviceMesh, Tree};
 use crate::error::{Error, Result};
-use crate::gpu::{DeviceKind, Gpu, StageTime};
+use crate::gpu::{DeviceKind, Gpu};
 use crate::kernels::Target;
 use crate::mesh::{Bounds, Field, Mesh, On};
 use crate::options::{BuildOptions, Lists};
@@ -14,6 +14,7 @@ use crate::reference::build::build;
 use crate::reference::locate::Locator;
 use crate::render::{PicturePlan, RenderSettings};
 use crate::slicing::{Extrapolate, SliceSettings, VoxelGrid};
+use crate::times::{StageTime, StageTimes};
 use crate::tree::TreeArrays;
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -110,13 +111,14 @@ impl<'a> Workload<'a> {
     }
 
     /// Runs stage 0 and both constructions with a target, and returns the times of their stages.
-    fn construct(&self, target: &Target) -> Result<(Prepared, Vec<StageTime>)> {
+    fn construct(&self, target: &Target) -> Result<(Prepared, StageTimes)> {
         let gpu = self.gpu.with_target(target.clone())?;
         let mesh = DeviceMesh::upload(&gpu, self.mesh, BadCells::Skip)?;
         let tree = |lists| Tree::build(&gpu, &mesh, &BuildOptions { lists, ..BuildOptions::default() });
         let (whole, boundary) = (tree(Lists::All)?, tree(Lists::Boundary)?);
-        let stages = mesh.stages().iter().chain(whole.stages()).chain(boundary.stages()).cloned().collect();
-        Ok((Prepared { target: target.clone(), mesh, whole, boundary }, stages))
+        let mut times = mesh.times().clone();
+        [&whole, &boundary].into_iter().for_each(|tree| times.add(tree.times().clone()));
+        Ok((Prepared { target: target.clone(), mesh, whole, boundary }, times))
     }
 
     /// Mesh and trees for a target, from the cache if they are there.
@@ -131,31 +133,26 @@ impl<'a> Workload<'a> {
         Ok(made)
     }
 
-    /// Runs every query; stores the answers in `answers` and returns the times of the stages.
-    fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<Vec<StageTime>> {
-        let mut stages = Vec::new();
+    /// Runs every query; stores the answers in `answers` and returns what it took.
+    fn ask(&self, on: &Prepared, answers: &mut Answers) -> Result<StageTimes> {
+        let mut times = StageTimes::default();
         for (tree, method) in [(&on.whole, LocateMethod::Descent), (&on.boundary, LocateMethod::Sorted)] {
             let options = LocateOptions { method, ..LocateOptions::default() };
             let located = query::locate(tree, &self.points, None, &options, SILENT)?;
-            stages.extend(located.stages);
+            times.add(located.times);
             answers.owners.push(located.owners);
             answers.barycentrics.extend(located.barycentrics);
         }
         let rendered = query::render(&on.whole, &self.plan, (&self.field.values, On::Points), None, SILENT)?;
         answers.colors = rendered.colors;
+        times.add(rendered.times);
         let sliced = query::slice(&on.whole, None, &self.voxels, Extrapolate::Nearest, SILENT, &mut |band| {
             answers.kinds.extend(band.kinds);
             answers.voxels.extend(band.owners);
             Ok(())
         })?;
-        let parts = [
-            ("query.intervals", rendered.stats.interval_ms),
-            ("query.march", rendered.stats.march_ms),
-            ("query.slice_locate", sliced.locate_ms),
-            ("query.slice_touch", sliced.touch_ms),
-        ];
-        stages.extend(parts.map(|(name, milliseconds)| StageTime { name: name.into(), milliseconds }));
-        Ok(stages)
+        times.add(sliced.times);
+        Ok(times)
     }
 
     fn answers(&self, target: &Target) -> Result<Answers> {
@@ -184,7 +181,7 @@ impl Work for Workload<'_> {
 
     fn run(&self, target: &Target, stages: &[&str]) -> Result<Vec<StageTime>> {
         let any = |kinds: &[&str]| stages.iter().any(|s| kinds.iter().any(|k| s.starts_with(k)));
-        let mut times = Vec::new();
+        let mut times = StageTimes::default();
         let begin;
         if any(&["query."]) {
             let on = self.prepared(target)?;
@@ -196,11 +193,11 @@ impl Work for Workload<'_> {
             begin = Instant::now();
         }
         if any(&["mesh.", "build."]) {
-            times.extend(self.construct(target)?.1);
+            times.add(self.construct(target)?.1);
         }
         // Without timestamps, the host's clock is used for all stages together.
         let wall =
             StageTime { name: stages.first().copied().unwrap_or_default().into(), milliseconds: begin.elapsed().as_secs_f64() * 1e3 };
-        Ok(if times.iter().any(|s| s.milliseconds > 0.0) { times } else { vec![wall] })
+        Ok(if times.total() > 0.0 { times.stages } else { vec![wall] })
     }
 }

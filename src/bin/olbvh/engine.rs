@@ -12,10 +12,9 @@ use olbvh::error::Result;
 use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Bounds, Fault, Mesh};
 use olbvh::options::BuildOptions;
-use olbvh::query::{Located, Nearest};
+use olbvh::query::{AllOwners, LocateOptions, Located, Nearest, Overlapped, Sliced};
 use olbvh::reference::boundary::Counts;
-use olbvh::reference::overlap::Overlap;
-use olbvh::slicing::{Band, Tally};
+use olbvh::slicing::Band;
 use olbvh::tree::TreeBytes;
 
 /// Receives progress: how much of how much is done.
@@ -34,17 +33,29 @@ pub trait Engine {
     /// Marks the boundary, builds the tree, and reports the properties of both.
     fn summary(&self, mesh: &Mesh, options: &BuildOptions) -> Result<Summary>;
     /// Builds a tree over a mesh and finds the owner and barycentric coordinates of each point.
-    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>>;
+    fn locate(
+        &self,
+        asked: &LocateRequest<'_>,
+        how: &LocateOptions,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<Located>>;
     /// Builds a tree over a mesh and finds every tetrahedron that contains each point.
-    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>>;
+    fn locate_all(
+        &self,
+        asked: &LocateRequest<'_>,
+        tolerance: f32,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<AllOwners>>;
     /// Builds a tree over a mesh and finds the place of its surface that is closest to each point, at most `within` away.
     fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>>;
     /// Builds a tree over each of two meshes and finds where they overlap.
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>>;
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>>;
     /// Builds a tree over a mesh and draws a field.
     fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>>;
     /// Builds a tree over a mesh and slices it, band by band into `sink`.
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>>;
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>>;
 }
 
 /// Figures about a mesh and its tree.

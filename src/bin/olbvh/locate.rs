@@ -103,16 +103,17 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     // The difference is taken in double precision, which is what the mesh's origin is for.
     let local: Vec<[f32; 3]> = points.iter().map(|p| [0, 1, 2].map(|c| (p[c] - mesh.origin[c]) as f32)).collect();
     let method = if args.coherent { LocateMethod::Descent } else { LocateMethod::Suited };
-    let asked = LocateRequest { mesh, options, points: &local, how: LocateOptions { method, tolerance: args.tolerance } };
+    let asked = LocateRequest { mesh, options, points: &local };
+    let how = LocateOptions { method, tolerance: args.tolerance };
     let progress = Progress::new(common, "locating");
     let report = |done: u64, total: u64| progress.follow(done, total);
     let (start, memory) = (Instant::now(), args.memory.memory);
     let (found, beside, took, seconds) = if args.all {
-        let (owners, took) = engine.locate_all(&asked, memory, &report)?.into_parts();
+        let (all, took) = engine.locate_all(&asked, args.tolerance, memory, &report)?.into_parts();
         let seconds = start.elapsed().as_secs_f64();
-        (write_every_owner(&output, mesh, &owners)?, 0, took, seconds)
+        (write_every_owner(&output, mesh, &all.owners)?, 0, took, seconds)
     } else {
-        let (mut located, took) = engine.locate(&asked, memory, &report)?.into_parts();
+        let (mut located, took) = engine.locate(&asked, &how, memory, &report)?.into_parts();
         let found = with_owner(&located);
         let distances = args.within.map(|within| move_beside(&*engine, &asked, &mut located, within, memory, &report)).transpose()?;
         let values = columns(mesh, &fields, args.all_fields, &located, distances);

@@ -11,6 +11,7 @@ use olbvh::blocks::{InBlocks, OverlapRequest};
 use olbvh::formats::{OutputFormat, write_json, write_mesh};
 use olbvh::mesh::{Bounds, Field, Mesh, On, is_usable, valid_grid};
 use olbvh::options::{Assign, BuildOptions, Fineness, Lists};
+use olbvh::query::Overlapped;
 use olbvh::reference::overlap::{Effort, Overlap};
 use serde_json::{Value, json};
 use std::path::PathBuf;
@@ -65,7 +66,8 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let progress = Progress::new(common, "overlap");
     let asked = OverlapRequest { meshes: [&a, &b], options, pairs: args.pairs };
     let start = Instant::now();
-    let (overlap, took) = engine.overlap(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
+    let (Overlapped { overlap, .. }, took) =
+        engine.overlap(&asked, args.memory.memory, &|done, total| progress.follow(done, total))?.into_parts();
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     drop(progress);
     for (path, bad) in [&args.a, &args.b].into_iter().zip(took.bad_cells) {

@@ -17,7 +17,7 @@ use olbvh::render::camera::{CameraSpec, HELP};
 use olbvh::render::clip;
 use olbvh::render::maps::MAPS;
 use olbvh::render::settings::MAX_SIZE;
-use olbvh::render::{Background, Clip, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
+use olbvh::render::{Background, Clip, Prepared, RenderSettings, SuitedStep, TransferFunction, suited_step, transfer};
 use serde_json::json;
 use std::path::PathBuf;
 use std::time::Instant;
@@ -158,18 +158,18 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
         let no_volume = picture.rendered.stats.found_samples == 0 && loaded.report.flat == loaded.report.tetrahedra;
         remark_on_emptiness(&field, values, no_volume, common);
     }
-    if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(picture.plan.step)) {
+    if let Some(SuitedStep { thickness, .. }) = suited.filter(|suited| 2.0 * suited.thickness < f64::from(picture.prepared.plan.step)) {
         common.remark(format_args!(
             "the mesh is about {thickness:.1e} thick, the step is {:.1e}: the picture may show rings, or miss parts; --step sets it",
-            picture.plan.step
+            picture.prepared.plan.step
         ));
     }
     if args.bounds {
-        bounding_box::draw(&mut picture.rendered.colors, &picture.plan, &picture.bounds, args.supersample);
+        bounding_box::draw(&mut picture.rendered.colors, &picture.prepared.plan, &picture.prepared.bounds, args.supersample);
     }
     let seconds = start.elapsed().as_secs_f64() - took.build_seconds;
     args.write(&picture, &field, legend, &output)?;
-    let camera = picture.camera.text(&picture.bounds, mesh.origin);
+    let camera = picture.prepared.camera.text(&picture.prepared.bounds, mesh.origin);
     Done { picture, camera, field, took, seconds, device: engine.name() }.report(args, output, common)
 }
 
@@ -196,14 +196,18 @@ struct Done {
 impl Done {
     /// Prints the summary.
     fn report(&self, args: &Args, output: ResultOutput, common: &Common) -> Outcome {
-        let Self { picture: Picture { rendered, plan, range: [lo, hi], .. }, camera, field, took, seconds, device } = self;
+        let Self { picture: Picture { rendered, prepared: Prepared { plan, range: [lo, hi], .. } }, camera, field, took, seconds, device } =
+            self;
         let (stats, [width, height], n) = (rendered.stats, args.size, args.supersample);
+        let took_ms = |stage: &str| rendered.times.milliseconds(stage);
+        let (ranges_ms, interval_ms, march_ms) =
+            (took_ms("build.ranges") + took_ms("query.visible"), took_ms("query.intervals"), took_ms("query.march"));
         let json = json!({
             "file": args.output.display().to_string(), "width": width, "height": height, "supersample": n,
             "field": field.name, "range": [single(*lo), single(*hi)], "iso": plan.iso.iter().map(|&v| single(v)).collect::<Vec<_>>(),
             "camera": camera, "step": single(plan.step), "samples": stats.samples, "skipped_samples": stats.skipped_samples,
-            "found_samples": stats.found_samples, "ranges_ms": stats.ranges_ms, "interval_ms": stats.interval_ms,
-            "march_ms": stats.march_ms, "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak,
+            "found_samples": stats.found_samples, "ranges_ms": ranges_ms, "interval_ms": interval_ms,
+            "march_ms": march_ms, "build_ms": took.build_seconds * 1e3, "blocks": took.trees, "peak_bytes": took.peak,
             "bad_cells": took.bad_cells[0], "seconds": seconds, "device": device,
         });
         let text = format!(
@@ -215,8 +219,8 @@ impl Done {
             grouped(stats.samples),
             grouped(stats.found_samples),
             grouped(stats.skipped_samples),
-            milliseconds(stats.interval_ms),
-            milliseconds(stats.march_ms),
+            milliseconds(interval_ms),
+            milliseconds(march_ms),
             in_blocks(took)
         );
         output.finish(common, &json, &text)
@@ -269,8 +273,9 @@ impl Args {
 
     /// Writes the picture, with its legend.
     fn write(&self, picture: &Picture, field: &Field, legend: Option<Legend>, output: &ResultOutput) -> Outcome {
-        let pixels = picture.plan.pixels(&picture.rendered.colors, self.supersample);
-        let explained = Explained { field: &printable(&field.name), range: picture.range, plan: &picture.plan };
+        let Picture { rendered, prepared: Prepared { plan, range, .. } } = picture;
+        let pixels = plan.pixels(&rendered.colors, self.supersample);
+        let explained = Explained { field: &printable(&field.name), range: *range, plan };
         let pixels = legend.map(|legend| legend.beside(&pixels, &explained)).unwrap_or(pixels);
         let [width, height] = self.size;
         Ok(write_png(output.path(), width, height, &pixels)?)

@@ -12,6 +12,7 @@ use olbvh::blocks::{InBlocks, SliceRequest};
 use olbvh::formats::{OutputFormat, printable};
 use olbvh::mesh::{Bounds, Field, Mesh, On, valid_grid};
 use olbvh::options::{BuildOptions, Fineness};
+use olbvh::query::Sliced;
 use olbvh::render::TransferFunction;
 use olbvh::render::transfer::DEFAULT_MAP;
 use olbvh::slicing::{Band, Extrapolate, Plane, SliceSettings, Tally, VoxelGrid};
@@ -130,7 +131,7 @@ pub fn run(args: &Args, common: &Common) -> Outcome {
     let mut sink = |band: Band| layers.band(band);
     let asked = SliceRequest { mesh, options, field, voxels: &voxels, extrapolate: args.extrapolate };
     let sliced = engine.slice(&asked, args.memory.memory, &|done, total| progress.follow(done, total), &mut sink)?;
-    let (tally, took) = sliced.into_parts();
+    let (Sliced { tally, .. }, took) = sliced.into_parts();
     layers.finish()?;
     drop(progress);
     input::remark_on_bad_cells(&args.mesh, took.bad_cells[0], common);

@@ -84,7 +84,7 @@ fn expected(gpu: &Gpu, meshes: &[Mesh; 2], plan: &PicturePlan, normals: Option<&
         sliced,
         hits: [bits(&sets.a, &meshes[0]), bits(&sets.b, &meshes[1])],
         pairs: pairs.pairs.unwrap(),
-        owners: locate_all(&tree, points, TOLERANCE, SILENT).unwrap(),
+        owners: locate_all(&tree, points, TOLERANCE, SILENT).unwrap().owners,
         nearest: nearest(&tree, points, 1.0, SILENT).unwrap(),
         located: locate(&tree, points, field, &LocateOptions::default(), SILENT).unwrap().values,
     }

@@ -44,6 +44,11 @@ impl PairMemory {
             scan: ScanScratch::carve(gpu, arena, tets)?,
         })
     }
+
+    /// Rejects memory that was carved for fewer tetrahedra.
+    fn check(&self, a: &Scene) -> Result<()> {
+        self.counts.check(4 * u64::from(a.mesh.input.tets), "counts of pairs")
+    }
 }
 
 /// Records the counting of pairs, a tetrahedron of A and one of B, that touch: [`crate::layout::OverlapStatus::pairs`],
@@ -56,9 +61,11 @@ impl PairMemory {
 /// finished.
 ///
 /// # Errors
-/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]), or for no rounds.
+/// [`Error::Invalid`] for a tree over B without the lists that pairs are found by ([`Lists::All`]), for no rounds, or for
+/// memory for fewer tetrahedra.
 pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, rounds: Rounds) -> Result<()> {
     rounds.check()?;
+    memory.check(a)?;
     if b.tree.lists != Lists::All {
         return Err(Error::Invalid("pairs of cells are found by lists: build the tree over the second mesh with `Lists::All`".into()));
     }
@@ -90,9 +97,10 @@ pub fn cmd_count_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &Pair
 /// writes; no barrier after.
 ///
 /// # Errors
-/// [`Error::Invalid`] for no rounds, [`Error::Vulkan`] if a pipeline cannot be made.
+/// [`Error::Invalid`] for no rounds, or memory for fewer tetrahedra; [`Error::Vulkan`] if a pipeline cannot be made.
 pub fn cmd_list_pairs(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &PairMemory, found: BufferRef, rounds: Rounds) -> Result<()> {
     rounds.check()?;
+    memory.check(a)?;
     if !rounds.resume {
         cmd_exclusive_scan(r, memory.counts, memory.places, memory.total, Count::host(a.mesh.input.tets), &memory.scan)?;
     }

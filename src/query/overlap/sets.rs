@@ -1,6 +1,7 @@
 //! Recording functions for the sets of tetrahedra that intersect the other mesh, both directions side by side.
 
 use super::frames::{Frames, each_once, unfinished};
+use crate::build::MeshInput;
 use crate::error::Result;
 use crate::gpu::{Arena, BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -42,6 +43,13 @@ impl Arrays {
             groups: arena.words(3)?,
         })
     }
+
+    /// Rejects memory that was carved for fewer points or tetrahedra.
+    fn check(&self, own: &MeshInput, other: &MeshInput) -> Result<()> {
+        self.places.check(4 * u64::from(own.points), "places of vertices")?;
+        self.waiting.check(4 * u64::from(own.tets), "tetrahedra to be searched for")?;
+        self.around.check(4 * u64::from(other.tets.div_ceil(32)), "tetrahedra around vertices")
+    }
 }
 
 /// Answers and scratch memory for the sets of two meshes: about 20 bytes per tetrahedron and 4 per point.
@@ -81,10 +89,13 @@ impl OverlapMemory {
 /// reads the answers.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for no rounds, [`crate::Error::Vulkan`] if a pipeline cannot be made.
+/// [`crate::Error::Invalid`] for no rounds, or memory for fewer points or tetrahedra; [`crate::Error::Vulkan`] if a
+/// pipeline cannot be made.
 pub fn cmd_overlap(r: &mut Recorder<'_>, a: &Scene, b: &Scene, memory: &OverlapMemory, rounds: Rounds) -> Result<()> {
     rounds.check()?;
     let [forth, back] = memory.directions;
+    forth.check(&a.mesh.input, &b.mesh.input)?;
+    back.check(&b.mesh.input, &a.mesh.input)?;
     let directions = [
         Direction { own: *a, other: *b, arrays: forth, held: back.around },
         Direction { own: *b, other: *a, arrays: back, held: forth.around },

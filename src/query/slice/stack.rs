@@ -12,24 +12,19 @@ use crate::mesh::On;
 use crate::query::searched::Searched;
 use crate::query::{Progress, Rounds, upload_field};
 use crate::slicing::{BAND_VOXELS, Band, EMPTY, Extrapolate, INSIDE, Rows, TOUCHED, Tally, VOXEL_RUN, VoxelGrid, bands};
+use crate::times::StageTimes;
 
 /// Bytes of device memory per voxel of a band, including transfers but not runs, and a fixed reserve.
 const PER_VOXEL: u64 = 40;
 const RESERVE: u64 = 1 << 14;
 
-/// Numbers of voxels, and what slicing a stack cost.
-#[derive(Clone, Copy, Debug, Default)]
+/// A stack that was sliced.
+#[derive(Clone, Debug, Default)]
 pub struct Sliced {
     /// Numbers of voxels by kind.
     pub tally: Tally,
-    /// Device time in milliseconds to locate the centres.
-    pub locate_ms: f64,
-    /// Device time in milliseconds to test the boxes of the other voxels.
-    pub touch_ms: f64,
-    /// Device time in milliseconds for the values.
-    pub values_ms: f64,
-    /// Number of submissions.
-    pub submissions: u32,
+    /// What it took.
+    pub times: StageTimes,
 }
 
 /// What the bands of a stack over a mesh and its structure have in common, in memory owned by this crate.
@@ -44,7 +39,8 @@ pub(crate) struct Slicing<'a> {
     buffer: Buffer,
     /// Rows of the largest band.
     pub(crate) rows: u32,
-    sliced: Sliced,
+    /// What was sliced so far.
+    pub(crate) sliced: Sliced,
 }
 
 impl<'a> Slicing<'a> {
@@ -84,13 +80,10 @@ impl<'a> Slicing<'a> {
         let input = SliceInput { voxels: self.voxels, rows, field, extrapolate: self.extrapolate };
         let mut rounds = Rounds::begin(1);
         let status = loop {
-            let ((), time) =
+            let ((), times) =
                 self.gpu.submit("olbvh.query.slice", |r| cmd_slice_in(r, &self.searched, &input, self.cells, memory, rounds))?;
             rounds = Rounds::resume(1);
-            sliced.submissions += 1;
-            sliced.locate_ms += time.milliseconds("query.slice_locate");
-            sliced.touch_ms += time.milliseconds("query.slice_touch");
-            sliced.values_ms += time.milliseconds("query.slice_values");
+            sliced.times.add(times);
             let status: SliceStatus = self.gpu.download_one(&self.buffer, memory.status)?;
             if status.locating + status.touching == 0 {
                 break status;
@@ -150,7 +143,6 @@ pub(crate) fn slice_in(
         sink(band)?;
         report(done, voxels.voxels())?;
     }
-    let Sliced { locate_ms, touch_ms, values_ms, submissions, .. } = slicing.sliced;
-    log::debug!("slice: locate {locate_ms:.1} ms, touch {touch_ms:.1} ms, values {values_ms:.1} ms, {submissions} submissions");
+    log::debug!("slice: {}", slicing.sliced.times);
     Ok(slicing.sliced)
 }

@@ -11,6 +11,7 @@ use crate::mesh::{Field, Mesh, On};
 use crate::query::searched::Searched;
 use crate::query::{Progress, Rounds, SILENT, upload_field};
 use crate::render::{PicturePlan, Prepared, RenderSettings, RenderStats, TABLE_SIZE, ValidTets};
+use crate::times::StageTimes;
 use bytemuck::Pod;
 
 /// Rays that [`render`] draws at once, in about a second on a processor, so that no submission takes long. Fewer for
@@ -19,13 +20,15 @@ fn strip(gpu: &Gpu) -> u32 {
     if matches!(gpu.report().kind, DeviceKind::Discrete | DeviceKind::Cpu) { 1 << 20 } else { 1 << 18 }
 }
 
-/// A finished picture, and what it cost; times are those of the device.
+/// A finished picture.
 #[derive(Clone, Debug, Default)]
 pub struct Rendered {
     /// Premultiplied colour and opacity, row 0 on top.
     pub colors: Vec<[f32; 4]>,
-    /// Numbers of samples, and times.
+    /// Numbers of samples.
     pub stats: RenderStats,
+    /// What it took, on the device.
+    pub times: StageTimes,
 }
 
 /// The rays of a picture in host memory, kept from one block of a mesh to the next.
@@ -63,6 +66,7 @@ pub(crate) struct Canvas<'a> {
     /// Whether the memory has the marks of the visible nodes, which strips have in common.
     marked: bool,
     stats: RenderStats,
+    times: StageTimes,
 }
 
 impl<'a> Canvas<'a> {
@@ -105,9 +109,9 @@ impl<'a> Canvas<'a> {
         }
         let buffer = gpu.buffer("olbvh.query.picture", Arena::measure(|a| carve(a, rows))?)?;
         let (memory, ranges) = carve(&mut Arena::new(buffer.all()), rows)?;
-        let stats = RenderStats::default();
+        let (stats, times) = (RenderStats::default(), StageTimes::default());
         let mut canvas =
-            Self { gpu, searched: *searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, marked: false, stats };
+            Self { gpu, searched: *searched, plan, field, normals, uniforms, ranges, memory, buffer, rows, marked: false, stats, times };
         canvas.gather_ranges()?;
         Ok(canvas)
     }
@@ -116,15 +120,15 @@ impl<'a> Canvas<'a> {
     fn gather_ranges(&mut self) -> Result<()> {
         if let (Some(tree), Some(ranges)) = (self.searched.octree(), self.ranges) {
             let field = (self.field.0.all(), self.field.1);
-            let ((), time) = self.gpu.submit("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
-            self.stats.ranges_ms += time.milliseconds("build.ranges");
+            let ((), times) = self.gpu.submit("olbvh.query.ranges", |r| cmd_ranges(r, &self.searched.mesh, tree, field, ranges))?;
+            self.times.add(times);
         }
         Ok(())
     }
 
     /// Draws a picture of this size from this row of the view on, or the share of a block in it. `report` receives the number of rays done and their total.
     fn draw(&mut self, size: [u32; 2], row: u32, cells: Option<CellRange>, report: Progress<'_>) -> Result<()> {
-        let Self { gpu, searched, plan, memory, stats, .. } = self;
+        let Self { gpu, searched, plan, memory, stats, times, .. } = self;
         let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
         let input = RenderInput {
             size,
@@ -135,16 +139,12 @@ impl<'a> Canvas<'a> {
         };
         let share = Share { cells, marked: self.marked };
         let begin = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::begin(0));
-        let ((), time) = gpu.submit("olbvh.query.intervals", begin)?;
+        times.add(gpu.submit("olbvh.query.intervals", begin)?.1);
         self.marked = true;
-        stats.ranges_ms += time.milliseconds("query.visible");
-        stats.interval_ms += time.milliseconds("query.intervals");
         let rays = u64::from(size[0]) * u64::from(size[1]);
         let status = loop {
             let round = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::resume(1));
-            let ((), time) = gpu.submit("olbvh.query.march", round)?;
-            stats.march_ms += time.milliseconds("query.march");
-            stats.submissions += 1;
+            times.add(gpu.submit("olbvh.query.march", round)?.1);
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
             report(rays.saturating_sub(u64::from(status.unfinished)), rays)?;
             if status.unfinished == 0 {
@@ -163,7 +163,7 @@ impl<'a> Canvas<'a> {
     /// # Errors
     /// A failed Vulkan call, or too little memory for transfers. `rays` then holds what is done; drawing the block
     /// again with these rays does not take the same samples again.
-    pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<RenderStats> {
+    pub(crate) fn draw_part(mut self, cells: CellRange, met: &[bool], rays: &mut Rays) -> Result<(RenderStats, StageTimes)> {
         let [width, height] = self.plan.size;
         for row in (0..height).step_by(self.rows as usize) {
             let size = [width, self.rows.min(height - row)];
@@ -183,7 +183,7 @@ impl<'a> Canvas<'a> {
             colors.copy_from_slice(&drawn);
             states.copy_from_slice(&reached);
         }
-        Ok(self.stats)
+        Ok((self.stats, self.times))
     }
 
     /// Reads back the first items of a part of the memory.
@@ -264,5 +264,6 @@ pub(crate) fn render_in(
         canvas.draw(size, row, None, &|done, _| report(before + done, rays))?;
         colors.extend(canvas.first::<[f32; 4]>(canvas.memory.colors, size[0] as usize * size[1] as usize)?);
     }
-    Ok(Rendered { colors, stats: canvas.stats })
+    log::debug!("picture: {}", canvas.times);
+    Ok(Rendered { colors, stats: canvas.stats, times: canvas.times })
 }

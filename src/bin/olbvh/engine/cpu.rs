@@ -5,16 +5,15 @@ use olbvh::blocks::{InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequ
 use olbvh::error::{Error, Result};
 use olbvh::mesh::Mesh;
 use olbvh::options::{BuildOptions, POINT_CHUNK, POINT_CODE_BITS};
-use olbvh::query::{LocateMethod, LocateOptions, Located, Nearest, Rendered};
+use olbvh::query::{AllOwners, LocateMethod, LocateOptions, Located, Nearest, Overlapped, Rendered, Sliced};
 use olbvh::reference::boundary::{Topology, topology};
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::{self, Location, Locator};
 use olbvh::reference::nearest::Surface;
-use olbvh::reference::overlap::{Overlap, OverlapSide, overlap};
+use olbvh::reference::overlap::{OverlapSide, overlap};
 use olbvh::reference::slice::Slicer;
 use olbvh::reference::vertices::Vertices;
 use olbvh::reference::volume::{self, Drawing};
-use olbvh::render::Prepared;
 use olbvh::slicing::{BAND_VOXELS, Tally, bands};
 use olbvh::tree::TreeArrays;
 use rayon::prelude::*;
@@ -65,14 +64,26 @@ impl Engine for Cpu {
         })
     }
 
-    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        on_host(asked.mesh, &asked.options, memory, |tree| tree.locate(asked.points, &asked.how, report))
+    fn locate(
+        &self,
+        asked: &LocateRequest<'_>,
+        how: &LocateOptions,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<Located>> {
+        on_host(asked.mesh, &asked.options, memory, |tree| tree.locate(asked.points, how, report))
     }
 
-    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
+    fn locate_all(
+        &self,
+        asked: &LocateRequest<'_>,
+        tolerance: f32,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<AllOwners>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
-            let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(asked.how.tolerance);
-            each(asked.points, |p| locator.owners(p), report)
+            let locator = Locator::new(tree.mesh, &tree.topology, &tree.tree).with_tolerance(tolerance);
+            Ok(AllOwners { owners: each(asked.points, |p| locator.owners(p), report)?, ..AllOwners::default() })
         })
     }
 
@@ -85,11 +96,12 @@ impl Engine for Cpu {
                 barycentrics: found.iter().map(|(location, _)| location.barycentric).collect(),
                 squares: found.iter().map(|(_, square)| *square).collect(),
                 scale: tree.tree.grid.scale,
+                ..Nearest::default()
             })
         })
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
         no_memory(memory)?;
         let ([a, b], options) = (asked.meshes, &asked.options);
         let start = Instant::now();
@@ -98,7 +110,8 @@ impl Engine for Cpu {
         let (tree_a, tree_b) = (build(a, &topology_a, options)?, build(b, &topology_b, options)?);
         let build_seconds = start.elapsed().as_secs_f64();
         let side_a = OverlapSide { mesh: a, topology: &topology_a, tree: &tree_a };
-        let answer = overlap(side_a, OverlapSide { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        let found = overlap(side_a, OverlapSide { mesh: b, topology: &topology_b, tree: &tree_b }, asked.pairs);
+        let answer = Overlapped { overlap: found, ..Overlapped::default() };
         report(1, 1)?;
         let bad_cells = [topology_a.counts.bad, topology_b.counts.bad];
         Ok(InBlocks { answer, trees: 2, peak: 0, build_seconds, bad_cells })
@@ -107,13 +120,12 @@ impl Engine for Cpu {
     fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let scene = Drawing::new(tree.mesh, &tree.topology, &tree.tree, asked.field, asked.settings)?;
-            let volume::Picture { colors, stats, .. } = volume::render(&scene, report)?;
-            let Prepared { plan, camera, bounds, range, .. } = scene.prepared().clone();
-            Ok(Picture { rendered: Rendered { colors, stats }, plan, camera, bounds, range })
+            let volume::Picture { colors, stats, times, .. } = volume::render(&scene, report)?;
+            Ok(Picture { rendered: Rendered { colors, stats, times }, prepared: scene.into_prepared() })
         })
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
         let SliceRequest { field, voxels, extrapolate, .. } = *asked;
         on_host(asked.mesh, &asked.options, memory, |tree| {
             let slicer = Slicer::new(tree.mesh, &tree.topology, &tree.tree, field, *voxels, extrapolate)?;
@@ -126,7 +138,7 @@ impl Engine for Cpu {
                 done += u64::from(rows.count) * u64::from(voxels.size[0]);
                 report(done, voxels.voxels())?;
             }
-            Ok(tally)
+            Ok(Sliced { tally, ..Sliced::default() })
         })
     }
 }

@@ -5,13 +5,11 @@ use crate::common::{Common, Outcome};
 use olbvh::blocks::{self, InBlocks, LocateRequest, OverlapRequest, Picture, RenderRequest, SliceRequest};
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::error::Result;
-use olbvh::gpu::{Gpu, GpuOptions, StageTime};
+use olbvh::gpu::{Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, fault_of};
 use olbvh::options::BuildOptions;
-use olbvh::query::{Located, Nearest};
+use olbvh::query::{AllOwners, LocateOptions, Located, Nearest, Overlapped, Sliced};
 use olbvh::reference::boundary::Counts;
-use olbvh::reference::overlap::Overlap;
-use olbvh::slicing::Tally;
 use std::path::PathBuf;
 
 /// An opened device, and the target of its kernels with its origin.
@@ -82,34 +80,45 @@ impl Engine for Device {
             memory: tree.sizes(),
             paper_bytes: tree.sizes().paper(),
             neighbour_bytes: device.neighbour_bytes(),
-            topology_ms: StageTime::sum(device.stages()),
-            build_ms: StageTime::sum(tree.stages()),
-            stages: device.stages().iter().chain(tree.stages()).map(|s| (s.name.clone(), s.milliseconds)).collect(),
+            topology_ms: device.times().total(),
+            build_ms: tree.times().total(),
+            stages: device.times().stages.iter().chain(&tree.times().stages).map(|s| (s.name.clone(), s.milliseconds)).collect(),
         })
     }
 
-    fn locate(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Located>> {
-        blocks::locate(&self.0, self.memory(memory), asked, None, report)
+    fn locate(
+        &self,
+        asked: &LocateRequest<'_>,
+        how: &LocateOptions,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<Located>> {
+        blocks::locate(&self.0, self.memory(memory), asked, None, how, report)
     }
 
-    fn locate_all(&self, asked: &LocateRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Vec<Vec<u32>>>> {
-        blocks::locate_all(&self.0, self.memory(memory), asked, report)
+    fn locate_all(
+        &self,
+        asked: &LocateRequest<'_>,
+        tolerance: f32,
+        memory: Option<u64>,
+        report: OnProgress<'_>,
+    ) -> Result<InBlocks<AllOwners>> {
+        blocks::locate_all(&self.0, self.memory(memory), asked, tolerance, report)
     }
 
     fn nearest(&self, asked: &LocateRequest<'_>, within: f32, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Nearest>> {
         blocks::nearest(&self.0, self.memory(memory), asked, within, report)
     }
 
-    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlap>> {
-        let (found, took) = blocks::overlap(&self.0, self.memory(memory), asked, report)?.into_parts();
-        Ok(took.with(found.overlap))
+    fn overlap(&self, asked: &OverlapRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Overlapped>> {
+        blocks::overlap(&self.0, self.memory(memory), asked, report)
     }
 
     fn render(&self, asked: &RenderRequest<'_>, memory: Option<u64>, report: OnProgress<'_>) -> Result<InBlocks<Picture>> {
         blocks::render(&self.0, self.memory(memory), asked, report)
     }
 
-    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Tally>> {
+    fn slice(&self, asked: &SliceRequest<'_>, memory: Option<u64>, report: OnProgress<'_>, sink: Sink<'_>) -> Result<InBlocks<Sliced>> {
         blocks::slice(&self.0, self.memory(memory), asked, report, sink)
     }
 }
