@@ -38,7 +38,6 @@ pub struct Constant {
 }
 
 pub struct StructLayout {
-    pub name: String,
     pub bytes: u32,
     pub members: Vec<Member>,
 }
@@ -207,19 +206,19 @@ pub fn interface(words: &[u32], stem: &str) -> Result<Interface, String> {
     Ok(Interface { stem: stem.into(), buffers: buffers.into_iter().map(|(_, b)| b).collect(), scalars, scalar_bytes, constants })
 }
 
-/// The named structs of a module.
-pub fn structs(words: &[u32], wanted: &[&str]) -> Result<Vec<StructLayout>, String> {
+/// The layout of a struct of a module.
+pub fn layout_of(words: &[u32], name: &str) -> Result<StructLayout, String> {
     let r = Reader::new(words)?;
-    wanted
-        .iter()
-        .map(|name| {
-            let laid_out = |id: &Word| r.member_decoration(*id, 0, Decoration::Offset).is_some();
-            let found = r.names.iter().find(|(id, n)| n == name && laid_out(id));
-            let (id, _) = found.ok_or_else(|| format!("struct {name} is not in the module"))?;
-            let bytes = r.rust_type(*id)?.1.next_multiple_of(4);
-            Ok(StructLayout { name: (*name).into(), bytes, members: r.members(*id).map_err(|e| format!("{name}.{e}"))? })
-        })
-        .collect()
+    let laid_out = |id: &Word| r.member_decoration(*id, 0, Decoration::Offset).is_some();
+    let found = r.names.iter().find(|(id, n)| n.as_str() == name && laid_out(id));
+    let (id, _) = found.ok_or_else(|| format!("struct {name} is not in the module"))?;
+    let bytes = r.rust_type(*id)?.1.next_multiple_of(4);
+    Ok(StructLayout { bytes, members: r.members(*id).map_err(|e| format!("{name}.{e}"))? })
+}
+
+/// The names of the structs of a source.
+pub fn struct_names(text: &str) -> impl Iterator<Item = &str> {
+    text.lines().filter_map(|line| line.strip_prefix("struct ")?.split_whitespace().next())
 }
 
 /// The comments of a source, by `Struct` (the lines before it) and `Struct.member` (after it on its line).

@@ -142,9 +142,9 @@ int main(int argc, char **argv) {
     /* Three layers of voxels. */
     float side = (float)n / (LAYER - 4);
     olbvh_slicing slicing = {.rows = LAYER * LAYERS, .field = picture.field, .rounds = {.count = 1}};
-    slicing.voxels = (olbvh_voxels){.width = LAYER, .height = LAYER, .layers = LAYERS, .up = {0, 0, hi[2] / 2}};
+    slicing.voxels = (olbvh_voxels){.width = LAYER, .height = LAYER, .layers = LAYERS, .next_layer = {0, 0, hi[2] / 2}};
     slicing.voxels.origin[0] = slicing.voxels.origin[1] = -1.6f * side;
-    slicing.voxels.across[0] = slicing.voxels.down[1] = side;
+    slicing.voxels.next_voxel[0] = slicing.voxels.next_row[1] = side;
     for (int c = 0; c < 3; ++c) slicing.voxels.half[c][c] = side / 2;
     olbvh_slicing_parts_data sliced;
     check(olbvh_slicing_parts(&slicing, &sliced), "measuring a slice");

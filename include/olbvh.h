@@ -32,7 +32,7 @@
 /*
  Version of this interface. A header and a library with different versions are incompatible.
  */
-#define OLBVH_ABI 3
+#define OLBVH_ABI 4
 
 /*
  Result of a call.
@@ -369,15 +369,15 @@ typedef struct olbvh_voxels {
   /*
    Vector from one voxel to the next in a row.
    */
-  float across[3];
+  float next_voxel[3];
   /*
    Vector from one row to the next.
    */
-  float down[3];
+  float next_row[3];
   /*
    Vector from one layer to the next.
    */
-  float up[3];
+  float next_layer[3];
   /*
    Half axes of a voxel's box.
    */

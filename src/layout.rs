@@ -1,5 +1,5 @@
 //! Structs and constants shared by host and device, and how their words are read. The structs are generated from
-//! `scene.glsl` and `layout.glsl` in `glsl/shared` by reflection, the constants from all files of `glsl`.
+//! `scene.glsl`, `layout.glsl` and `state.glsl` in `glsl/shared` by reflection, the constants from all files of `glsl`.
 
 #![allow(clippy::doc_markdown)]
 

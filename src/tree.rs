@@ -98,33 +98,32 @@ impl TreeArrays {
         if digit < 8 && mask >> digit & 1 != 0 { self.co.get(node as usize).map(|co| co + 1 + before) } else { None }
     }
 
-    /// The range of a node's entries in `p`, from those of its first leaf to those of its last.
-    ///
-    /// # Panics
-    /// For a node that the tree does not have, or in a tree that breaks its rules (see [`TreeArrays::validate`]).
+    /// The range of a node's entries in `p`, from those of its first leaf to those of its last; empty for a node that the
+    /// tree does not have.
     pub fn entries(&self, node: u32) -> Range<usize> {
-        let (mut first, mut last) = (node, node);
-        while first < self.internal_nodes() {
-            (first, last) = (self.co[first as usize] + 1, self.co[last as usize + 1]);
+        let internal = self.internal_nodes() as usize;
+        let child_offset = |node: usize| self.co.get(node).map_or(0, |&offset| offset as usize);
+        let (mut first, mut last) = (node as usize, node as usize);
+        for _ in 0..self.grid.level {
+            if first < internal {
+                (first, last) = (child_offset(first) + 1, child_offset(last + 1));
+            }
         }
-        let leaf = |node: u32| (node - self.internal_nodes()) as usize;
-        self.po[leaf(first)] as usize..self.po[leaf(last) + 1] as usize
+        let leaf_offset = |node: usize| node.checked_sub(internal).and_then(|leaf| self.po.get(leaf)).map_or(0, |&offset| offset as usize);
+        leaf_offset(first)..leaf_offset(last + 1)
     }
 
     /// The tetrahedra of a node. For a leaf they are ascending and distinct; for an internal node the lists of its
     /// leaves follow one another.
-    ///
-    /// # Panics
-    /// As [`TreeArrays::entries`].
-    pub fn primitives(&self, node: u32) -> &[u32] {
-        &self.p[self.entries(node)]
+    pub fn tets(&self, node: u32) -> &[u32] {
+        self.p.get(self.entries(node)).unwrap_or_default()
     }
 
     /// The seed, from which a walk through a leaf starts, if the leaf has one: the leaf lies entirely within the mesh
     /// and its list is left out (SPEC 2.6).
     pub fn seed(&self, leaf: u32) -> Option<u32> {
         let full = self.lists == Lists::Boundary && !self.is_boundary(leaf);
-        self.primitives(leaf).first().copied().filter(|_| full)
+        self.tets(leaf).first().copied().filter(|_| full)
     }
 
     /// Whether the mesh surface may pass through the node. If not, the node's leaves lie entirely within the mesh.

@@ -1,14 +1,15 @@
 //! The body: a mesh in the host's memory, deformed every frame, and the arrays of olbvh for it.
 
-use crate::host::{Host, HostBuffer};
+use crate::host::{Host, HostBuffer, storage_set};
 use anyhow::{Context, Result};
 use ash::vk;
 use glam::Vec3;
 use gpu_allocator::MemoryLocation;
 use olbvh::build::{PlacedScene, ScenePlan};
 use olbvh::glsl::SceneBuffers;
-use olbvh::gpu::{BufferRef, Gpu, Recorder, USAGE};
+use olbvh::gpu::{Gpu, Recorder};
 use olbvh::mesh::Mesh;
+use olbvh::query::Scene;
 use std::path::Path;
 
 /// What each frame in flight has of its own.
@@ -61,8 +62,9 @@ impl Body {
         let (low, high) = (fold(Vec3::min), fold(Vec3::max));
         let (points, tets) = (mesh.points.len() as u32, mesh.tets.len() as u32);
 
-        let values = host.filled("values", &values, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
-        let cells = host.filled("cells", &mesh.tets, USAGE)?;
+        let usage = gpu.usage();
+        let values = host.filled("values", &values, usage | vk::BufferUsageFlags::VERTEX_BUFFER)?;
+        let cells = host.filled("cells", &mesh.tets, usage)?;
         let faces = surface(&mesh.tets);
         let triangles = host.filled("triangles", &faces, vk::BufferUsageFlags::INDEX_BUFFER)?;
 
@@ -70,22 +72,33 @@ impl Body {
         // coarser one.
         let plan = ScenePlan::usual(points, tets, 7);
         let bytes = plan.bytes(gpu)?;
-        let device_buffer = |name: &str, size| host.buffer(name, size, USAGE, MemoryLocation::GpuOnly);
+        let device_buffer = |name: &str, size| host.buffer(name, size, usage, MemoryLocation::GpuOnly);
         let scratch = device_buffer("scratch", bytes.scratch)?;
-        let sets = if host.addresses { None } else { Some(descriptor_pool(host, slots)?) };
+        let sets = if host.addresses { None } else { Some(host.storage_sets(SceneBuffers::COUNT, slots)?) };
         let slots = (0..slots).map(|_| {
-            let positions = host.filled("positions", &mesh.points, USAGE | vk::BufferUsageFlags::VERTEX_BUFFER)?;
+            let positions = host.filled("positions", &mesh.points, usage | vk::BufferUsageFlags::VERTEX_BUFFER)?;
             let memory = device_buffer("tree", bytes.memory)?;
             let scene = plan.place(gpu, positions.part(), cells.part(), memory.part(), scratch.part())?;
             let buffers = SceneBuffers::new(&scene.mesh, &scene.tree, Some(values.part()))?;
-            let tree = host.filled("addresses", &[buffers.addresses()], USAGE)?;
-            let set = sets.map(|(pool, layout)| descriptor_set(host, pool, layout, &buffers.list(tree.part()))).transpose()?;
+            let tree = host.filled("addresses", &[buffers.addresses()], usage)?;
+            let set = sets.map(|(pool, layout)| storage_set(host, pool, layout, &buffers.list(tree.part()))).transpose()?;
             Ok(Deformed { positions, tree, set, memory, scene })
         });
         let slots = slots.collect::<Result<Vec<_>>>()?;
         let (centre, radius) = ((low + high) * 0.5, (high - low).length() * 0.5);
         let indices = faces.len() as u32;
         Ok(Self { mesh, tets, centre, radius, values, triangles, indices, slots, cells, scratch, sets })
+    }
+
+    /// What the body's coordinates are relative to, in those of its file.
+    pub fn origin(&self) -> [f64; 3] {
+        self.mesh.origin
+    }
+
+    /// The body and its tree in a slot, for queries.
+    pub fn scene(&self, slot: usize) -> Scene {
+        let PlacedScene { mesh, tree, .. } = self.slots[slot].scene;
+        Scene::recorded(mesh, tree)
     }
 
     pub fn set_layout(&self) -> Option<vk::DescriptorSetLayout> {
@@ -117,58 +130,11 @@ impl Body {
 
     pub fn free(self, host: &Host) {
         if let Some((pool, layout)) = self.sets {
-            // SAFETY: the device is idle.
-            unsafe {
-                host.device.destroy_descriptor_pool(pool, None);
-                host.device.destroy_descriptor_set_layout(layout, None);
-            }
+            host.free_sets(pool, layout);
         }
         for slot in self.slots {
             [slot.positions, slot.tree, slot.memory].into_iter().for_each(|b| host.free(b));
         }
         [self.values, self.triangles, self.cells, self.scratch].into_iter().for_each(|b| host.free(b));
-    }
-}
-
-/// A layout and a pool for the arrays of a scene, for devices without buffer addresses.
-fn descriptor_pool(host: &Host, sets: usize) -> Result<(vk::DescriptorPool, vk::DescriptorSetLayout)> {
-    let count = SceneBuffers::COUNT as u32;
-    let bindings: Vec<_> = (0..count)
-        .map(|i| {
-            let binding = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);
-            binding.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::FRAGMENT)
-        })
-        .collect();
-    let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: count * sets as u32 }];
-    // SAFETY: objects are created as Vulkan asks for; `Body::free` destroys both.
-    unsafe {
-        let layout = host.device.create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)?;
-        let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets as u32).pool_sizes(&sizes);
-        Ok((host.device.create_descriptor_pool(&info, None)?, layout))
-    }
-}
-
-fn descriptor_set(
-    host: &Host,
-    pool: vk::DescriptorPool,
-    layout: vk::DescriptorSetLayout,
-    buffers: &[BufferRef; SceneBuffers::COUNT],
-) -> Result<vk::DescriptorSet> {
-    let layouts = [layout];
-    let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
-    let range = |b: &BufferRef| [vk::DescriptorBufferInfo { buffer: b.buffer(), offset: b.offset(), range: b.size() }];
-    let infos = buffers.each_ref().map(range);
-    // SAFETY: the buffers outlive the set.
-    unsafe {
-        let set = host.device.allocate_descriptor_sets(&info)?[0];
-        let writes: Vec<_> = (0..)
-            .zip(&infos)
-            .map(|(i, info)| {
-                let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i);
-                write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
-            })
-            .collect();
-        host.device.update_descriptor_sets(&writes, &[]);
-        Ok(set)
     }
 }

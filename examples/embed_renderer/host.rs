@@ -130,14 +130,14 @@ impl Host {
     }
 
     pub fn buffer(&self, name: &str, size: u64, usage: vk::BufferUsageFlags, location: MemoryLocation) -> Result<HostBuffer> {
-        let usage = if self.addresses { usage | vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS } else { usage };
         // SAFETY: fresh memory of the right requirements, bound once.
         unsafe {
             let handle = self.device.create_buffer(&vk::BufferCreateInfo::default().size(size).usage(usage), None)?;
             let allocation = self.allocate(name, self.device.get_buffer_memory_requirements(handle), location, true)?;
             self.device.bind_buffer_memory(handle, allocation.memory(), allocation.offset())?;
             let info = vk::BufferDeviceAddressInfo::default().buffer(handle);
-            let address = if self.addresses { self.device.get_buffer_device_address(&info) } else { 0 };
+            let address =
+                if usage.contains(vk::BufferUsageFlags::SHADER_DEVICE_ADDRESS) { self.device.get_buffer_device_address(&info) } else { 0 };
             Ok(HostBuffer { handle, size, address, allocation })
         }
     }
@@ -164,6 +164,44 @@ impl Host {
             let info = vk::ImageViewCreateInfo::default().image(handle).view_type(vk::ImageViewType::TYPE_2D).format(format);
             let view = self.device.create_image_view(&info.subresource_range(range), None)?;
             Ok(HostImage { handle, view, allocation })
+        }
+    }
+
+    /// Records a barrier from and to these stages and accesses.
+    pub fn barrier(
+        &self,
+        commands: vk::CommandBuffer,
+        (from, to): (vk::PipelineStageFlags, vk::PipelineStageFlags),
+        (written, read): (vk::AccessFlags, vk::AccessFlags),
+    ) {
+        let barrier = [vk::MemoryBarrier::default().src_access_mask(written).dst_access_mask(read)];
+        // SAFETY: the command buffer is in the recording state, outside of a render pass.
+        unsafe { self.device.cmd_pipeline_barrier(commands, from, to, vk::DependencyFlags::empty(), &barrier, &[], &[]) };
+    }
+
+    /// A layout and a pool for sets of so many storage buffers.
+    pub fn storage_sets(&self, buffers: usize, sets: usize) -> Result<(vk::DescriptorPool, vk::DescriptorSetLayout)> {
+        let bindings: Vec<_> = (0..buffers as u32)
+            .map(|i| {
+                let binding = vk::DescriptorSetLayoutBinding::default().binding(i).descriptor_count(1);
+                binding.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).stage_flags(vk::ShaderStageFlags::FRAGMENT)
+            })
+            .collect();
+        let sizes = [vk::DescriptorPoolSize { ty: vk::DescriptorType::STORAGE_BUFFER, descriptor_count: (buffers * sets) as u32 }];
+        // SAFETY: objects are created as Vulkan asks for; `free_sets` destroys both.
+        unsafe {
+            let layout =
+                self.device.create_descriptor_set_layout(&vk::DescriptorSetLayoutCreateInfo::default().bindings(&bindings), None)?;
+            let info = vk::DescriptorPoolCreateInfo::default().max_sets(sets as u32).pool_sizes(&sizes);
+            Ok((self.device.create_descriptor_pool(&info, None)?, layout))
+        }
+    }
+
+    pub fn free_sets(&self, pool: vk::DescriptorPool, layout: vk::DescriptorSetLayout) {
+        // SAFETY: the device is idle when the renderer frees its sets.
+        unsafe {
+            self.device.destroy_descriptor_pool(pool, None);
+            self.device.destroy_descriptor_set_layout(layout, None);
         }
     }
 
@@ -226,4 +264,30 @@ pub struct HostImage {
     pub handle: vk::Image,
     pub view: vk::ImageView,
     allocation: Allocation,
+}
+
+/// A set with these buffers, which outlive it.
+pub fn storage_set(
+    host: &Host,
+    pool: vk::DescriptorPool,
+    layout: vk::DescriptorSetLayout,
+    buffers: &[olbvh::gpu::BufferRef],
+) -> Result<vk::DescriptorSet> {
+    let layouts = [layout];
+    let info = vk::DescriptorSetAllocateInfo::default().descriptor_pool(pool).set_layouts(&layouts);
+    let range = |b: &olbvh::gpu::BufferRef| [vk::DescriptorBufferInfo { buffer: b.buffer(), offset: b.offset(), range: b.size() }];
+    let infos: Vec<_> = buffers.iter().map(range).collect();
+    // SAFETY: the pool has room for the set, and the infos outlive the call.
+    unsafe {
+        let set = host.device.allocate_descriptor_sets(&info)?[0];
+        let writes: Vec<_> = (0..)
+            .zip(&infos)
+            .map(|(i, info)| {
+                let write = vk::WriteDescriptorSet::default().dst_set(set).dst_binding(i);
+                write.descriptor_type(vk::DescriptorType::STORAGE_BUFFER).buffer_info(info)
+            })
+            .collect();
+        host.device.update_descriptor_sets(&writes, &[]);
+        Ok(set)
+    }
 }

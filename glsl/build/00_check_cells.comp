@@ -8,7 +8,7 @@ ARGUMENTS(4)
     uint tets;
     uint points;
     uint stride;  // floats from one point to the next
-    uint share;   // tetrahedra per workgroup
+    uint tile;    // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER(0, readonly, float, positions)
 RECORDS(1, uvec4, cells)
@@ -31,7 +31,7 @@ void main() {
     const float FAR = uintBitsToFloat(LIMIT);
     vec3 lo = vec3(FAR), hi = vec3(-FAR);
     uint bad_cells = 0u;
-    uvec2 items = items_of_share(share, tets);
+    uvec2 items = items_of_tile(tile, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         uvec4 v = words(cells.at[t]);
         bool ok = max(max(v.x, v.y), max(v.z, v.w)) < points && v.x != v.y && v.x != v.z && v.x != v.w && v.y != v.z && v.y != v.w && v.z != v.w;

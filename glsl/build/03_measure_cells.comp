@@ -9,7 +9,7 @@
 #include "shared/shapes.glsl"
 ARGUMENTS(6)
     uint tets;
-    uint share; // tetrahedra per workgroup
+    uint tile;  // tetrahedra per workgroup
 END_ARGUMENTS
 RECORDS(0, vec4, vertices)
 RECORDS(1, uvec4, cells)
@@ -22,7 +22,7 @@ BUFFER(5, READ_WRITE, MeshStatus, status)
 
 void main() {
     uint flat_cells = 0u, negative = 0u;
-    uvec2 items = items_of_share(share, tets);
+    uvec2 items = items_of_tile(tile, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);

@@ -9,7 +9,7 @@ ARGUMENTS(6)
     uint tets;
     uint slots;      // of the table
     uint near_slots; // of the table per vertex, searched first
-    uint share;      // tetrahedra per workgroup
+    uint tile;       // tetrahedra per workgroup
 END_ARGUMENTS
 RECORDS(0, uvec4, cells)
 BUFFER(1, readonly, uint, bad)
@@ -21,7 +21,7 @@ BUFFER(5, READ_WRITE, uint, branches) // zeroed
 #include "shared/faces.glsl"
 
 void main() {
-    uvec2 items = items_of_share(share, tets);
+    uvec2 items = items_of_tile(tile, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         uvec4 ids = words(cells.at[t]), known = uvec4(NONE);
         // An attempt of one of the four faces per pass, so that invocations do not wait for each other's.

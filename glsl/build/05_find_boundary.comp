@@ -11,7 +11,7 @@
 layout(constant_id = 2) const uint MATES = 1;
 ARGUMENTS(9)
     uint tets;
-    uint share; // tetrahedra per workgroup
+    uint tile;  // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER(0, readonly, uint, bad)
 BUFFER(1, readonly, uint, shapes) // see shapes.glsl
@@ -64,7 +64,7 @@ bool is_fold(uint shape, uint theirs, uvec4 ids, uint f, uint opposite) {
 void main() {
     uint boundary_cells = 0u;
     bool any_crowded = status.at[0].crowded > 0u;
-    uvec2 items = items_of_share(share, tets);
+    uvec2 items = items_of_tile(tile, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         uvec4 across = neighbours_of(t);
         if (is_bad(t)) continue;

@@ -4,11 +4,11 @@
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-layout(constant_id = 2) const uint SHARE = 32; // most candidates of a share, see shares.glsl
+#include "shared/share.glsl"
 ARGUMENTS(5)
     uint tets;
     uint stride;
-    uint tets_each; // tetrahedra per workgroup
+    uint tile; // tetrahedra per workgroup
 END_ARGUMENTS
 BUFFER16(0, readonly, Grid, grid)
 BUFFER(1, readonly, float, positions)
@@ -36,7 +36,7 @@ void main() {
     uint large = 0u;
     uvec2 sums[12];
     for (uint i = 0u; i < 12u; ++i) sums[i] = uvec2(0u);
-    uvec2 items = items_of_share(tets_each, tets);
+    uvec2 items = items_of_tile(tile, tets);
     for (uint t = items.x; t < items.y; t += gl_SubgroupSize) {
         if (is_bad(t)) continue;
         uvec4 ids = words(cells.at[t]);

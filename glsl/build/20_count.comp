@@ -1,12 +1,13 @@
 #version 460
-// Codes, 1 of 2: counts the candidates of every tetrahedron, or its shares of up to SHARE candidates, of which it has
-// at least one. `counts` has one more element, for the total. Where every tetrahedron has a single share, only that total
+// Codes, count: counts the candidates of every tetrahedron, or (IN_SHARES) its shares of up to SHARE candidates, of which
+// it has at least one. `counts` has one more element, for the total. Where every tetrahedron has a single share, only that total
 // is written, as the one count to be scanned. With CLEAR, the kernel also clears the marks of the level, whatever they
 // were.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
-layout(constant_id = 2) const uint SHARE = 1;
+#include "shared/share.glsl"
+layout(constant_id = 2) const uint IN_SHARES = 0;
 layout(constant_id = 3) const uint CLEAR = 0;
 ARGUMENTS(7)
     uint tets;
@@ -31,7 +32,7 @@ void main() {
     if (t < tets && all_counts > 1u) {
         uvec3 size = coarser(finest_box(t), g.level).size;
         n = size.x * size.y * size.z;
-        if (SHARE > 1u) n = max(n / SHARE + uint(n % SHARE != 0u), 1u);
+        if (IN_SHARES != 0u) n = max(n / SHARE + uint(n % SHARE != 0u), 1u);
     }
     counts.at[t] = n;
 }

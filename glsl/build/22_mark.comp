@@ -1,12 +1,12 @@
 #version 460
-// Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes a few tetrahedra, of
+// Codes, filter 1, with Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes a few tetrahedra, of
 // which hardly any are on the boundary, and marks the first share of each; with LATER, it takes one other share.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"
 #include "shared/tet.glsl"
 layout(constant_id = 2) const uint ASSIGN = 0;
-layout(constant_id = 4) const uint TETS = 32; // per invocation: 32 where there are few, 8 where there are thousands
+layout(constant_id = 4) const uint TETS_EACH = 32; // per invocation: 32 where there are few, 8 where there are thousands
 ARGUMENTS(8)
     uint tets;
     uint capacity; // most shares
@@ -57,8 +57,8 @@ void main() {
         if (is_boundary_tet(share.t)) mark(g, share.t, share.first);
         return;
     }
-    uint first = TETS * item_index();
+    uint first = TETS_EACH * item_index();
     if (first >= tets) return;
-    uint bits = boundary.at[first >> 5u] >> (first & 31u) & low_bits(TETS);
+    uint bits = boundary.at[first >> 5u] >> (first & 31u) & low_bits(TETS_EACH);
     for (; bits != 0u; bits &= bits - 1u) mark(g, first + uint(findLSB(bits)), 0u);
 }

@@ -1,5 +1,5 @@
 #version 460
-// Codes of all lists but the paper's, 1 of 3: decides which candidates are entries, and counts them. An invocation
+// Codes, filter 2: decides which candidates are entries, and counts them. An invocation
 // takes a share of up to 32 candidates of one tetrahedron, and answers with one word. With LISTS 0, the entries are the
 // candidates that the assignment keeps (SPEC 2.2). Otherwise (SPEC 2.6) they are those of them that lie in marked
 // cells, and the unmarked cells whose centre a non-boundary tetrahedron clearly contains; centres in doubt are left to

@@ -1,5 +1,5 @@
 #version 460
-// Codes of all lists but the paper's, 2 of 3: decides about centres on faces, edges or vertices, or too near to them.
+// Codes, filter 3, with Lists::Boundary: decides about centres on faces, edges or vertices, or too near to them.
 // There are few, but each needs a star of tetrahedra; in the previous kernel, every such centre would hold up all lanes
 // of a subgroup.
 #include "shared/kernel.glsl"

@@ -1,5 +1,5 @@
 #version 460
-// Codes of all lists but the paper's, 3 of 3: writes the entries of the candidates that were hit.
+// Codes, filter 5: writes the entries of the candidates that were hit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

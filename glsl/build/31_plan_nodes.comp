@@ -48,7 +48,7 @@ void main() {
         if (k == level) {
             status.at[0].leaves = through - before;
             status.at[0].internal = before;
-            write_groups(11u, through - before, EACH);
+            write_groups(MAX_LEVEL + 1u, through - before, EACH);
         }
         before = through;
     }

@@ -1,5 +1,5 @@
 #version 460
-// Leaves, first with Lists::All (Alg. 1): sets boundary flags, in parallel over entries, so that a long leaf does not
+// Leaves 1, with Lists::All (Alg. 1): sets boundary flags, in parallel over entries, so that a long leaf does not
 // become a long loop.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"

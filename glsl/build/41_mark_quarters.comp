@@ -1,5 +1,5 @@
 #version 460
-// Leaves, first with Lists::Boundary, whose boundary flags follow from marks: writes into the top bits of every entry of P
+// Leaves 1, with Lists::Boundary, whose boundary flags follow from marks: writes into the top bits of every entry of P
 // which quarters of its leaf's cell the entry is near, so that a search can skip most of a list.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
@@ -18,7 +18,7 @@ BUFFER(6, READ_WRITE, uint, p)
 #include "shared/spanned.glsl"
 
 void main() {
-    uvec2 items = items_of_share(WORKGROUP * ROWS, min(entries.at[0], capacity));
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, min(entries.at[0], capacity));
     if (status.at[0].overflow != 0u) return;
     Grid g = grid.at[0];
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) {

@@ -1,5 +1,5 @@
 #version 460
-// Leaves, second (Alg. 1): writes the box of every leaf, where boxes are stored, from the code of its last entry; the
+// Leaves 2 (Alg. 1): writes the box of every leaf, where boxes are stored, from the code of its last entry; the
 // flag of leaves outside of the mesh (see src/reference/leaves.rs); the mask of each leaf's octants; statistics, and the
 // length of the longest list.
 // Where cells are MARKED (Lists::Boundary), the mark of a leaf's cell is its flag.

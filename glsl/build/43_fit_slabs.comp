@@ -1,5 +1,5 @@
 #version 460
-// Leaves, last where they have slabs: the slab of each leaf, behind PO. See src/reference/slabs.rs.
+// Leaves 3, where they have slabs: the slab of each leaf, behind PO. See src/reference/slabs.rs.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

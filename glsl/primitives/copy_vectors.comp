@@ -9,6 +9,6 @@ BUFFER16(0, readonly, uvec4, from)
 BUFFER16(1, writeonly, uvec4, to)
 
 void main() {
-    uvec2 items = items_of_share(WORKGROUP * ROWS, count);
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, count);
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) to.at[i] = from.at[i];
 }

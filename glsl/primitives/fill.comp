@@ -8,6 +8,6 @@ END_ARGUMENTS
 BUFFER(0, writeonly, uint, to)
 
 void main() {
-    uvec2 items = items_of_share(WORKGROUP * ROWS, count);
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, count);
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) to.at[i] = value;
 }

@@ -20,7 +20,7 @@ uint value_at(uint i) { return IN_PLACE != 0u ? scanned.at[i] : values.at[i]; }
 
 void main() {
     uint n = min(count, live.at[0]);
-    uvec2 items = items_of_share(WORKGROUP * ROWS, n);
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, n);
     if (SERIAL != 0u) items = uvec2(first_item(), min(n, first_item() + ROWS));
     uint step = SERIAL != 0u ? 1u : gl_SubgroupSize;
     uint sum = 0u;

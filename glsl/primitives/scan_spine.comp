@@ -13,7 +13,7 @@ BUFFER(2, writeonly, uint, total)
 void main() {
     uint n = min(count, live.at[0]);
     uint tiles = n / tile + uint(n % tile != 0u);
-    uvec2 items = items_of_share((tiles + WORKGROUP - 1u) / WORKGROUP * WORKGROUP, tiles);
+    uvec2 items = items_of_tile((tiles + WORKGROUP - 1u) / WORKGROUP * WORKGROUP, tiles);
     uint sum = 0u, all;
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) sum += sums.at[i];
     uint running = subgroups_exclusive_add(sum, all);

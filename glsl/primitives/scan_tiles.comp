@@ -11,7 +11,7 @@ BUFFER(2, writeonly, uint, sums)
 
 void main() {
     uint n = min(count, live.at[0]);
-    uvec2 items = items_of_share(WORKGROUP * ROWS, n);
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, n);
     uint sum = 0u;
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) sum += values.at[i];
     sum = workgroup_add(sum);

@@ -10,7 +10,7 @@ BUFFER(2, writeonly, uint, keys)
 BUFFER(3, writeonly, uint, values)
 
 void main() {
-    uvec2 items = items_of_share(WORKGROUP * ROWS, min(count, live.at[0]));
+    uvec2 items = items_of_tile(WORKGROUP * ROWS, min(count, live.at[0]));
     for (uint i = items.x; i < items.y; i += gl_SubgroupSize) {
         uvec2 moved = words(pairs.at[i]);
         keys.at[i] = moved.x;

@@ -55,11 +55,11 @@ uint local_index() { return gl_SubgroupID * gl_SubgroupSize + gl_SubgroupInvocat
 // The first of the ROWS consecutive items of this invocation.
 uint first_item() { return (group_index() * WORKGROUP + local_index()) * ROWS; }
 
-// The first item of this invocation, and the end, where a workgroup takes `share` items (a multiple of WORKGROUP) of
+// The first item of this invocation, and the end, where a workgroup takes `tile` items (a multiple of WORKGROUP) of
 // `count`; then every gl_SubgroupSize-th. A subgroup takes consecutive items: processors run the subgroups of a
 // workgroup one after the other, and read memory faster in order.
-uvec2 items_of_share(uint share, uint count) {
-    uint each = share / gl_NumSubgroups, begin = group_index() * share + gl_SubgroupID * each;
+uvec2 items_of_tile(uint tile, uint count) {
+    uint each = tile / gl_NumSubgroups, begin = group_index() * tile + gl_SubgroupID * each;
     return uvec2(begin + gl_SubgroupInvocationID, min(begin + each, count));
 }
 

@@ -1,7 +1,8 @@
-// Candidates are processed in shares of up to 32 candidates of one tetrahedron. Every tetrahedron has at least one
+// Candidates are processed in shares of up to SHARE candidates of one tetrahedron. Every tetrahedron has at least one
 // share. A dispatch over the first shares of all tetrahedra needs no search; the other shares follow in a second
 // dispatch (LATER), which is empty for most meshes; then there are as many shares as tetrahedra. Otherwise offsets, which
 // the including kernel declares, are the scanned numbers of shares (tets + 1). Needs cells.glsl.
+#include "shared/share.glsl"
 layout(constant_id = 3) const uint LATER = 0;
 
 struct Share {
@@ -22,7 +23,7 @@ Share later_share(uint i, uint tets) {
         if (offsets.at[mid] - mid <= i) lo = mid;
         else hi = mid;
     }
-    return Share(lo + i + 1u, lo, 32u * (i - (offsets.at[lo] - lo) + 1u));
+    return Share(lo + i + 1u, lo, SHARE * (i - (offsets.at[lo] - lo) + 1u));
 }
 
 // The share of invocation i of a dispatch, where there are `all` shares. Returns false if it has none.
@@ -33,7 +34,7 @@ bool share_of(uint i, uint tets, uint all, out Share share) {
     return share.index < all;
 }
 
-// The candidate `by` places after `at`, for `by` up to 32, found by steps instead of the divisions of `candidate`.
+// The candidate `by` places after `at`, for `by` up to SHARE, found by steps instead of the divisions of `candidate`.
 uvec3 advance(CellBox box, uvec3 at, uint by) {
     uvec3 end = box.lo + box.size;
     at.x += by;
@@ -49,4 +50,4 @@ uvec3 advance(CellBox box, uvec3 at, uint by) {
 
 uvec3 first_candidate(CellBox box, uint first) { return LATER == 0u || first == 0u ? box.lo : candidate(box, first); }
 
-uint candidates_of(CellBox box, uint first) { return min(32u, box.size.x * box.size.y * box.size.z - first); }
+uint candidates_of(CellBox box, uint first) { return min(SHARE, box.size.x * box.size.y * box.size.z - first); }

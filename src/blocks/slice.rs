@@ -78,7 +78,7 @@ pub fn slice(
     }
     let source = Source::new(mesh, options)?.within(gpu, memory)?;
     took.bad_cells[0] = source.bad_cells();
-    voxels.plan(&source.grid)?;
+    voxels.check_over(&source.grid)?;
     let (blocks, times) = (vec![source.whole()], StageTimes::default());
     let mut job = Job { gpu, memory, asked, source: &source, blocks, placed: None, took, times, done: 0.0, report };
     for rows in bands(voxels, BATCH) {

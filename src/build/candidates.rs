@@ -1,6 +1,6 @@
 //! Stage 2, candidates: counts them, decides which are entries, and goes to coarser levels until the entries fit.
 
-use super::plan::{Capacity, CoarserScratch, CountScratch, FilterScratch, SHARE, SeedScratch, filtered};
+use super::plan::{Capacity, CoarserScratch, CountScratch, FilterScratch, SeedScratch, filtered};
 use super::prepare::{MeshArrays, MeshInput};
 use super::stages::Build;
 use crate::error::Result;
@@ -86,8 +86,8 @@ impl Build<'_> {
         let (live, groups) = over.coarser.map_or((scratch.live, scratch.groups), |coarser| (coarser.live, coarser.groups));
         let (vertices, bad) = (mesh.arrays.vertices, mesh.arrays.bad);
         let count = CountCells { grid, vertices, cells, bad, counts: offsets, marks, live, tets };
-        let (share, clear) = (if filtered(options) { SHARE } else { 1 }, u32::from(over.marks.is_some()));
-        let spec = CountSpec { workgroup, share, clear, ..Default::default() };
+        let (in_shares, clear) = (u32::from(filtered(options)), u32::from(over.marks.is_some()));
+        let spec = CountSpec { workgroup, in_shares, clear, ..Default::default() };
         r.dispatch(&count, spec, Groups::Indirect(groups.part(0, 12)))?;
         let all = Count::device(tets + 1, live);
         cmd_exclusive_scan(r, offsets, offsets, over.total, all, &scratch.scan)
@@ -112,7 +112,7 @@ impl Build<'_> {
             let mark = Mark { grid, vertices, cells, bad, offsets, shares, marks, boundary, tets, capacity };
             // A word of bits per invocation, or a part of one where invocations are plenty and should not wait for others.
             let (each, slot) = if r.gpu().target().is_processor() { (32, 1) } else { (8, 2) };
-            let spec = MarkSpec { workgroup, assign: options.assign as u32, tets: each, ..Default::default() };
+            let spec = MarkSpec { workgroup, assign: options.assign as u32, tets_each: each, ..Default::default() };
             r.dispatch(&mark, spec, over.groups(slot, tets.div_ceil(each), workgroup))?;
             r.barrier("codes.mark → codes.mark_later");
             r.dispatch(&mark, MarkSpec { later: 1, ..spec }, later)?;

@@ -2,7 +2,7 @@
 
 use super::prepare::check_tets;
 use crate::error::{Error, Result};
-use crate::gpu::{Arena, BufferRef, Gpu};
+use crate::gpu::{Arena, BufferRef, Gpu, Groups};
 use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists, usual_capacity};
@@ -284,6 +284,9 @@ impl SeedScratch {
     }
 }
 
+/// Place of the leaves behind the levels 0 to [`MAX_LEVEL`].
+const LEAVES_SLOT: u64 = MAX_LEVEL as u64 + 1;
+
 /// Scratch memory of the second half: codes, sort, splits.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct SortedScratch {
@@ -293,6 +296,8 @@ pub(crate) struct SortedScratch {
     /// Length of the table of splits; the total of its scan is in `node_total`.
     pub(crate) table_length: BufferRef,
     pub(crate) node_total: BufferRef,
+    /// Workgroups of dispatches over the nodes of each level, then over the leaves, three words each; see
+    /// `31_plan_nodes.comp`.
     pub(crate) groups: BufferRef,
     /// Workgroups of the dispatch that emits codes; those of the dispatches over sorted entries are in `arguments`.
     pub(crate) emit_arguments: BufferRef,
@@ -322,11 +327,21 @@ impl SortedScratch {
             splits: arena.words(u64::from(table) + 1)?,
             table_length: arena.words(1)?,
             node_total: arena.words(1)?,
-            groups: arena.words(36)?,
+            groups: arena.words(3 * (LEAVES_SLOT + 1))?,
             emit_arguments: arena.words(3)?,
             arguments: arena.words(3)?,
             scan: ScanScratch::carve(gpu, arena, table)?,
         })
+    }
+
+    /// The workgroups of a dispatch over the nodes of a level.
+    pub fn over_level(&self, level: u32) -> Groups {
+        Groups::Indirect(self.groups.part(12 * u64::from(level), 12))
+    }
+
+    /// The workgroups of a dispatch over the leaves.
+    pub fn over_leaves(&self) -> Groups {
+        Groups::Indirect(self.groups.part(12 * LEAVES_SLOT, 12))
     }
 }
 

@@ -132,7 +132,7 @@ impl MeshScratch {
 
 /// How many consecutive tetrahedra one workgroup of a kernel that sums over all tetrahedra takes; at least one
 /// workgroup's worth.
-pub(crate) fn summing_share(tets: u32, workgroup: u32) -> u32 {
+pub(crate) fn summing_tile(tets: u32, workgroup: u32) -> u32 {
     tets.div_ceil(SUMMING_GROUPS).clamp(1, SUMMING_ROWS * workgroup).next_multiple_of(workgroup)
 }
 
@@ -257,9 +257,9 @@ impl<'a> Stage0<'a> {
         }
     }
 
-    /// Workgroups of a kernel that takes shares of this many tetrahedra.
-    fn groups(&self, share: u32) -> Groups {
-        Groups::Count(self.input.tets.div_ceil(share))
+    /// Workgroups of a kernel that takes tiles of this many tetrahedra.
+    fn groups(&self, tile: u32) -> Groups {
+        Groups::Count(self.input.tets.div_ceil(tile))
     }
 
     /// Bad cells, bounds, normalised vertices, and what the boundary needs to know of every tetrahedron.
@@ -268,12 +268,12 @@ impl<'a> Stage0<'a> {
         let MeshArrays { status, grid, bad, vertices, .. } = *self.arrays;
         let MeshScratch { shapes, thin, .. } = *self.scratch;
         let (workgroup, once) = (r.gpu().target().each, r.gpu().subgroup_size());
-        let share = summing_share(tets, workgroup);
-        let shares = self.groups(share);
+        let tile = summing_tile(tets, workgroup);
+        let tiles = self.groups(tile);
         r.barrier("mesh.clear → mesh.check_cells");
         r.stage("mesh.bounds", |r| {
             let spec = CheckCellsSpec { workgroup, ..Default::default() };
-            r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, share }, spec, shares)?;
+            r.dispatch(&CheckCells { positions, cells, bad, status, tets, points, stride, tile }, spec, tiles)?;
             r.barrier("mesh.check_cells → mesh.make_grid");
             if let Some(given) = given {
                 r.copy(given, grid.part(0, given.size));
@@ -288,7 +288,7 @@ impl<'a> Stage0<'a> {
         r.barrier("mesh.normalise_vertices → mesh.measure_cells");
         r.stage("mesh.shapes", |r| {
             let spec = MeasureCellsSpec { workgroup, ..Default::default() };
-            r.dispatch(&MeasureCells { vertices, cells, bad, shapes, thin, status, tets, share }, spec, shares)
+            r.dispatch(&MeasureCells { vertices, cells, bad, shapes, thin, status, tets, tile }, spec, tiles)
         })
     }
 
@@ -298,15 +298,15 @@ impl<'a> Stage0<'a> {
         let MeshArrays { status, bad, neighbours, .. } = *self.arrays;
         let MeshScratch { table, branches, .. } = *self.scratch;
         let workgroup = r.gpu().target().each;
-        let share = MATCHING_ROWS * workgroup;
+        let tile = MATCHING_ROWS * workgroup;
         r.barrier("mesh.measure_cells → mesh.match_faces");
         r.stage("mesh.faces", |r| {
             let slots = (table.size / 4) as u32;
             let near_slots = (slots / points.max(1)).max(1);
             let mates = neighbours;
             if r.gpu().target().is_processor() {
-                let kernel = MatchFaces { cells, bad, table, mates, status, branches, tets, slots, near_slots, share };
-                r.dispatch(&kernel, MatchFacesSpec { workgroup, ..Default::default() }, self.groups(share))
+                let kernel = MatchFaces { cells, bad, table, mates, status, branches, tets, slots, near_slots, tile };
+                r.dispatch(&kernel, MatchFacesSpec { workgroup, ..Default::default() }, self.groups(tile))
             } else {
                 let workgroup = workgroup.min(MATCHING_TILE);
                 let kernel = MatchFacesTiled { cells, bad, table, mates, status, branches, tets, slots, near_slots };
@@ -321,14 +321,14 @@ impl<'a> Stage0<'a> {
         let MeshArrays { status, bad, boundary, neighbours, .. } = *self.arrays;
         let MeshScratch { table, shapes, thin, branches } = *self.scratch;
         let workgroup = r.gpu().target().each;
-        let share = MATCHING_ROWS * workgroup;
+        let tile = MATCHING_ROWS * workgroup;
         r.barrier("mesh.faces → mesh.find_boundary");
         r.stage("mesh.boundary", |r| {
             let spec = FindBoundarySpec { workgroup, mates, ..Default::default() };
             r.dispatch(
-                &FindBoundary { bad, shapes, neighbours, boundary, status, cells, thin, branches, table, tets, share },
+                &FindBoundary { bad, shapes, neighbours, boundary, status, cells, thin, branches, table, tets, tile },
                 spec,
-                self.groups(share),
+                self.groups(tile),
             )
         })
     }

@@ -1,8 +1,8 @@
 //! The stages of a build, which append to a recorder. Those that choose the entries are in [`super::candidates`];
 //! [`super`] calls them in order.
 
-use super::plan::{Capacity, CountScratch, FilterScratch, SHARE, SortedScratch, TreeMemory, filtered};
-use super::prepare::{MeshInput, MeshView, summing_share};
+use super::plan::{Capacity, CountScratch, FilterScratch, SortedScratch, TreeMemory, filtered};
+use super::prepare::{MeshInput, MeshView, summing_tile};
 use crate::error::Result;
 use crate::gpu::{BufferRef, Groups, Recorder};
 use crate::kernels::{
@@ -29,14 +29,14 @@ pub(crate) struct Build<'a> {
 }
 
 impl Build<'_> {
-    /// Stage 1: chooses the level of the leaves (§3.2; SPEC 2.4), at most `deepest` and with at most `max_entries`
+    /// Stage 1: chooses the level of the leaves (§3.2; SPEC 2.4), at most `deepest` and with at most `most_candidates`
     /// candidates, and writes it to grid and status.
-    pub fn depth(&self, r: &mut Recorder<'_>, max_entries: u32, deepest: u32) -> Result<()> {
+    pub fn depth(&self, r: &mut Recorder<'_>, most_candidates: u32, deepest: u32) -> Result<()> {
         let Self { mesh, options, status, grid, counts, .. } = *self;
         let MeshInput { positions, stride, cells, tets, .. } = mesh.input;
         let workgroup = r.gpu().target().each;
         let (alpha, requested) = (options.alpha_fixed()?, options.checked_level()?.unwrap_or(NONE));
-        let capacity = options.capacity.unwrap_or(u32::MAX).min(max_entries);
+        let capacity = options.capacity.unwrap_or(u32::MAX).min(most_candidates);
         let (per_tet, ample) = if options.capacity.is_some() { (u32::MAX, u32::MAX) } else { (USUAL_ENTRIES, LEAST_USUAL) };
         let words = options.budget.map_or(u64::MAX, |bytes| bytes / 4);
         let (budget, box_words) = ([words as u32, (words >> 32) as u32], if options.boxes { 6 } else { 0 });
@@ -45,13 +45,9 @@ impl Build<'_> {
             r.fill(status.part(0, size_of::<BuildStatus>() as u64), 0);
             r.copy(mesh.arrays.grid.part(0, size_of::<Grid>() as u64), grid);
             r.barrier("depth.clear → depth.estimate");
-            let tets_each = summing_share(tets, workgroup);
-            let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, tets_each };
-            r.dispatch(
-                &estimate,
-                EstimateDepthSpec { workgroup, share: SHARE, ..Default::default() },
-                Groups::Count(tets.div_ceil(tets_each)),
-            )?;
+            let tile = summing_tile(tets, workgroup);
+            let estimate = EstimateDepth { grid, positions, cells, bad: mesh.arrays.bad, status, tets, stride, tile };
+            r.dispatch(&estimate, EstimateDepthSpec { workgroup, ..Default::default() }, Groups::Count(tets.div_ceil(tile)))?;
             r.barrier("depth.estimate → depth.choose");
             let once = ChooseDepthSpec { workgroup: r.gpu().subgroup_size(), each: workgroup, ..Default::default() };
             let CountScratch { candidates, live, groups, .. } = *counts;
@@ -230,7 +226,7 @@ impl Build<'_> {
             let marks = marks.unwrap_or_else(|| r.gpu().nothing());
             let finish = FinishLeaves { grid, codes, po, flags, status, boxes, p, cells, vertices, marks, masks };
             let spec = FinishLeavesSpec { workgroup: target.each, boxes: u32::from(tree.boxes.is_some()), marked, ..Default::default() };
-            r.dispatch(&finish, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
+            r.dispatch(&finish, spec, scratch.over_leaves())?;
             r.barrier("leaves.finish → levels");
             Ok(())
         })
@@ -247,7 +243,7 @@ impl Build<'_> {
         r.stage("build.slabs", |r| {
             let fit = FitSlabs { grid, status, codes: scratch.codes, po, p, flags, cells, vertices, neighbours };
             let spec = FitSlabsSpec { workgroup: r.gpu().target().each, ..Default::default() };
-            r.dispatch(&fit, spec, Groups::Indirect(scratch.groups.part(4 * 33, 12)))?;
+            r.dispatch(&fit, spec, scratch.over_leaves())?;
             r.barrier("slabs → levels");
             Ok(())
         })
@@ -263,7 +259,7 @@ impl Build<'_> {
         r.stage("build.levels", |r| {
             for level in (0..tree.capacity.level).rev() {
                 let merge = MergeLevel { grid, status, codes: scratch.codes, po, co, flags, masks, boxes, level };
-                r.dispatch(&merge, spec, Groups::Indirect(scratch.groups.part(u64::from(12 * level), 12)))?;
+                r.dispatch(&merge, spec, scratch.over_level(level))?;
                 r.barrier("levels.lower → levels.upper");
             }
             Ok(())

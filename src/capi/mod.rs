@@ -288,7 +288,7 @@ pub extern "C" fn olbvh_version() -> *const c_char {
 }
 
 /// Version of this interface. A header and a library with different versions are incompatible.
-pub const OLBVH_ABI: u32 = 3;
+pub const OLBVH_ABI: u32 = 4;
 
 /// Returns the `OLBVH_ABI` of the library, for comparison with that of the header.
 #[unsafe(no_mangle)]

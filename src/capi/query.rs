@@ -59,11 +59,11 @@ pub struct OlbvhVoxels {
     /// Centre of voxel (0, 0) of layer 0.
     pub origin: [f32; 3],
     /// Vector from one voxel to the next in a row.
-    pub across: [f32; 3],
+    pub next_voxel: [f32; 3],
     /// Vector from one row to the next.
-    pub down: [f32; 3],
+    pub next_row: [f32; 3],
     /// Vector from one layer to the next.
-    pub up: [f32; 3],
+    pub next_layer: [f32; 3],
     /// Half axes of a voxel's box.
     pub half: [[f32; 3]; 3],
     /// Number of voxels in a row.
@@ -111,7 +111,7 @@ impl OlbvhPictureSettings {
 
 impl OlbvhVoxels {
     pub(super) fn read(&self) -> VoxelGrid {
-        let Self { origin, across: next_voxel, down: next_row, up: next_layer, half, width, height, layers } = *self;
+        let Self { origin, next_voxel, next_row, next_layer, half, width, height, layers } = *self;
         VoxelGrid { origin, next_voxel, next_row, next_layer, half, size: [width, height], layers }
     }
 }

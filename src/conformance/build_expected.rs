@@ -5,6 +5,7 @@ use super::twin::{Built, Twin};
 use crate::layout::BuildStatus;
 use crate::options::{Assign, BuildOptions, Lists};
 use crate::reference::codes::Stage;
+use crate::reference::depth::SHARE;
 use crate::tree::TreeArrays;
 use std::sync::Arc;
 
@@ -51,7 +52,7 @@ impl Expected {
         }
         let tree = built.tree();
 
-        let share = if options.assign == Assign::Aabb && options.lists == Lists::All { 1 } else { 32 };
+        let share = if options.assign == Assign::Aabb && options.lists == Lists::All { 1 } else { SHARE };
         let (mesh, topology, vertices) = (&twin.mesh, &twin.topology, &twin.vertices);
         let candidates = Stage { mesh, topology, vertices, grid: &tree.grid, assign: Assign::Aabb, marks: None };
         let mut offsets = vec![0];

@@ -74,7 +74,7 @@ fn holds(tree: &TreeArrays, mesh: &Mesh, topology: &Topology, field: &Field, ran
     let wrong = |node: u32| fail("build.ranges", "ranges", Some(node as usize), "a range around all values in the node", "a smaller one");
     for leaf in tree.leaves() {
         let [lo, hi] = ranges[leaf as usize];
-        for &t in tree.primitives(leaf).iter().filter(|&&t| topology.is_valid(t)) {
+        for &t in tree.tets(leaf).iter().filter(|&&t| topology.is_valid(t)) {
             let ids = mesh.tets[t as usize];
             let values = if field.on == On::Points { ids.map(|i| field.values[i as usize]) } else { [field.values[t as usize]; 4] };
             if values.iter().all(|v| v.is_finite()) && !values.iter().all(|v| (lo..=hi).contains(v)) {

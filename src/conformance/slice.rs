@@ -68,7 +68,7 @@ pub(crate) fn check(gpu: &Gpu, case: &SliceCase, twin: &mut Twin, device: &Devic
     let Ok(voxels) = settings.voxels(lo, hi, mesh.origin) else {
         return compare_one("query.slice", "extent, if there is nothing to slice", &lo, &hi);
     };
-    if voxels.plan(&host.grid).is_err() {
+    if voxels.check_over(&host.grid).is_err() {
         // The coordinates reach the limits of single precision: the device must refuse these voxels, too.
         let refused = slice(&tree, None, &voxels, extrapolate, SILENT, &mut |_| Ok(()));
         return compare_one("query.slice", "refusal", &true, &matches!(refused, Err(Error::Invalid(_))));

@@ -142,7 +142,7 @@ impl Gpu {
         self.inner.binding
     }
 
-    /// The usage flags that every buffer must have that a host passes to kernels: [`super::USAGE`], and the one for
+    /// The usage flags that every buffer must have that a host passes to kernels, with the one for
     /// device addresses where buffers are passed by address.
     pub fn usage(&self) -> vk::BufferUsageFlags {
         let addresses =

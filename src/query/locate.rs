@@ -7,6 +7,7 @@ use crate::error::{Error, Result};
 use crate::gpu::{Arena, BufferRef, DeviceKind, Gpu, Groups, Recorder};
 use crate::grid::MAX_LEVEL;
 use crate::kernels::{Interpolate, InterpolateSpec, Locate, LocateByTraversal, LocateByTraversalSpec, LocateSpec};
+use crate::layout::constants::locate::{HINTS, ORDER};
 use crate::mesh::On;
 use crate::options::{POINT_CHUNK, POINT_RUN, TOLERANCE};
 use crate::reference::traverse::full_stack;
@@ -137,14 +138,6 @@ impl LocateOutput {
     }
 }
 
-/// What the kernel's buffer of guides holds.
-#[derive(Clone, Copy)]
-enum Guide {
-    Nothing,
-    Hints,
-    Order,
-}
-
 /// Records point location. Compute shaders read mesh, tree and points and write `output`; there is no barrier before or
 /// after.
 ///
@@ -161,15 +154,16 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
     let (cells, vertices, neighbours) = (scene.mesh.input.cells, scene.mesh.arrays.vertices, scene.mesh.arrays.neighbours);
     let (workgroup, lists) = (r.gpu().target().query, scene.tree.lists as u32);
     let groups = |run: u32| Groups::Count(count.div_ceil(run).div_ceil(workgroup));
-    let (run, guide, guides) = match options.method {
-        method if method.is_sorted() && order.is_none() => {
-            return Err(Error::Invalid("points to be located in an order that is not given".into()));
-        }
-        LocateMethod::Suited if order.is_some() => (1, Guide::Order, order),
-        LocateMethod::Suited | LocateMethod::Descent | LocateMethod::Traversal(_) => (1, Guide::Hints, hints),
-        LocateMethod::Runs => (POINT_RUN, Guide::Nothing, None),
-        LocateMethod::Sorted => (1, Guide::Order, order),
-        LocateMethod::SortedRuns => (POINT_RUN, Guide::Order, order),
+    if options.method.is_sorted() && order.is_none() {
+        return Err(Error::Invalid("points to be located in an order that is not given".into()));
+    }
+    let sorted = options.method.is_sorted() || options.method == LocateMethod::Suited;
+    let in_runs = matches!(options.method, LocateMethod::Runs | LocateMethod::SortedRuns);
+    let run = if in_runs { POINT_RUN } else { 1 };
+    let (guide, guides) = match (order.filter(|_| sorted), hints.filter(|_| !in_runs)) {
+        (Some(order), _) => (ORDER, order),
+        (None, Some(hints)) => (HINTS, hints),
+        (None, None) => (0, r.gpu().nothing()),
     };
     if matches!(options.method, LocateMethod::Traversal(_)) && scene.longest_leaf > MOST_TRAVERSED {
         let longest = scene.longest_leaf;
@@ -203,8 +197,6 @@ pub fn cmd_locate(r: &mut Recorder<'_>, scene: &Scene, input: &PointInput, outpu
             );
         }
         let (length, parts) = list_parts(r.gpu().report().kind, scene.longest_leaf);
-        let guide = guides.map_or(Guide::Nothing, |_| guide) as u32;
-        let guides = guides.unwrap_or_else(|| r.gpu().nothing());
         for part in 0..parts {
             if part > 0 {
                 r.barrier("locate.part → locate.part");

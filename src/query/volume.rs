@@ -63,7 +63,7 @@ pub struct RenderInput {
     /// along the axis of the view.
     pub depth: Option<BufferRef>,
     /// The visible values, so that the march can skip nodes without any; `None`: every sample in the mesh is taken. The
-    /// picture is the same either way. With a binary tree nothing is skipped.
+    /// picture is the same either way.
     pub visibility: Option<Visibility>,
     /// The row of the view that is row 0 of this picture: 0, or the first row of a strip that is drawn by itself.
     pub row: u32,
@@ -93,19 +93,6 @@ impl RenderInput {
     }
 }
 
-/// The share of a block of a mesh in a picture, or of a strip in the work for a whole one; by default neither.
-#[derive(Clone, Copy, Debug, Default)]
-struct Share {
-    /// Given if the mesh is a block of another one, and other blocks draw their parts of the same rows. Blocks draw one
-    /// after the other, in an order in which every ray that meets two of them meets the earlier one first. Each block
-    /// continues the colours and rays in [`RenderMemory`] instead of starting new ones. Before the first block, colours
-    /// must be 0, and rays must be 0 except for [`RayState::last`], which must be `u32::MAX`. Only samples in these
-    /// cells of the finest grid, whole leaves of an octree, are taken.
-    cells: Option<CellRange>,
-    /// The memory has the marks of the visible nodes already.
-    marked: bool,
-}
-
 /// The values that are visible; nodes of an octree without any of them are skipped.
 #[derive(Clone, Copy, Debug)]
 pub struct Visibility {
@@ -127,25 +114,25 @@ pub struct RenderMemory {
     /// [`RenderStatus`]: numbers of samples, and how many rays are unfinished.
     pub status: BufferRef,
     /// [`ViewUniforms`], [`DrawUniforms`], the transfer function, and the top of the octree.
-    pub frame: BufferRef,
+    frame: BufferRef,
     /// A [`RayState`] for each ray that may meet the mesh.
-    pub rays: BufferRef,
+    rays: BufferRef,
     /// Workgroups of a march.
     groups: BufferRef,
-    visible: Option<Visible>,
+    marks: Option<NodeMarks>,
 }
 
 /// A copy of the boundary flags of a tree, followed by the marks of its visible nodes.
 #[derive(Clone, Copy, Debug)]
-struct Visible {
+struct NodeMarks {
     flags: BufferRef,
-    marks: BufferRef,
+    visible: BufferRef,
 }
 
-impl Visible {
+impl NodeMarks {
     fn all(&self) -> BufferRef {
-        let Self { flags, marks } = *self;
-        BufferRef { size: marks.offset + marks.size - flags.offset, ..flags }
+        let Self { flags, visible } = *self;
+        BufferRef { size: visible.offset + visible.size - flags.offset, ..flags }
     }
 }
 
@@ -165,7 +152,7 @@ impl RenderMemory {
             frame: arena.take((size_of::<ViewUniforms>() + size_of::<DrawUniforms>() + 16 * TABLE_SIZE + 4 * TOP_CELLS) as u64)?,
             rays: arena.take(size_of::<RayState>() as u64 * rays)?,
             groups: arena.words(3)?,
-            visible: bits.map(|bits| Ok::<_, Error>(Visible { flags: arena.take(bits)?, marks: arena.take(bits)? })).transpose()?,
+            marks: bits.map(|bits| Ok::<_, Error>(NodeMarks { flags: arena.take(bits)?, visible: arena.take(bits)? })).transpose()?,
         })
     }
 
@@ -227,22 +214,29 @@ fn rays([width, height]: [u32; 2]) -> Result<u32> {
 /// [`Error::Invalid`] for memory of fewer pixels, or without room for the nodes to be skipped, or if a part of the input
 /// is too small; [`Error::TooLarge`] as [`RenderMemory::carve`].
 pub fn cmd_render(r: &mut Recorder<'_>, scene: &Scene, input: &RenderInput, memory: &RenderMemory, rounds: Rounds) -> Result<()> {
-    cmd_render_in(r, &scene.into(), input, Share::default(), memory, rounds)
+    cmd_render_in(r, &scene.into(), input, None, false, memory, rounds)
 }
 
-/// [`cmd_render`], in any structure.
+/// [`cmd_render`], in any structure. With `marked`, the memory has the marks of the visible nodes already.
+///
+/// `cells` are given if the mesh is a block of another one, and other blocks draw their parts of the same rows. Blocks draw one
+/// after the other, in an order in which every ray that meets two of them meets the earlier one first. Each block
+/// continues the colours and rays in `memory` instead of starting new ones. Before the first block, colours must be 0,
+/// and rays must be 0 except for [`RayState::last`], which must be `u32::MAX`. Only samples in these cells of the finest
+/// grid, whole leaves of an octree, are taken.
 fn cmd_render_in(
     r: &mut Recorder<'_>,
     searched: &Searched,
     input: &RenderInput,
-    Share { cells, marked }: Share,
+    cells: Option<CellRange>,
+    marked: bool,
     memory: &RenderMemory,
     rounds: Rounds,
 ) -> Result<()> {
     let [width, height] = input.size;
     let rays = memory.rays_of(input.size)?;
     input.check(&searched.mesh.input)?;
-    let visible = visible(searched, input, memory)?;
+    let marks = node_marks(searched, input, memory)?;
     let unfinished = memory.status.part(offset_of!(RenderStatus, unfinished) as u64, 4);
     let met = memory.status.part(0, 4);
     let march = Count::device(rays, met);
@@ -252,14 +246,14 @@ fn cmd_render_in(
         r.fill(memory.status.part(4, offset_of!(RenderStatus, unfinished) as u64 - 4), 0);
         r.fill(unfinished, width * height);
         if !marked {
-            cmd_marks(r, searched, input, visible)?;
+            cmd_marks(r, searched, input, marks)?;
         }
-        cmd_plan(r, searched, input, cells, memory, visible)?;
+        cmd_plan(r, searched, input, cells, memory, marks)?;
         r.barrier("render.plan → render.intervals");
         // With iso-surfaces the intervals use the boundary flags, not the marks: where the mesh has a crack, the field
         // may jump across an iso-value between nodes of which none is visible. These places must be sampled whatever
         // the tree.
-        cmd_intervals(r, searched, rays, input, cells.is_some(), memory, visible.filter(|_| !input.iso))?;
+        cmd_intervals(r, searched, rays, input, cells.is_some(), memory, marks.filter(|_| !input.iso))?;
         r.barrier("render.intervals → render.arguments");
         march.arguments(r, workgroup, memory.groups)?;
     }
@@ -270,27 +264,27 @@ fn cmd_render_in(
         }
         r.fill(unfinished, 0);
         r.barrier("render.clear → render.march");
-        cmd_march(r, searched, groups, input, memory, visible)?;
+        cmd_march(r, searched, groups, input, memory, marks)?;
     }
     Ok(())
 }
 
 /// The flags and marks in `memory` if nodes are to be skipped.
-fn visible(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> Result<Option<Visible>> {
+fn node_marks(searched: &Searched, input: &RenderInput, memory: &RenderMemory) -> Result<Option<NodeMarks>> {
     let (Some(_), Some(tree)) = (input.visibility, searched.octree()) else { return Ok(None) };
     let bits = visible_bytes(tree.capacity.nodes);
-    match memory.visible {
-        Some(visible) if bits <= visible.marks.size => Ok(Some(visible)),
+    match memory.marks {
+        Some(marks) if bits <= marks.visible.size => Ok(Some(marks)),
         _ => Err(Error::Invalid(format!("nodes are to be skipped in memory without room for {} of them", tree.capacity.nodes))),
     }
 }
 
 /// Records the marks of the visible nodes, if nodes are to be skipped.
-fn cmd_marks(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, visible: Option<Visible>) -> Result<()> {
-    if let (Some(Visible { flags, marks }), Some(shown), Some(tree)) = (visible, input.visibility, searched.octree()) {
+fn cmd_marks(r: &mut Recorder<'_>, searched: &Searched, input: &RenderInput, marks: Option<NodeMarks>) -> Result<()> {
+    if let (Some(NodeMarks { flags, visible }), Some(shown), Some(tree)) = (marks, input.visibility, searched.octree()) {
         let bits = visible_bytes(tree.capacity.nodes);
         r.copy(tree.flags.part(0, bits), flags);
-        cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), marks)?;
+        cmd_visible(r, tree, shown.ranges, (shown.values, shown.count), visible)?;
     }
     Ok(())
 }
@@ -302,7 +296,7 @@ fn cmd_plan(
     input: &RenderInput,
     cells: Option<CellRange>,
     memory: &RenderMemory,
-    visible: Option<Visible>,
+    marks: Option<NodeMarks>,
 ) -> Result<()> {
     let [first_cell, last_cell] = cells.unwrap_or(CellRange::WHOLE).words();
     let nothing = r.gpu().nothing();
@@ -320,7 +314,7 @@ fn cmd_plan(
         octree,
         width: input.size[0],
         height: input.size[1],
-        visible_at: visible.map_or(0, |v| ((v.marks.offset - v.flags.offset) / 4) as u32),
+        visible_at: marks.map_or(0, |marks| ((marks.visible.offset - marks.flags.offset) / 4) as u32),
         row: input.row,
         first_cell,
         last_cell,
@@ -337,9 +331,9 @@ fn cmd_intervals(
     input: &RenderInput,
     part: bool,
     memory: &RenderMemory,
-    visible: Option<Visible>,
+    marks: Option<NodeMarks>,
 ) -> Result<()> {
-    let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.marks));
+    let searched = &marks.map_or(*searched, |marks| searched.with_flags(marks.visible));
     let (mesh, arrays) = (&searched.mesh.input, &searched.mesh.arrays);
     let (stack, part, iso) = (STACK, u32::from(part), u32::from(input.iso));
     let (depth, depths) = input.depths(r);
@@ -364,12 +358,12 @@ fn cmd_march(
     groups: Groups,
     input: &RenderInput,
     memory: &RenderMemory,
-    visible: Option<Visible>,
+    marks: Option<NodeMarks>,
 ) -> Result<()> {
-    let searched = &visible.map_or(*searched, |visible| searched.with_flags(visible.all()));
+    let searched = &marks.map_or(*searched, |marks| searched.with_flags(marks.all()));
     let (mesh, arrays, (field, on)) = (&searched.mesh.input, &searched.mesh.arrays, input.field);
     let (shading, on_cells, lists) = (u32::from(input.normals.is_some()), u32::from(on == On::Cells), searched.lists());
-    let (iso, skip, normals) = (u32::from(input.iso), u32::from(visible.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
+    let (iso, skip, normals) = (u32::from(input.iso), u32::from(marks.is_some()), input.normals.unwrap_or_else(|| r.gpu().nothing()));
     let ((depth, depths), budget) = (input.depths(r), BUDGET);
     r.stage("query.march", |r| {
         dispatch!(r, groups, searched, VolumeMarch VolumeMarchSpec {} { lists, skip }, LbvhMarch LbvhMarchSpec, {

@@ -14,7 +14,7 @@ use rayon::prelude::*;
 const LEVELS: usize = MAX_LEVEL as usize + 1;
 
 /// Most candidates of a share: where candidates are tested, those of one tetrahedron are taken in shares.
-pub const SHARE: u32 = 32;
+pub use crate::layout::constants::share::SHARE;
 
 /// What one pass over the tetrahedra gathers: enough to choose a level, and to bound the size of the tree at every
 /// level.

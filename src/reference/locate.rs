@@ -129,9 +129,7 @@ impl<'a> Locator<'a> {
     fn searches_long_list(&self, p: [f32; 3]) -> bool {
         let leaf = place(&self.tree.grid, p).and_then(|(cell, x)| Some((self.tree.find_leaf(cell)?, x)));
         leaf.is_some_and(|(leaf, x)| {
-            self.tree.primitives(leaf).len() > LIST_PART as usize
-                && self.tree.seed(leaf).is_none()
-                && self.stride_from_middle(leaf, x).is_none()
+            self.tree.tets(leaf).len() > LIST_PART as usize && self.tree.seed(leaf).is_none() && self.stride_from_middle(leaf, x).is_none()
         })
     }
 
@@ -149,7 +147,7 @@ impl<'a> Locator<'a> {
             });
             owners.sort_unstable();
         } else {
-            owners.extend(self.tree.primitives(leaf).iter().filter(|&&t| self.weights(t, x).1.inside));
+            owners.extend(self.tree.tets(leaf).iter().filter(|&&t| self.weights(t, x).1.inside));
         }
         if owners.is_empty() { self.in_leaf(leaf, cell, x).found().into_iter().collect() } else { owners }
     }
@@ -230,7 +228,7 @@ impl<'a> Locator<'a> {
 
     /// The owner by a stride from the tetrahedron in the middle of the list, in trees with seeds.
     fn stride_from_middle(&self, leaf: u32, x: Vec3) -> Option<u32> {
-        let list = self.tree.primitives(leaf);
+        let list = self.tree.tets(leaf);
         let middle = *list.get(list.len() / 2).filter(|_| self.tree.lists == Lists::Boundary)?;
         self.walker().stride_to(middle, x, STRIDE)
     }
@@ -240,7 +238,7 @@ impl<'a> Locator<'a> {
         let reach = reach(&self.tree.grid, self.tolerance);
         let near = |&&t: &&u32| is_near(&self.vertices.cells(self.mesh.tets[t as usize], MAX_LEVEL), finest, reach);
         let mut best = Best::NONE;
-        for &t in self.tree.primitives(leaf).iter().filter(near) {
+        for &t in self.tree.tets(leaf).iter().filter(near) {
             let (tet, weights) = self.weights(t, x);
             best.consider(t, &tet, &weights);
             if best.inside {

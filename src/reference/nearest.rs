@@ -54,7 +54,7 @@ impl<'a> Surface<'a> {
                 waiting.extend(children);
                 continue;
             }
-            for &t in self.tree.primitives(index).iter().filter(|&&t| self.topology.neighbours[t as usize].contains(&NONE)) {
+            for &t in self.tree.tets(index).iter().filter(|&&t| self.topology.neighbours[t as usize].contains(&NONE)) {
                 let (tet, v) = self.around(t, x);
                 if box_square(&v) <= least {
                     let Closest { square, .. } = closest_on(&v, self.surface_of(t, tet.rank));

@@ -89,7 +89,7 @@ pub fn joint_grid(a: &Grid, b: &Grid, valid: [bool; 2]) -> Grid {
 }
 
 /// The cells of the tree with grid `grid`, in normalised coordinates of the joint grid.
-pub fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
+pub(crate) fn node_frame(grid: &Grid, joint: &Grid) -> NodeFrame {
     let corner = joint.normalise([grid.lo[0], grid.lo[1], grid.lo[2]]);
     let half = per_axis(|c| (canonical(grid.hi[c] - grid.lo[c]) * joint.scale) * two_to(39));
     let flat = per_axis(|c| if grid.inv[c] == 0.0 { 1.0 } else { 0.0 });
@@ -156,7 +156,7 @@ impl Direction<'_> {
             Some(leaf) => {
                 let x = grid.normalise(p);
                 let holds = |&&t: &&u32| Tet::new(self.other.mesh.tets[t as usize], other_normalised).weights(x).inside;
-                (tree.primitives(leaf).iter().find(holds).map_or(Place::Outside, |&t| Place::In(t)), true)
+                (tree.tets(leaf).iter().find(holds).map_or(Place::Outside, |&t| Place::In(t)), true)
             }
         }
     }
@@ -217,7 +217,7 @@ impl Direction<'_> {
                     effort.narrow += u64::from(compared);
                     compared && tets_touch(&v, &self.other_tet(b))
                 };
-                found = tree.primitives(leaf.index).iter().find(touches).is_some();
+                found = tree.tets(leaf.index).iter().find(touches).is_some();
                 found
             },
         );
@@ -233,7 +233,7 @@ impl Direction<'_> {
             tree,
             |node| meets(node, &cells),
             |leaf| {
-                for &b in tree.primitives(leaf.index) {
+                for &b in tree.tets(leaf.index) {
                     if self.compared_in(leaf, &bounds, &raw_box(self.other.mesh, b)) {
                         effort.narrow += 1;
                         if tets_touch(&v, &self.other_tet(b)) {

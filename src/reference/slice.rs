@@ -47,7 +47,7 @@ impl<'a> Slicer<'a> {
     /// Prepares slicing of `mesh` into these voxels. `tree` must have been built over the mesh.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] as [`VoxelGrid::plan`].
+    /// [`crate::Error::Invalid`] as [`VoxelGrid::check_over`].
     pub fn new(
         mesh: &'a Mesh,
         topology: &'a Topology,
@@ -56,7 +56,8 @@ impl<'a> Slicer<'a> {
         voxels: VoxelGrid,
         extrapolate: Extrapolate,
     ) -> Result<Self> {
-        let plan = voxels.plan(&tree.grid)?;
+        voxels.check_over(&tree.grid)?;
+        let plan = voxels.over(&tree.grid);
         let normalised = mesh.points.par_iter().map(|&p| tree.grid.normalise(p)).collect();
         Ok(Self {
             mesh,
@@ -137,7 +138,7 @@ impl<'a> Slicer<'a> {
         let mut best = (f32::MAX, NONE);
         let enters = |node: super::traverse::Node| self.tree.is_boundary(node.index) && meets(node, &cells);
         walk_leaves(self.tree, enters, |leaf| {
-            for &t in self.tree.primitives(leaf.index) {
+            for &t in self.tree.tets(leaf.index) {
                 if self.topology.is_boundary(t) {
                     let (_, v) = self.around(t, x);
                     let closer = touching(&v, &half, best.0).filter(|&square| square < best.0 || t < best.1);

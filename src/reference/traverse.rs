@@ -48,7 +48,7 @@ impl Stack {
 /// Calls `f_p` for every tetrahedron of every leaf that `f_n` accepts along with all its ancestors, in order, until
 /// `f_p` breaks. A tetrahedron is passed once per such leaf.
 pub fn traverse(tree: &TreeArrays, stack: usize, f_n: impl FnMut(Node) -> bool, mut f_p: impl FnMut(Node, u32) -> ControlFlow<()>) {
-    traverse_leaves(tree, stack, f_n, |leaf| tree.primitives(leaf.index).iter().try_for_each(|&p| f_p(leaf, p)));
+    traverse_leaves(tree, stack, f_n, |leaf| tree.tets(leaf.index).iter().try_for_each(|&p| f_p(leaf, p)));
 }
 
 /// Calls `found` for every leaf that `f_n` accepts along with all its ancestors, in order, until `found` breaks. The

@@ -194,7 +194,7 @@ impl TreeArrays {
             let expected = if j < internal {
                 self.children(j).any(|c| self.is_boundary(c))
             } else {
-                flag(self.primitives(j), codes[j as usize], self.lists, mesh, topology, &vertices, &self.grid)
+                flag(self.tets(j), codes[j as usize], self.lists, mesh, topology, &vertices, &self.grid)
             };
             let what = if j < internal { "children" } else { "primitives" };
             rule(self.is_boundary(j) == expected, || format!("BF[{j}] = {}, its {what} say {expected}", !expected))?;
@@ -204,7 +204,7 @@ impl TreeArrays {
             let (mask, octants) = (self.mask_of(j), octants(self.entries(j), expected, &self.quarters, &self.grid));
             rule(mask == octants, || format!("mask of leaf {j} is {mask:#010b}, its entries say {octants:#010b}"))?;
             let slab = self.slabs.get((j - internal) as usize).copied();
-            let fitted = slab.map(|_| fit.slab(self.primitives(j), expected, codes[j as usize]));
+            let fitted = slab.map(|_| fit.slab(self.tets(j), expected, codes[j as usize]));
             rule(slab == fitted, || format!("slab of leaf {j} is {slab:x?}, its tetrahedra say {fitted:x?}"))
         };
         (0..self.nodes()).into_par_iter().map(check).find_map_first(Result::err).map_or(Ok(()), Err)

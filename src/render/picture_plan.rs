@@ -299,7 +299,7 @@ impl PicturePlan {
 /// How much larger than its cell the box of a node is when rays are tested against it, so that no sample is lost by
 /// rounding of samples, boxes and rays. 2^-18 of the bounds is 1/256 of the smallest cell; 2^-21 of a coordinate is
 /// four of its last bits. Twin of `glsl/query/volume_plan`.
-pub fn interval_slack(grid: &Grid) -> [f32; 3] {
+pub(crate) fn interval_slack(grid: &Grid) -> [f32; 3] {
     let (lo, hi) = (grid.lo, grid.hi);
     let largest = (0..3).map(|c| canonical(hi[c] - lo[c])).fold(0.0, f32::max);
     [0, 1, 2].map(|c| canonical(largest * two_to(-18)) + canonical(canonical(lo[c].abs() + hi[c].abs()) * two_to(-21)))

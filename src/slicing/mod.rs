@@ -158,8 +158,8 @@ impl VoxelGrid {
 
     /// What the kernels and the reference need to know of these voxels over a mesh with grid `grid`. Twin of
     /// `glsl/query/slice_plan`.
-    pub fn over(&self, grid: &Grid) -> SliceUniforms {
-        // 2·2^e, see `plan`. Larger half axes are refused as they are, since scaling them could overflow.
+    pub(crate) fn over(&self, grid: &Grid) -> SliceUniforms {
+        // 2·2^e, see `check_over`. Larger half axes are refused as they are, since scaling them could overflow.
         let most = f32::from_bits((255 << 23) - grid.scale.to_bits());
         let beyond = self.half.iter().flatten().any(|x| x.abs() > most);
         let normalise = |x: f32| {
@@ -200,16 +200,15 @@ impl VoxelGrid {
         }
     }
 
-    /// As [`VoxelGrid::over`], but checks that the voxels can be sliced.
+    /// Checks that the voxels can be sliced over a mesh with this grid.
     ///
     /// # Errors
     /// [`Error::Invalid`] as [`VoxelGrid::check`], and if their boxes are flat or too large: along each axis a box
     /// measures at most 4·2^e, where the largest extent of the mesh lies in [2^e, 2^(e+1)).
-    pub fn plan(&self, grid: &Grid) -> Result<SliceUniforms> {
+    pub fn check_over(&self, grid: &Grid) -> Result<()> {
         self.check()?;
-        let plan = self.over(grid);
-        match plan.refused {
-            0 => Ok(plan),
+        match self.over(grid).refused {
+            0 => Ok(()),
             1 => Err(Error::Invalid("voxels without volume; size and thickness must be above 0".into())),
             _ => Err(Error::Invalid(format!(
                 "voxels that measure more than {} along an axis, which is 2 to 4 times the size of the mesh; take a smaller thickness or \

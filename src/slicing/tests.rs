@@ -109,7 +109,7 @@ fn voxels_meet_the_blocks_that_their_rounded_centres_lie_in() {
 #[test]
 fn too_large_voxels_are_refused_with_the_limit() {
     let grid = Grid::new([0.0; 3], [3.0, 1.0, 1.0]);
-    let high = |z: f32| VoxelGrid { half: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5 * z]], ..voxels([1, 1], 1) }.plan(&grid);
+    let high = |z: f32| VoxelGrid { half: [[0.5, 0.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.0, 0.5 * z]], ..voxels([1, 1], 1) }.check_over(&grid);
     assert!(high(8.0).is_ok());
     for z in [8.000_001, 100.0] {
         let error = high(z).unwrap_err().to_string();

@@ -20,7 +20,7 @@ fn every_case_builds_a_valid_tree_at_every_alpha_and_assignment() {
                 let stats = tree.validate(&mesh, &topology).unwrap_or_else(|e| panic!("{} α {alpha} {assign}: {e}", case.name));
                 assert!(stats.entries <= entries, "{} α {alpha}: {assign} has more entries", case.name);
                 assert_eq!(stats.nodes, stats.nodes_per_level.iter().sum::<u64>());
-                assert_eq!(stats.entries, tree.primitives(0).len() as u64);
+                assert_eq!(stats.entries, tree.tets(0).len() as u64);
                 entries = stats.entries;
             }
         }
@@ -135,7 +135,7 @@ fn a_mesh_that_is_a_point_has_a_chain_of_single_nodes() {
     let tree = tree(&mesh, &topology, 0.0, Assign::Aabb);
     assert_eq!((tree.grid.level, tree.nodes()), (10, 11));
     for node in 0..11 {
-        assert_eq!(tree.primitives(node), [0, 1, 2]);
+        assert_eq!(tree.tets(node), [0, 1, 2]);
         assert_eq!(tree.level_of(node), node);
     }
 }
@@ -168,8 +168,8 @@ fn levels_children_and_memory_agree() {
         let children: Vec<u32> = tree.children(node).collect();
         assert_eq!(children, (0..8).filter_map(|d| tree.child(node, d)).collect::<Vec<_>>());
         assert!(children.iter().all(|&c| tree.level_of(c) == level + 1));
-        let below: usize = children.iter().map(|&c| tree.primitives(c).len()).sum();
-        assert!(children.is_empty() || below == tree.primitives(node).len());
+        let below: usize = children.iter().map(|&c| tree.tets(c).len()).sum();
+        assert!(children.is_empty() || below == tree.tets(node).len());
     }
     let memory = tree.memory();
     let (n_m, n_n, n_ni) = (tree.p.len() as u64, u64::from(tree.nodes()), u64::from(tree.internal_nodes()));

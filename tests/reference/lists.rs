@@ -29,7 +29,7 @@ fn trees_keep_every_rule() {
                 assert_eq!(all.grid.level, tree.grid.level);
                 // Cells that the boundary touches still have lists.
                 for leaf in tree.leaves().filter(|&j| tree.is_boundary(j)) {
-                    assert!(!tree.primitives(leaf).is_empty());
+                    assert!(!tree.tets(leaf).is_empty());
                 }
                 assert!(stats.entries <= all.p.len() as u64, "{} α {alpha} {assign}", case.name);
             }

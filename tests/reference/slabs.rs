@@ -122,7 +122,7 @@ fn boxes_beside_slabs_are_not_touched() {
                         continue;
                     }
                     told += 1;
-                    for &t in tree.primitives(leaf) {
+                    for &t in tree.tets(leaf) {
                         let v = mesh.tets[t as usize].map(|id| [0, 1, 2].map(|c| vertices.normalised[id as usize][c] - x[c]));
                         let touches = box_touches(&v, &axes, touch_slack(&v, &axes));
                         assert!(!touches, "{name} level {level} leaf {leaf} tetrahedron {t} at {x:?} {axes:?}");

@@ -25,7 +25,7 @@ fn breaks(assign: Assign, text: &str, change: impl FnOnce(&mut TreeArrays)) {
 
 /// A leaf that lists at least `n` tetrahedra.
 fn leaf(tree: &TreeArrays, n: usize) -> u32 {
-    tree.leaves().find(|&j| tree.primitives(j).len() >= n).unwrap()
+    tree.leaves().find(|&j| tree.tets(j).len() >= n).unwrap()
 }
 
 #[test]

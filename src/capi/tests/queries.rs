@@ -25,7 +25,16 @@ pub fn settings() -> OlbvhPictureSettings {
 fn voxels() -> OlbvhVoxels {
     let axis = |c: usize, x: f32| [0, 1, 2].map(|k| if k == c { x } else { 0.0 });
     let half = [axis(0, 0.2), axis(1, 0.2), axis(2, 0.4)];
-    OlbvhVoxels { origin: LO, across: axis(0, 0.4), down: axis(1, 0.4), up: axis(2, 0.8), half, width: 17, height: 13, layers: 6 }
+    OlbvhVoxels {
+        origin: LO,
+        next_voxel: axis(0, 0.4),
+        next_row: axis(1, 0.4),
+        next_layer: axis(2, 0.8),
+        half,
+        width: 17,
+        height: 13,
+        layers: 6,
+    }
 }
 
 fn meshes() -> [Mesh; 2] {
@@ -332,7 +341,8 @@ pub fn recorded(gpu: *mut OlbvhGpu) {
 
 /// A stack that is sliced in several bands.
 fn large_stack(tree: *mut OlbvhTree, values: &[f32]) {
-    let stack = OlbvhVoxels { across: [0.007, 0.0, 0.0], down: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
+    let stack =
+        OlbvhVoxels { next_voxel: [0.007, 0.0, 0.0], next_row: [0.0, 0.004, 0.0], width: 1000, height: 1400, layers: 2, ..voxels() };
     let held = handle(tree, "tree").unwrap();
     let expected = sliced(&held.tree, Some((values, On::Points)), &stack);
     let (mut answers, mut found) = (vec![0u32; 2_800_000], vec![0f32; 2_800_000]);

@@ -56,7 +56,7 @@ impl<'a> Slicing<'a> {
         (voxels, extrapolate): (&'a VoxelGrid, Extrapolate),
         cells: Option<CellRange>,
     ) -> Result<Self> {
-        voxels.plan(grid)?;
+        voxels.check_over(grid)?;
         let field = field.map(|field| upload_field(gpu, &searched.mesh.input, field)).transpose()?;
         let [width, height] = voxels.size;
         let per_run = size_of::<RunState>() as u64;
@@ -113,7 +113,7 @@ impl<'a> Slicing<'a> {
 /// they belong to points or tetrahedra. `report` receives the number of voxels done and their total.
 ///
 /// # Errors
-/// [`crate::Error::Invalid`] for a field of the wrong length, or for voxels that [`VoxelGrid::plan`] refuses;
+/// [`crate::Error::Invalid`] for a field of the wrong length, or for voxels that [`VoxelGrid::check_over`] refuses;
 /// [`crate::Error::Memory`]; a failed Vulkan call; errors of `sink`.
 pub fn slice(
     tree: &Tree,

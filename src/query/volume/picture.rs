@@ -1,7 +1,7 @@
 //! Drawing of a whole picture by means of [`super::cmd_render`]: allocates memory, and submits one round at a time until every
 //! ray is done.
 
-use super::{BLOCK, RenderInput, RenderMemory, Share, Visibility, cmd_render_in};
+use super::{BLOCK, RenderInput, RenderMemory, Visibility, cmd_render_in};
 use crate::build::{DeviceMesh, Tree, cmd_ranges, range_bytes};
 use crate::error::{Error, Result};
 use crate::gpu::{Arena, Buffer, BufferRef, DeviceKind, Gpu, Recorder};
@@ -126,7 +126,7 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws a picture of this size from this row of the view on, or the share of a block in it. `report` receives the number of rays done and their total.
+    /// Draws a picture of this size from this row of the view on, or what a block with these cells has of it. `report` receives the number of rays done and their total.
     fn draw(&mut self, size: [u32; 2], row: u32, cells: Option<CellRange>, report: Progress<'_>) -> Result<()> {
         let Self { gpu, searched, plan, memory, stats, times, .. } = self;
         let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
@@ -137,13 +137,13 @@ impl<'a> Canvas<'a> {
             visibility: self.ranges.map(|ranges| Visibility { ranges, values, count: plan.visible_values.len() as u32 }),
             ..RenderInput::of(plan, view, table, (self.field.0.all(), self.field.1))
         };
-        let share = Share { cells, marked: self.marked };
-        let begin = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::begin(0));
+        let marked = self.marked;
+        let begin = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, cells, marked, memory, Rounds::begin(0));
         times.add(gpu.submit("olbvh.query.intervals", begin)?.1);
         self.marked = true;
         let rays = u64::from(size[0]) * u64::from(size[1]);
         let status = loop {
-            let round = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, share, memory, Rounds::resume(1));
+            let round = |r: &mut Recorder<'_>| cmd_render_in(r, searched, &input, cells, marked, memory, Rounds::resume(1));
             times.add(gpu.submit("olbvh.query.march", round)?.1);
             let status: RenderStatus = gpu.download_one(&self.buffer, memory.status)?;
             report(rays.saturating_sub(u64::from(status.unfinished)), rays)?;
@@ -266,4 +266,32 @@ pub(crate) fn render_in(
     }
     log::debug!("picture: {}", canvas.times);
     Ok(Rendered { colors, stats: canvas.stats, times: canvas.times })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::build::BadCells;
+    use crate::gpu::GpuOptions;
+    use crate::layout::{DrawUniforms, ViewUniforms};
+    use crate::mesh::kuhn_jittered;
+    use crate::options::BuildOptions;
+    use crate::render::interval_slack;
+
+    #[test]
+    fn the_device_makes_of_a_view_what_the_reference_does() {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        let mesh = kuhn_jittered([6, 5, 4], 0.3, 5).unwrap();
+        let device = DeviceMesh::upload(&gpu, &mesh, BadCells::Skip).unwrap();
+        let tree = Tree::build(&gpu, &device, &BuildOptions::default()).unwrap();
+        let settings = RenderSettings { size: [37, 29], ..RenderSettings::default() };
+        let plan = prepare_picture(&device, &mesh, &mesh.fields[0], &settings).unwrap().plan;
+        let mut canvas = Canvas::new(&gpu, &(&tree).into(), &plan, (&mesh.fields[0].values, On::Points), None, false).unwrap();
+        canvas.draw(plan.size, 0, None, SILENT).unwrap();
+        let frame = canvas.memory.frame;
+        assert_eq!(canvas.first::<ViewUniforms>(frame, 1).unwrap(), [plan.view()]);
+        let made = canvas.first::<DrawUniforms>(frame.part(size_of::<ViewUniforms>() as u64, frame.size()), 1).unwrap()[0];
+        let [x, y, z] = interval_slack(tree.grid());
+        assert_eq!((made.slack, made.size), ([x, y, z, 0.0], plan.size));
+    }
 }

@@ -24,35 +24,49 @@ use glam::{DMat4, DVec2, DVec3, DVec4};
 pub struct ProjectedView {
     /// Takes points of the mesh (relative to [`crate::mesh::Mesh::origin`]) to Vulkan's clip space: projection · view ·
     /// model. Its y points down, so negate the second row of a matrix that is used with a viewport of negative height. The
-    /// viewport is the picture, with depths from 0 to 1.
+    /// viewport is the picture, with depths from 0 to 1. It may come from a renderer that multiplies in single precision.
     pub to_clip: DMat4,
     /// Whether the near plane has depth 1, and what is far depth 0; otherwise it is the other way round. The far plane may
     /// lie at infinity.
     pub reversed: bool,
 }
 
-/// A part of this size of a row is taken for 0.
-const NOTHING: f64 = 1e-9;
+/// Planes of equal depth may be tilted by this much against the picture: several roundings to single precision.
+const TILT: f64 = 1.0 / (1 << 18) as f64;
 
 impl ProjectedView {
+    /// The matrix with planes of equal depth that are exactly parallel to the picture, as they are in all matrices of
+    /// cameras before these are multiplied in single precision; `None` if they are not parallel.
+    fn levelled(&self) -> Option<DMat4> {
+        let mut rows = self.to_clip.transpose();
+        let (depth, ahead) = (rows.z_axis.truncate(), rows.w_axis.truncate());
+        if ahead != DVec3::ZERO {
+            let parallel = depth.project_onto(ahead);
+            if depth.distance(parallel) > TILT * ahead.length() {
+                return None;
+            }
+            rows.z_axis = parallel.extend(rows.z_axis.w);
+        }
+        Some(rows.transpose())
+    }
+
     /// The view of a picture of this size.
     ///
     /// # Errors
     /// [`Error::Invalid`] if the matrix has no inverse, or if its near plane is not parallel to the picture.
     pub(crate) fn view(&self, [width, height]: [u32; 2], bounds: &Bounds) -> Result<View> {
         let wrong = |why: &str| Err(Error::Invalid(format!("a matrix to clip space {why}")));
-        let inverse = self.to_clip.inverse();
-        if !(self.to_clip.is_finite() && inverse.is_finite()) {
-            return wrong("without an inverse");
-        }
-        let w = inverse.row(3);
-        if w.x.abs().max(w.y.abs()) > w.abs().max_element() * NOTHING {
+        let Some(to_clip) = self.levelled() else {
             return wrong("whose planes of equal depth are not parallel to the picture; render without an oblique near plane");
+        };
+        let inverse = to_clip.inverse();
+        if !(to_clip.is_finite() && inverse.is_finite()) {
+            return wrong("without an inverse");
         }
         // u grows from the near plane, where it is 0, to the far plane, where it is 1.
         let (base, slope) = if self.reversed { (1.0, -1.0) } else { (0.0, 1.0) };
         let at = |x: f64, y: f64, u: f64| inverse * DVec4::new(x, y, (u - base) * slope, 1.0);
-        let clip = bounds.corners().map(|corner| self.to_clip * corner.extend(1.0));
+        let clip = bounds.corners().map(|corner| to_clip * corner.extend(1.0));
         let depths = clip.iter().map(|c| if c.w > 0.0 { base + slope * c.z / c.w } else { 0.0 });
         let [nearest, farthest] = depths.fold([f64::MAX, f64::MIN], |[lo, hi], u| [lo.min(u), hi.max(u)]);
         // Rays start on the plane through the nearest corner, so that no single precision is wasted on the way to the mesh.

@@ -27,6 +27,15 @@ fn views() -> Vec<(&'static str, ProjectedView)> {
         ("from within", view(lens * seen_from(DVec3::new(1.0, 2.5, 1.0)), false)),
         ("off the centre", view(shift * lens * outside, false)),
         ("a model that is turned", view(lens * seen_from(DVec3::new(-20.0, -25.0, 20.0)) * model, false)),
+        ("in single precision", view((lens.as_mat4() * outside.as_mat4()).as_dmat4(), false)),
+        (
+            "near and far in single precision",
+            view((perspective(0.9, ASPECT, 0.01, 1000.0).as_mat4() * outside.as_mat4()).as_dmat4(), false),
+        ),
+        (
+            "reversed in single precision",
+            view((perspective_infinite_reverse(0.9, ASPECT, 0.01).as_mat4() * outside.as_mat4()).as_dmat4(), true),
+        ),
         ("mirrored", view(DMat4::from_scale(DVec3::new(-1.0, 1.0, 1.0)) * lens * outside, false)),
     ]
 }

@@ -1,0 +1,1 @@
+const uint SHARE = 32u; // Candidates of a share: the bits of a word of hits.
