@@ -1,6 +1,7 @@
 //! The arrays of a tree in host memory (SPEC 2.5, the paper's §3.1), equal byte for byte to those on a device.
 
 mod stats;
+pub mod stored;
 pub use stats::{TreeBytes, TreeStats};
 
 use crate::grid::{Box6, Grid, MAX_LEVEL, morton};

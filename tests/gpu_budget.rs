@@ -17,9 +17,8 @@ use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
 use olbvh::reference::depth::measure;
 use olbvh::reference::locate::Locator;
-use olbvh::reference::quarters::split_entries;
-use olbvh::reference::slabs::split_slabs;
 use olbvh::reference::vertices::Vertices;
+use olbvh::tree::stored::{split_entries, split_slabs};
 use olbvh::tree::{TreeArrays, TreeBytes};
 use submit::submit;
 

@@ -16,7 +16,7 @@ use olbvh::mesh::{Mesh, kuhn_jittered};
 use olbvh::options::BuildOptions;
 use olbvh::reference::boundary::topology;
 use olbvh::reference::build::build;
-use olbvh::reference::quarters::split_entries;
+use olbvh::tree::stored::split_entries;
 
 const SLOTS: usize = 2;
 

@@ -32,7 +32,7 @@ const LAYERS: &[(&str, &[&str])] = &[
     ("baseline", &["build", "error", "gpu", "kernels", "layout", "mesh", "primitives", "query", "reference", "render", "slicing", "times"]),
     ("conformance", &["build", "error", "gpu", "grid", "kernels", "layout", "mesh", "options", "primitives", "query", "reference", "render", "slicing", "tree"]),
     ("capi", &["build", "error", "glsl", "gpu", "grid", "layout", "mesh", "options", "query", "reference", "render", "slicing"]),
-    ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "times"]),
+    ("bench", &["baseline", "build", "error", "gpu", "grid", "kernels", "mesh", "named", "options", "primitives", "query", "reference", "render", "slicing", "times", "tree"]),
     ("tune", &["bench", "build", "error", "formats", "gpu", "kernels", "mesh", "options", "query", "reference", "render", "slicing", "times", "tree"]),
 ];
 

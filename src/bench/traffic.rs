@@ -35,7 +35,7 @@
 use crate::build::{DeviceMesh, SHARE, Tree, filtered};
 use crate::kernels::Target;
 use crate::options::Lists;
-use crate::reference::quarters::id_mask;
+use crate::tree::stored::id_mask;
 
 /// Bytes that a scan moves per value.
 const SCAN: u64 = 12;

@@ -13,7 +13,7 @@ use crate::kernels::{
 use crate::layout::{BuildStatus, Grid, NONE};
 use crate::options::{BuildOptions, LEAST_USUAL, USUAL_ENTRIES};
 use crate::primitives::{Count, Unsorted, cmd_exclusive_scan, cmd_sort};
-use crate::reference::quarters::id_mask;
+use crate::tree::stored::id_mask;
 
 /// A build under way: what its stages share.
 #[derive(Clone, Copy)]

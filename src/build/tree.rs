@@ -10,9 +10,8 @@ use crate::grid::MAX_LEVEL;
 use crate::layout::{BuildStatus, Grid, wide};
 use crate::options::BuildOptions;
 use crate::reference::depth::{finer, too_large};
-use crate::reference::quarters::split_entries;
-use crate::reference::slabs::split_slabs;
 use crate::times::StageTimes;
+use crate::tree::stored::{split_entries, split_slabs};
 use crate::tree::{TreeArrays, TreeBytes};
 
 /// An OLBVH in device memory.

@@ -10,8 +10,7 @@ use crate::build::{BuildScratch, Capacity, DeviceMesh, Tree, TreeMemory, cmd_bui
 use crate::gpu::{Arena, BufferRef, Gpu};
 use crate::layout::{BuildStatus, Grid};
 use crate::options::{Assign, BuildOptions, Lists};
-use crate::reference::quarters::split_entries;
-use crate::reference::slabs::split_slabs;
+use crate::tree::stored::{split_entries, split_slabs};
 use crate::tree::{TreeArrays, TreeBytes};
 
 /// Which interface builds the tree, and within which limits.

@@ -25,6 +25,9 @@ pub use visible::{cmd_visible, visible_bytes};
 pub(crate) use volume::{Canvas, Rays, render_in};
 pub use volume::{RenderInput, RenderMemory, Rendered, Visibility, cmd_depths, cmd_render, prepare_picture, render};
 
+/// What an overlap is, and what it takes to find, is defined with the reference.
+pub use crate::reference::overlap::{Effort, Overlap};
+
 use crate::build::{MeshInput, MeshView, Tree, TreeMemory};
 use crate::error::{Error, Result};
 use crate::gpu::{Buffer, BufferRef, DeviceKind, Gpu};

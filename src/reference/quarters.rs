@@ -17,7 +17,6 @@
 use super::vertices::Vertices;
 use crate::grid::{CellRange, Grid, MAX_LEVEL, per_axis, two_to, unmorton};
 use crate::mesh::Mesh;
-use crate::options::Lists;
 use rayon::prelude::*;
 
 pub use crate::layout::constants::quarters::ALL_OCTANTS;
@@ -25,13 +24,6 @@ pub use crate::layout::constants::quarters::ALL_OCTANTS;
 /// On an axis with a smaller extent than this in normalised coordinates, a finest cell is less than four steps of the
 /// coordinates wide.
 pub(super) const COARSE: f32 = two_to(-30);
-
-/// The bits of an entry's word that are its tetrahedron's id; quarters or halves stand above them. All bits if entries
-/// have no quarters: in the paper's lists, and in meshes that need the bits for their ids.
-pub fn id_mask(lists: Lists, tets: usize) -> u32 {
-    let bits = [20, 26].into_iter().find(|&bits| tets <= 1 << bits);
-    bits.filter(|_| lists == Lists::Boundary).map_or(u32::MAX, |bits| (1 << bits) - 1)
-}
 
 /// How many times a leaf's cell is halved along each axis.
 fn cuts(grid: &Grid) -> u32 {
@@ -57,14 +49,6 @@ pub fn quarters_near(grid: &Grid, code: u32, cells: &CellRange) -> u32 {
         (2 << place(cells.hi[c] + reach[c])) - (1 << place(cells.lo[c].saturating_sub(reach[c])))
     };
     along(0) | along(1) << (1 << n) | along(2) << (2 << n)
-}
-
-/// Splits entries, as a device stores them in a tree with this grid, into tetrahedra and quarters.
-pub fn split_entries(entries: Vec<u32>, grid: &Grid) -> (Vec<u32>, Vec<u16>) {
-    if grid.ids == u32::MAX {
-        return (entries, Vec::new());
-    }
-    entries.into_iter().map(|entry| (entry & grid.ids, (entry >> grid.ids.count_ones()) as u16)).unzip()
 }
 
 /// The quarters of all entries, given their Morton codes and tetrahedra; empty if entries have no bits for them.
@@ -111,6 +95,8 @@ pub fn is_near(cells: &CellRange, cell: [u32; 3], reach: [u32; 3]) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::options::Lists;
+    use crate::tree::stored::id_mask;
 
     /// The quarters found by testing every finest cell of the leaf.
     fn counted(grid: &Grid, code: u32, cells: &CellRange, parts: u32) -> u32 {

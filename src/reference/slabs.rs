@@ -100,12 +100,6 @@ fn normal_bits(n: Vec3) -> u32 {
     (axis as u32) << 30 | part(2) << 23 | part(1) << 16
 }
 
-/// Splits what a device stores of so many leaves into the offsets of PO and the slabs behind them.
-pub fn split_slabs(mut words: Vec<u32>, leaves: usize) -> (Vec<u32>, Vec<u32>) {
-    let slabs = words.split_off(words.len().min(leaves + 1));
-    (words, slabs)
-}
-
 /// What slabs are fitted to.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Fit<'a> {

@@ -5,7 +5,7 @@ use super::codes::Stage;
 use super::leaves::{cell_box, flag, longest_list, octants};
 use super::levels::union;
 use super::marks::Marks;
-use super::quarters::{id_mask, quarters_near};
+use super::quarters::quarters_near;
 use super::slabs::Fit;
 use super::vertices::Vertices;
 use crate::error::{Error, Result};
@@ -13,6 +13,7 @@ use crate::grid::{MAX_LEVEL, unmorton};
 use crate::layout::NONE;
 use crate::mesh::Mesh;
 use crate::options::Lists;
+use crate::tree::stored::id_mask;
 use crate::tree::{TreeArrays, TreeStats};
 use rayon::prelude::*;
 
