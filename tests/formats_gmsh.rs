@@ -79,5 +79,9 @@ fn gmsh_views_of_several_time_steps() {
         let remark = format!("time step {read} of 0 to 2 is read");
         assert!(loaded.report.warnings.iter().any(|w| w.starts_with(&remark)), "{:?}", loaded.report.warnings);
     }
+    let short = text.clone() + &view("s", 9, 0) + &view("s", 10, 0);
+    let options = LoadOptions { step: TimeStep::Last, ..LoadOptions::default() };
+    let warnings = load_bytes("a.msh", short.into_bytes(), &options).unwrap().report.warnings;
+    assert!(warnings.contains(&"array `s` is left out: it has no values at this time step".into()), "{warnings:?}");
     assert!(open(TimeStep::Number(3)).unwrap_err().to_string().contains("there is no time step 3; the steps are 0 to 2"));
 }

@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::shared;
+use formats_small::{shared, small};
 use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, TimeStep, listed_files, load};
 use olbvh::mesh::{Mesh, On};
 use std::fs;
@@ -100,6 +100,7 @@ fn errors_name_the_list_or_the_listed_file() {
     let broken = file("UnstructuredGrid", &piece("0 0 0 1 0 0 0 1 0 0 0 1", 7).replace(">0 1 2 3 0 1 2 3<", ">0 1 2 3 0 1 2 4<"));
     fs::write(folder.path().join("broken.vtu"), broken.replace("Name='vtkGhostType'", "Name='g'")).unwrap();
     fs::write(folder.path().join("far.vtu"), file("UnstructuredGrid", &piece("0 0 0 1 0 nan 0 1 0 0 0 1", 7))).unwrap();
+    fs::write(folder.path().join("case.vtk"), small("ascii.vtk")).unwrap();
     for (sources, wanted) in [
         (&["c/grid.vtu", "gone.vtu"][..], "case.pvtu: line 4: `gone.vtu`: there is no such file"),
         (&["c/grid.vtu", "c/grid.vtu"], "case.pvtu: line 4: `c/grid.vtu`: the file is listed twice"),
@@ -108,6 +109,7 @@ fn errors_name_the_list_or_the_listed_file() {
         // Neither folders nor devices, which may have no end.
         (&["c"], "case.pvtu: line 3: `c`: there is no such file"),
         (&["/dev/zero"], "case.pvtu: line 3: `/dev/zero`: there is no such file"),
+        (&["case.vtk"], "case.pvtu: line 3: `case.vtk`: no VTK XML file, as such a list needs; read it by itself"),
         // A list of itself.
         (&["case.pvtu"], "case.pvtu: line 3: `case.pvtu`: the file is listed twice"),
     ] {
@@ -293,6 +295,22 @@ fn a_series_in_json() {
         assert_eq!(mesh.field("s").unwrap().values, [value]);
         assert!(report.warnings[0].starts_with(&format!("time step {number} of 0 to 1 is read")), "{:?}", report.warnings);
     }
+    // Each file is a step of its own; of those at one time, the last counts.
+    let Loaded { mesh, report } = read(&folder, "one.vtu.series", &series.replace("9.5", "1e1")).unwrap();
+    assert_eq!((fields(&mesh), report.warnings.len()), (vec![("s", On::Cells, &[7.0][..])], 0), "{report}");
+    // A step may have any format.
+    fs::write(folder.path().join("c/old.vtk"), small("ascii.vtk")).unwrap();
+    let legacy = read(&folder, "old.vtk.series", r#"{"files": [{"name": "c/old.vtk"}, {"name": "c/old.vtk"}]}"#).unwrap();
+    assert!(legacy.mesh.tets.len() > 1 && legacy.report.format.starts_with("ParaView series: VTK"), "{}", legacy.report);
+    for (content, wanted) in [
+        (r#"{"files": []}"#, "self.series: it lists no file"),
+        (
+            r#"{"files": [{"name": "self.series"}]}"#,
+            "self.series: line 1: `self.series`: a series in a series; list the files of its steps",
+        ),
+    ] {
+        assert_eq!(read(&folder, "self.series", content).unwrap_err(), wanted);
+    }
     let error = read(&folder, "run.vtu.series", &series.replace("a & b/", "d/")).unwrap_err();
     assert!(error.contains("line 2: `d/grid.vtu`: there is no such file"), "{error}");
     let error = read(&folder, "run.vtu.series", "{\n\"files\": 3}").unwrap_err();
@@ -300,4 +318,13 @@ fn a_series_in_json() {
     assert_eq!(listed_files(&path).len(), 0, "a broken list names nothing");
     fs::write(&path, &series).unwrap();
     assert_eq!(listed_files(&path), ["c/grid.vtu", "a & b/grid.vtu"].map(|name| folder.path().join(name)));
+}
+
+/// A list that names itself many times is read once.
+#[test]
+fn lists_of_themselves_name_few_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("self.pvtu");
+    fs::write(&path, file("PUnstructuredGrid", &"<Piece Source='self.pvtu'/><Piece Source='./self.pvtu'/>".repeat(500))).unwrap();
+    assert_eq!(listed_files(&path).len(), 1000);
 }

@@ -4,7 +4,7 @@
 
 mod formats_small;
 
-use formats_small::{POINTS, TETS, all, open_bytes, replace, shared};
+use formats_small::{POINTS, TETS, all, join, open_bytes, replace, shared};
 use olbvh::Error;
 use olbvh::formats::{Fate, LoadOptions, Loaded, Merge, load, load_bytes};
 use olbvh::mesh::On;
@@ -376,4 +376,40 @@ fn messages_about_xml_are_short_and_printable() {
             assert!(error.len() < 600 && !error.contains(char::is_control) && error.contains("line"), "{error}");
         }
     }
+}
+
+/// What single precision makes of values is said in every format.
+#[test]
+fn losses_by_rounding_are_remarked_on() {
+    let near: Vec<f64> = (0..8).map(|i| 1e9 + f64::from(i)).collect();
+    let (small, large) = (join(0..8), join(&near));
+    let rows = |values: &[f64]| values.iter().zip(1..).map(|(v, i)| format!("{} {v}\n", 10 * i)).collect::<String>();
+    let big = |keyword: &str, bytes: Vec<u8>| [format!("SCALARS s {keyword}\nLOOKUP_TABLE default\n").into_bytes(), bytes].concat();
+    let floats = big("float", (0..8u8).flat_map(|v| f32::from(v).to_be_bytes()).collect());
+    let doubles = big("double", near.iter().flat_map(|v| v.to_be_bytes()).collect());
+    let collapsed = "array `s` has several values at 1000000000";
+    for (name, old, new, warning) in [
+        ("ascii.vtk", format!("float\n{small}").into_bytes(), format!("double\n{large}").into_bytes(), collapsed),
+        ("binary.vtk", floats, doubles, collapsed),
+        ("v22.msh", rows(&[0., 1., 2., 3., 4., 5., 6., 7.]).into_bytes(), rows(&near).into_bytes(), collapsed),
+        ("ascii.vtk", b"0 1 2 3 4 5\n".into(), b"0 1 2 3 4 20000001\n".into(), "array `c` has whole numbers beyond 16777216"),
+        ("v22.msh", b"10 4 2 0".into(), b"10 4 2 20000001".into(), "array `gmsh:physical` has whole numbers beyond 16777216"),
+        ("text.mesh", b"7 8 5\n".into(), b"7 8 20000001\n".into(), "array `medit:ref (cells)` has whole numbers beyond 16777216"),
+    ] {
+        let warnings = open_bytes(name, replace(name, &old, &new)).report.warnings;
+        assert!(warnings.len() == 1 && warnings[0].starts_with(warning), "{name}: {warnings:?}");
+    }
+    let vtu = |kind: &str, values: &str| {
+        let text = String::from_utf8(formats_small::small("ascii.vtu")).unwrap();
+        let text = text
+            .replace("type=\"Float32\" Name=\"s\"", &format!("type=\"{kind}\" Name=\"s\""))
+            .replace(&format!(">{small}<"), &format!(">{values}<"));
+        open_bytes("a.vtu", text.into_bytes()).report.warnings
+    };
+    for kind in ["Float64", "Int64", "UInt32"] {
+        assert!(vtu(kind, &large)[0].starts_with(collapsed), "{kind}");
+    }
+    let ids = vtu("Int64", &join((1..9).map(|i| 10_000_000 * i)));
+    assert!(ids.len() == 1 && ids[0].starts_with("array `s` has whole numbers beyond 16777216"), "{ids:?}");
+    assert_eq!([vtu("Int64", &join([20_000_001; 8])), vtu("Float64", &join([1e9 + 0.1; 8]))], [[""; 0]; 2]);
 }

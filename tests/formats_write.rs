@@ -162,6 +162,9 @@ fn tables_of_points() {
         "z (mm),y (mm),x (mm)\n-3,2.5,1\n6e3,5,4\n",
         "X [ m ], Y [ m ], Z [ m ], P\n1,2.5,-3,7\n4,5,6e3,7\n",
         "nodenumber,    x-coordinate,    y-coordinate,    z-coordinate\n1,1,2.5,-3\n2,4,5,6e3\n",
+        "# by NumPy\n# z y x\n-3 2.5 1\n6e3 5 4\n",
+        "#v,x,y,z\n0,1,2.5,-3\n# x y z v\n0,4,5,6e3\n",
+        "# Z [mm], Y, X\n# z y x of two places\n1 2.5 -3\n4 5 6e3\n",
         "zone,x_pos,y,y_pos,z,x,z_pos\n9,9,2.5,9,-3,1,9\n9,9,5,9,6e3,4,9\n",
     ] {
         std::fs::write(&path, text).unwrap();

@@ -2,6 +2,7 @@
 //! instances. All else, such as materials, loads and steps, is passed over.
 
 use std::collections::HashMap;
+use std::path::PathBuf;
 
 use super::LoadOptions;
 use super::abaqus_model::{Block, Body, Element, Instance, Model};
@@ -16,23 +17,44 @@ const MOST_DEEP: usize = 8;
 const GENERATORS: [&str; 8] = ["NGEN", "NFILL", "NCOPY", "NMAP", "ELGEN", "ELCOPY", "SYSTEM", "ELEMENT MATRIX"];
 
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
-    let mut reader = Reader { model: Model::default(), section: Section::Other, part: 0, pending: Vec::new() };
-    reader.file(source, 1)?;
+    let mut reader = Reader::default();
+    reader.whole(source)?;
+    if let twice @ Some(_) = reader.model.node_given_twice() {
+        // Lines are not kept; a second reading finds that of this node.
+        Reader { twice, ..Reader::default() }.whole(source)?;
+    }
     let mut assembly = Assembly::new(source, options, "Abaqus input file".into());
     reader.model.assemble(source, &mut assembly)?;
     Ok(assembly)
 }
 
+/// The files that an input file names in its keywords.
+pub(super) fn included(source: &Source) -> Vec<PathBuf> {
+    let (mut lines, mut found) = (Tokens::new(source, None), Vec::new());
+    while let Ok(Some((line, _))) = lines.line() {
+        let line = line.trim_ascii();
+        if line.starts_with(b"*") && !line.starts_with(b"**") {
+            let line = line.to_vec();
+            let Ok(keyword) = Keyword::read(line, &mut lines) else { break };
+            found.extend(keyword.get("INPUT").map(|name| source.beside(name)));
+        }
+    }
+    found
+}
+
 /// What data lines hold.
+#[derive(Default)]
 enum Section {
     Nodes,
     /// Elements of the last block of the part.
     Elements,
     /// Where an instance is; the number of lines so far.
     Instance(usize),
+    #[default]
     Other,
 }
 
+#[derive(Default)]
 struct Reader {
     model: Model,
     section: Section,
@@ -40,6 +62,8 @@ struct Reader {
     part: usize,
     /// Numbers of an element that goes on in the next line.
     pending: Vec<i64>,
+    /// A node, by its body and its place there, that another one has the number of.
+    twice: Option<[usize; 2]>,
 }
 
 /// A keyword in upper case, without its star, and its parameters, whose names are in upper case.
@@ -49,9 +73,26 @@ struct Keyword {
 }
 
 impl Keyword {
+    /// Reads a keyword whose first line this is: it goes on after a comma at the end, and comments do not end it.
+    fn read(mut line: Vec<u8>, lines: &mut Tokens<'_>) -> Result<Self> {
+        while line.ends_with(b",")
+            && let Some((more, _)) = lines.line()?
+        {
+            if !more.trim_ascii_start().starts_with(b"**") {
+                line.extend_from_slice(more.trim_ascii());
+            }
+        }
+        Ok(Self::new(&line))
+    }
+
     fn new(line: &[u8]) -> Self {
         let text = String::from_utf8_lossy(line).into_owned();
-        let mut fields = text.trim_start_matches('*').split(',');
+        let mut quoted = false;
+        // Names in quotation marks may have commas.
+        let mut fields = text.trim_start_matches('*').split(|c| {
+            quoted ^= c == '"';
+            c == ',' && !quoted
+        });
         let upper = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase();
         let name = upper(fields.next().unwrap_or_default());
         let parameter = |field: &str| {
@@ -71,6 +112,11 @@ impl Reader {
         &mut self.model.bodies[self.part]
     }
 
+    fn whole(&mut self, source: &Source) -> Result<()> {
+        self.file(source, 1)?;
+        self.end_of_section(source, source.len())
+    }
+
     fn file(&mut self, source: &Source, deep: usize) -> Result<()> {
         let mut lines = Tokens::new(source, None);
         while let Some((line, at)) = lines.line()? {
@@ -82,16 +128,16 @@ impl Reader {
                 self.data(source, line, at)?;
                 continue;
             }
-            let mut keyword = line.to_vec();
-            while keyword.ends_with(b",")
-                && let Some((more, _)) = lines.line()?
-            {
-                keyword.extend_from_slice(more.trim_ascii());
+            let line = line.to_vec();
+            let keyword = Keyword::read(line, &mut lines)?;
+            // The lines of an included file stand where it is included, so a section may go on in it, and after it.
+            if keyword.name != "INCLUDE" {
+                self.end_of_section(source, at)?;
+                self.begin(source, &keyword, at)?;
             }
-            self.end_of_section(source, at)?;
-            self.keyword(source, &Keyword::new(&keyword), at, deep)?;
+            self.include(source, &keyword, at, deep)?;
         }
-        self.end_of_section(source, source.len())
+        Ok(())
     }
 
     /// Nothing of a section may be left over.
@@ -103,7 +149,8 @@ impl Reader {
         Err(source.error_line(at, format!("element {element} ends after {found} nodes, fewer than its type has")))
     }
 
-    fn keyword(&mut self, source: &Source, keyword: &Keyword, at: usize, deep: usize) -> Result<()> {
+    /// Begins the section of a keyword.
+    fn begin(&mut self, source: &Source, keyword: &Keyword, at: usize) -> Result<()> {
         let fail = |message: String| Err(source.error_line(at, message));
         self.section = Section::Other;
         let name = || keyword.get("NAME").unwrap_or_default().to_uppercase();
@@ -123,7 +170,9 @@ impl Reader {
             "PART" => {
                 self.part = self.model.bodies.len();
                 self.model.bodies.push(Body::default());
-                self.model.parts.insert(name(), self.part);
+                if self.model.parts.insert(name(), self.part).is_some() {
+                    return fail(format!("a second part `{}`; give each a name of its own", excerpt(name().as_bytes())));
+                }
             }
             "INSTANCE" => {
                 let part = keyword.get("PART").unwrap_or_default().to_uppercase();
@@ -142,13 +191,18 @@ impl Reader {
             }
             _ => {}
         }
+        Ok(())
+    }
+
+    /// Reads the file that a keyword names, if it is one of nodes or elements.
+    fn include(&mut self, source: &Source, keyword: &Keyword, at: usize, deep: usize) -> Result<()> {
+        let fail = |message: String| Err(source.error_line(at, message));
         let included = if keyword.name == "INCLUDE" || !matches!(self.section, Section::Other) { keyword.get("INPUT") } else { None };
         let Some(included) = included else { return Ok(()) };
         if deep == MOST_DEEP {
             return fail(format!("files lie more than {MOST_DEEP} deep within each other"));
         }
-        let path = source.path.parent().map_or_else(|| included.into(), |folder| folder.join(included));
-        match Source::open(&path, "an Abaqus input file") {
+        match Source::open(&source.beside(included), "an Abaqus input file") {
             Ok(included) => self.file(&included, deep + 1),
             Err(error) => fail(format!("the file that it names cannot be read ({error})")),
         }
@@ -167,7 +221,11 @@ impl Reader {
                 for (x, field) in point.iter_mut().zip(fields).filter(|(_, field)| !field.is_empty()) {
                     *x = float(field).ok_or_else(|| wrong(field, "a coordinate"))?;
                 }
-                let body = self.body();
+                let part = self.part;
+                let body = &mut self.model.bodies[part];
+                if self.twice == Some([part, body.tags.len()]) {
+                    return Err(source.error_line(at, format!("node {tag} a second time, at another place; number it anew")));
+                }
                 body.tags.push(tag);
                 body.points.push(point);
             }
@@ -193,7 +251,8 @@ impl Reader {
                 self.pending = pending;
             }
             Section::Instance(lines) => {
-                let numbers: Option<Vec<f64>> = fields.map(float).collect();
+                // What is left blank is 0.
+                let numbers: Option<Vec<f64>> = fields.map(|field| if field.is_empty() { Some(0.0) } else { float(field) }).collect();
                 let numbers = numbers.ok_or_else(|| wrong(line, "the place of an instance"))?;
                 let instance = self.model.instances.last_mut();
                 let right = instance.is_none_or(|instance| instance.place(lines, &numbers));

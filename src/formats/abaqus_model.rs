@@ -1,6 +1,6 @@
 //! Nodes and elements of an Abaqus input file, by parts, and their assembly to a mesh.
 
-use std::collections::HashMap;
+use std::collections::{HashMap, HashSet};
 
 use glam::{DQuat, DVec3};
 
@@ -16,28 +16,42 @@ use crate::mesh::On;
 /// A type of elements.
 #[derive(Clone, Copy)]
 pub(super) struct Element {
-    /// `None`: elements without volume, which are only counted.
+    /// `None`: elements that are only counted, under `name`.
     pub kind: Option<CellType>,
     /// Number of nodes in the file.
     pub nodes: usize,
+    name: &'static str,
+    fate: Fate,
 }
 
 /// What precedes `3D` in the names of solids: stress, heat, acoustic, convection, coupled, Eulerian, fluid, cohesive.
 const SOLIDS: [&str; 8] = ["C", "DC", "AC", "DCC", "Q", "EC", "F", "COH"];
+/// What precedes it in those of points, lines and surfaces: truss, rigid, membrane, connector, pipe, particle and so on.
+const FLAT: [&str; 15] = ["T", "R", "RB", "M", "SFM", "CONN", "DCOUP", "JOINT", "DRAG", "FRAME", "FP", "FPC", "PC", "PD", "ACIN"];
+/// What precedes it in the names of solids that are not read; any other may be one as well.
+const UNREAD: [(&str, &str); 5] = [
+    ("GK", "gasket element"),
+    ("FC", "element of fluid dynamics"),
+    ("EMC", "electromagnetic element"),
+    ("COD", "coupled cohesive element"),
+    ("CIN", "infinite element"),
+];
 
 impl Element {
     /// The type of this name, such as `C3D10M`.
     pub fn of(name: &str) -> Self {
         let name = name.to_uppercase();
-        let nodes = match name.split_once("3D") {
-            Some((solid, rest)) if SOLIDS.contains(&solid) => rest,
-            // Shells that are described like solids.
-            _ => name.strip_prefix("SC").or_else(|| name.strip_prefix("CSS")).unwrap_or_default(),
-        };
-        let digits = nodes.find(|c: char| !c.is_ascii_digit()).unwrap_or(nodes.len());
-        let nodes = nodes[..digits].parse().unwrap_or(0);
+        let (family, rest) = name.split_once("3D").unwrap_or_default();
+        let is_solid = SOLIDS.contains(&family);
+        // Some shells are described like solids.
+        let shell = name.strip_prefix("SC").or_else(|| name.strip_prefix("CSS"));
+        let rest = if family.is_empty() { shell.unwrap_or_default() } else { rest };
+        let digits = rest.find(|c: char| !c.is_ascii_digit()).unwrap_or(rest.len());
+        let nodes = rest[..digits].parse().unwrap_or(0);
         // The order of nodes is that of VTK.
         let number = match nodes {
+            // A tetrahedron in CalculiX, the surface of a cavity in Abaqus.
+            4 if family == "F" => -1,
             4 => 10,
             5 => 14,
             6 => 13,
@@ -48,7 +62,18 @@ impl Element {
             20 | 27 => 25,
             _ => -1,
         };
-        Self { kind: vtk(number), nodes }
+        let kind = if is_solid || family.is_empty() { vtk(number) } else { None };
+        // Lines and triangles have up to three nodes, and an L in the name those of gaskets.
+        let flat = family.is_empty() || FLAT.contains(&family) || (1..4).contains(&nodes) || rest.contains('L');
+        let (name, fate) = if flat {
+            ("element without volume", Fate::Boundary)
+        } else if family == "F" {
+            ("element F3D4 or the like", Fate::Unsupported)
+        } else {
+            let known = UNREAD.iter().find(|(unread, _)| *unread == family);
+            (known.map_or("element of an unknown type", |(_, name)| name), Fate::Unsupported)
+        };
+        Self { kind, nodes, name, fate }
     }
 }
 
@@ -134,6 +159,23 @@ impl Default for Model {
 }
 
 impl Model {
+    /// A node, by its body and its place there, that has the number of an earlier one at another place. The same place again
+    /// is no contradiction.
+    pub fn node_given_twice(&self) -> Option<[usize; 2]> {
+        let added = self.instances.iter().map(|instance| instance.bodies.to_vec());
+        let added = added.filter(|bodies| !self.bodies[bodies[1]].tags.is_empty());
+        (0..self.bodies.len()).map(|body| vec![body]).chain(added).find_map(|bodies| {
+            let places = |&body: &usize| (0..self.bodies[body].tags.len()).map(move |i| [body, i]);
+            let nodes: Vec<[usize; 2]> = bodies.iter().flat_map(places).collect();
+            let tags: Vec<i64> = nodes.iter().map(|&[body, i]| self.bodies[body].tags[i]).collect();
+            let first = Tags::new(&tags, true).ok()?;
+            let point = |[body, i]: [usize; 2]| self.bodies[body].points[i];
+            let is_moved = |earlier: [usize; 2], node| earlier != node && point(earlier) != point(node);
+            let at = nodes.iter().zip(&tags).position(|(&node, &tag)| first.get(tag).is_some_and(|i| is_moved(nodes[i as usize], node)));
+            at.map(|i| nodes[i])
+        })
+    }
+
     /// Adds the model, and the instances of its parts, or else the parts.
     pub fn assemble(mut self, source: &Source, assembly: &mut Assembly) -> Result<()> {
         if self.instances.is_empty() {
@@ -160,7 +202,7 @@ impl Model {
         for (&instance, &start) in placed.iter().zip(&starts) {
             let bodies: Vec<&Body> = instance.bodies[..bodies(instance)].iter().map(|&body| &self.bodies[body]).collect();
             let tags: Vec<i64> = bodies.iter().flat_map(|body| &body.tags).copied().collect();
-            let nodes = Tags::new(&tags, false).map_err(|tag| source.error(format!("two nodes have the number {tag}")))?;
+            let nodes = Tags::new(&tags, true).map_err(|tag| source.error(format!("two nodes have the number {tag}")))?;
             for block in bodies.iter().flat_map(|body| &body.blocks) {
                 block.push(source, assembly, &nodes, start)?;
                 sets.add(block);
@@ -175,7 +217,7 @@ impl Block {
     /// Adds the elements, whose nodes are found by their numbers from point number `start` on.
     fn push(&self, source: &Source, assembly: &mut Assembly, nodes: &Tags, start: usize) -> Result<()> {
         let Some(kind) = self.element.kind else {
-            (0..self.count).for_each(|_| assembly.skip("element without volume", Fate::Boundary));
+            (0..self.count).for_each(|_| assembly.skip(self.element.name, self.element.fate));
             return Ok(());
         };
         assembly.reserve(self.count);
@@ -193,30 +235,35 @@ impl Block {
     }
 }
 
-/// The set that each element is in by its keyword, as a number from 1; 0: none.
+/// The set that each element is in by its keyword, as a number from 1; 0: none. Elements that are left out do not count.
 #[derive(Default)]
 struct Sets {
     names: Vec<String>,
-    values: Vec<f32>,
+    /// The numbers of elements that are read.
+    used: HashSet<usize>,
+    values: Vec<f64>,
 }
 
 impl Sets {
     fn add(&mut self, block: &Block) {
-        let number = block.set.as_ref().map_or(0, |set| {
+        let is_read = block.element.kind.is_some() && block.count > 0;
+        let number = block.set.as_ref().filter(|_| is_read).map_or(0, |set| {
             let known = self.names.iter().position(|name| name == set);
             1 + known.unwrap_or_else(|| {
                 self.names.push(set.clone());
                 self.names.len() - 1
             })
         });
-        self.values.resize(self.values.len() + block.count, number as f32);
+        if is_read {
+            self.used.insert(number);
+        }
+        self.values.resize(self.values.len() + block.count, number as f64);
     }
 
     /// Makes a field of cells of them, if there are several.
     fn give(self, assembly: &mut Assembly) {
-        let first = self.values.first().copied();
-        if self.values.iter().any(|&value| Some(value) != first) {
-            assembly.arrays.push(Array { name: "elset".into(), on: On::Cells, components: 1, values: self.values });
+        if self.used.len() > 1 {
+            assembly.arrays.push(Array::whole("elset".into(), On::Cells, &self.values));
         }
     }
 }

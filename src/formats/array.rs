@@ -3,6 +3,7 @@
 use std::collections::{HashMap, HashSet};
 
 use super::budget::Budget;
+use super::loss::Loss;
 use crate::mesh::{Field, On};
 
 /// An array of a file: `components` values per point or per cell of the file.
@@ -11,9 +12,30 @@ pub(crate) struct Array {
     pub on: On,
     pub components: usize,
     pub values: Vec<f32>,
+    pub loss: Loss,
 }
 
 impl Array {
+    /// An array of values that become single.
+    pub fn rounded(name: String, on: On, components: usize, exact: &[f64]) -> Self {
+        let values: Vec<f32> = exact.iter().map(|&v| v as f32).collect();
+        let loss = Loss { whole: false, collapsed: Loss::collapsed(components, &values, exact) };
+        Self { name, on, components, values, loss }
+    }
+
+    /// An array of whole numbers, which become single.
+    pub fn whole(name: String, on: On, exact: &[f64]) -> Self {
+        let mut array = Self::rounded(name, on, 1, exact);
+        array.loss.whole = true;
+        array
+    }
+
+    /// The name of the field of a component.
+    pub fn name_of(&self, component: usize) -> String {
+        let suffixes = self.suffixes();
+        format!("{}{}", self.name, suffixes[suffixes.len() - self.components + component])
+    }
+
     /// Fills the array with NaN up to `tuples` tuples if it is shorter. Returns an error that states the limit if the
     /// budget does not allow that.
     pub fn fill(&mut self, tuples: usize, budget: &mut Budget) -> Result<(), String> {

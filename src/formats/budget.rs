@@ -3,7 +3,7 @@
 use super::LoadOptions;
 
 /// The number of bytes that may still be allocated for a file.
-#[derive(Default)]
+#[derive(Clone, Default)]
 pub(crate) struct Budget {
     left: u64,
     expansion: u64,

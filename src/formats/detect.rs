@@ -8,6 +8,7 @@ use crate::error::Result;
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Format {
     VtkXml,
+    Series,
     VtkLegacy,
     Gmsh,
     Medit,
@@ -35,8 +36,10 @@ fn told(source: &Source) -> Result<Option<Format>> {
     let is = |prefix: &[u8]| start.get(..prefix.len()).is_some_and(|b| b.eq_ignore_ascii_case(prefix));
     Ok(if bytes.trim_ascii_start().starts_with(b"# vtk DataFile") {
         Some(Format::VtkLegacy)
-    } else if is(b"<") || ending == "series" && is(b"{") {
+    } else if is(b"<") {
         Some(Format::VtkXml)
+    } else if ending == "series" && is(b"{") {
+        Some(Format::Series)
     } else if is(b"$") {
         Some(Format::Gmsh)
     } else if is(b"MeshVersionFormatted") {

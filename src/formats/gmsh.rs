@@ -160,8 +160,8 @@ impl Content {
         };
         for (name, marks) in [("gmsh:physical", &physical), ("gmsh:geometrical", &self.elements.entities)] {
             if marks.len() == self.elements.types.len() && marks.iter().any(|m| *m != 0) {
-                let values = marks.iter().map(|&m| m as f32).collect();
-                assembly.arrays.push(Array { name: name.into(), on: On::Cells, components: 1, values });
+                let values: Vec<f64> = marks.iter().map(|&m| m as f64).collect();
+                assembly.arrays.push(Array::whole(name.into(), On::Cells, &values));
             }
         }
     }

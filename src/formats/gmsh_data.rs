@@ -4,6 +4,7 @@ use super::TimeStep;
 use super::array::Array;
 use super::budget::Budget;
 use super::gmsh_reader::Reader;
+use super::loss::Loss;
 use super::source::{Source, excerpt};
 use super::tags::Tags;
 use crate::error::Result;
@@ -18,7 +19,7 @@ pub(crate) struct View {
     pub step: i64,
     components: usize,
     tags: Vec<i64>,
-    values: Vec<f32>,
+    values: Vec<f64>,
 }
 
 impl View {
@@ -35,19 +36,21 @@ impl View {
         let missing = (n * count).saturating_sub(self.values.len());
         let refused = |limit: String| left_out(format!("few {what}s have a value, and NaN for the others would take {limit}"));
         padding.spend((missing * size_of::<f32>()) as u64).map_err(refused)?;
+        let given: Vec<f32> = self.values.iter().map(|&v| v as f32).collect();
         let mut values = vec![f32::NAN; n * count];
-        for (&tag, tuple) in self.tags.iter().zip(self.values.chunks_exact(n.max(1))) {
+        for (&tag, tuple) in self.tags.iter().zip(given.chunks_exact(n.max(1))) {
             let found = tags.get(tag).and_then(|i| values.get_mut(i as usize * n..(i as usize + 1) * n));
             let slot = found.ok_or_else(|| left_out(format!("it has a value for {what} {tag}, which does not exist")))?;
             slot.copy_from_slice(tuple);
         }
-        Ok(Array { name: self.name.clone(), on: self.on, components: n, values })
+        let loss = Loss { whole: false, collapsed: Loss::collapsed(n, &given, &self.values) };
+        Ok(Array { name: self.name.clone(), on: self.on, components: n, values, loss })
     }
 }
 
-/// Keeps the views of one time step, and those that the file has at one step only. If there are several steps, returns a
-/// remark on that.
-pub(crate) fn keep_step(views: &mut Vec<View>, step: TimeStep, source: &Source) -> Result<Option<String>> {
+/// Keeps the views of one time step, and those that the file has at one step only. If there are several steps, returns
+/// remarks on that, and on the views that lack the step.
+pub(crate) fn keep_step(views: &mut Vec<View>, step: TimeStep, source: &Source) -> Result<Vec<String>> {
     let mut steps_of: HashMap<(On, &str), BTreeSet<i64>> = HashMap::new();
     for view in views.iter() {
         steps_of.entry((view.on, &view.name)).or_default().insert(view.step);
@@ -57,13 +60,18 @@ pub(crate) fn keep_step(views: &mut Vec<View>, step: TimeStep, source: &Source) 
     all.sort_unstable();
     all.dedup();
     if all.len() < 2 {
-        return Ok(None);
+        return Ok(Vec::new());
     }
     let chosen = step.chosen(source, &mut all)?;
+    let lacks = |steps: &BTreeSet<i64>| steps.len() > 1 && !steps.iter().any(|step| step.to_string() == all[chosen]);
+    let lacking = steps_of.iter().filter(|(_, steps)| lacks(steps)).map(|((_, name), _)| excerpt(name.as_bytes()));
+    let mut remarks: Vec<String> = lacking.map(|name| format!("array `{name}` is left out: it has no values at this time step")).collect();
+    remarks.sort_unstable();
+    remarks.insert(0, TimeStep::remark(chosen, all.len()));
     let kept: Vec<bool> = views.iter().map(|view| !is_series(view) || view.step.to_string() == all[chosen]).collect();
     let mut kept = kept.into_iter();
     views.retain(|_| kept.next().unwrap_or(true));
-    Ok(Some(TimeStep::remark(chosen, all.len())))
+    Ok(remarks)
 }
 
 impl Reader<'_> {
@@ -107,7 +115,7 @@ impl Reader<'_> {
         for _ in 0..count {
             view.tags.push(self.int("the number of a node or element")?);
             for _ in 0..components {
-                view.values.push(self.real("a value")? as f32);
+                view.values.push(self.real("a value")?);
             }
         }
         self.end(end)?;

@@ -44,9 +44,9 @@ const fn cell(name: &'static str, shape: Shape, nodes: usize) -> CellType {
 #[derive(Default)]
 pub(crate) struct Content {
     pub points: Option<Vec<[f64; 3]>>,
-    pub point_marks: Vec<f32>,
+    pub point_marks: Vec<f64>,
     pub cells: Vec<(CellType, Vec<i64>)>,
-    pub cell_marks: Vec<f32>,
+    pub cell_marks: Vec<f64>,
     pub skipped: Vec<String>,
 }
 
@@ -68,7 +68,7 @@ impl Content {
         }
         for (name, on, values) in [("medit:ref", On::Points, self.point_marks), ("medit:ref (cells)", On::Cells, self.cell_marks)] {
             if values.iter().any(|v| *v != 0.0) {
-                assembly.arrays.push(Array { name: name.into(), on, components: 1, values });
+                assembly.arrays.push(Array::whole(name.into(), on, &values));
             }
         }
         if !self.skipped.is_empty() {
@@ -136,7 +136,7 @@ fn vertices(source: &Source, tokens: &mut Tokens<'_>, content: &mut Content, at:
     content.point_marks.reserve(n);
     for _ in 0..n {
         points.push([tokens.float("a coordinate")?, tokens.float("a coordinate")?, tokens.float("a coordinate")?]);
-        content.point_marks.push(tokens.float("the reference of a vertex")? as f32);
+        content.point_marks.push(tokens.float("the reference of a vertex")?);
     }
     content.points = Some(points);
     Ok(())
@@ -150,7 +150,7 @@ fn cells(tokens: &mut Tokens<'_>, content: &mut Content, name: &str, kind: CellT
         for _ in 0..width {
             nodes.push(tokens.integer(name)?);
         }
-        content.cell_marks.push(tokens.float("the reference of a cell")? as f32);
+        content.cell_marks.push(tokens.float("the reference of a cell")?);
     }
     content.cells.push((kind, nodes));
     Ok(())

@@ -27,6 +27,8 @@ mod gmsh_reader;
 mod integers;
 mod isaac;
 mod lattice;
+mod listed;
+mod loss;
 mod medit;
 mod meditb;
 mod npy;
@@ -64,12 +66,12 @@ use crate::named::named;
 pub use array::without_lengths;
 use assemble::Assembly;
 use detect::Format;
+pub use listed::listed_files;
 pub use points::{load_points, read_points};
 pub use report::{CellCount, Fate, Report};
 use source::Source;
 pub use source::printable;
 pub use steps::TimeStep;
-pub use vtu_files::listed_files;
 pub use write::{
     Channel, Located, NpyNumber, OutputFile, OutputFormat, SliceGrid, SliceWriter, VoxelPackage, VoxelWriter, destination, is_part,
     write_json, write_located, write_mesh, write_npy, write_png, xml_attribute,
@@ -177,6 +179,7 @@ fn assembled(source: &Source, options: &LoadOptions) -> Result<Assembly> {
     let companion;
     match detect::detect(source)? {
         Format::VtkXml => vtu::read(source, options),
+        Format::Series => vtk_series::read(source, options),
         Format::VtkLegacy => vtk::read(source, options),
         Format::Gmsh => gmsh::read(source, options),
         Format::Medit => medit::read(source, options),

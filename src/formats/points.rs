@@ -18,7 +18,7 @@ use crate::error::{Error, Result};
 /// be in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table
 /// may name the columns, `x`, `y` and `z` among them (also as in `X [ m ]`, `x-coordinate` or `Points:0`): these are used.
 /// Without names there must be three columns.
-/// Lines that start with `#` are comments. A table without points is valid, even an empty file.
+/// Lines that start with `#` are comments; the last one before the points may name the columns as well. A table without points is valid, even an empty file.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
 /// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl`, and a `.vtk` with
@@ -121,6 +121,11 @@ fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> 
     let separator = separator(line, None);
     let names: Vec<_> = fields(line, separator).collect();
     let (width, numbers) = (names.len(), names.iter().filter(|name| number(name).is_some()).count());
+    if numbers == width
+        && let Some(at) = commented(&source.start()[..at], width)
+    {
+        return Ok(Some(Columns { separator, width, at }));
+    }
     let named = if numbers == width { None } else { named(&names) };
     // Other names may stand for anything in any order.
     if numbers == 0 && named.is_none() && width == 3 {
@@ -139,6 +144,14 @@ fn columns(source: &Source, rest: &mut Range<usize>) -> Result<Option<Columns>> 
     }
     *rest = first.clone();
     Ok(next_line(source, &mut first).map(|(line, _)| Columns { separator: self::separator(line, Some(separator)), width, at }))
+}
+
+/// The columns that the last comment before the points names, where it names them all, as NumPy writes a header.
+fn commented(before: &[u8], width: usize) -> Option<[usize; 3]> {
+    let mut lines = before.split(|b| b"\r\n".contains(b)).map(<[u8]>::trim_ascii);
+    let line = lines.rfind(|line| line.starts_with(b"#"))?;
+    let names: Vec<_> = fields(&line[1..], separator(&line[1..], None)).collect();
+    if names.len() == width { named(&names) } else { None }
 }
 
 impl Columns {

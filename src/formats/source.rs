@@ -83,6 +83,11 @@ impl Source {
         Self { path: path.into(), start: Arc::new(bytes), rest: None }
     }
 
+    /// The path of a file that this one names, which is relative to its folder.
+    pub fn beside(&self, name: &str) -> PathBuf {
+        self.path.parent().unwrap_or(Path::new("")).join(name)
+    }
+
     /// Length of the contents in bytes.
     pub fn len(&self) -> usize {
         self.rest.as_ref().map_or(self.start.len(), |rest| rest.length)

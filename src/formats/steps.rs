@@ -21,7 +21,12 @@ impl TimeStep {
             let [a, b] = [a, b].map(|time| time.as_ref().trim().parse().unwrap_or(f64::NAN));
             a.total_cmp(&b)
         });
-        let last = steps.len().saturating_sub(1);
+        self.of(source, steps.len())
+    }
+
+    /// The number of this step among so many; 0 if there is only one, or none.
+    pub(super) fn of(self, source: &Source, count: usize) -> Result<usize> {
+        let last = count.saturating_sub(1);
         match self {
             Self::Number(n) if last > 0 && n as usize > last => {
                 Err(source.error(format!("there is no time step {n}; the steps are 0 to {last}")))

@@ -17,7 +17,7 @@ pub(crate) fn points(source: &Source) -> Option<Result<Vec<[f64; 3]>>> {
         "stl" => Some(stl(source)),
         _ if begins(b"# vtk DataFile") => vtk::surface_points(source),
         _ if begins(b"ply\n") || begins(b"ply\r") => Some(ply(source)),
-        _ if begins(b"solid") => Some(stl(source)),
+        _ if begins(b"solid") || is_binary_stl(source) => Some(stl(source)),
         _ => None,
     }
 }
@@ -39,14 +39,21 @@ fn lines(source: &Source, keyword: &[u8]) -> Result<Vec<[f64; 3]>> {
     Ok(points)
 }
 
+/// Bytes of the header and the number of triangles in a binary `.stl`, and of a triangle: its normal, its vertices, and two
+/// more.
+const STL: [usize; 2] = [84, 50];
+
+/// Whether a file has the length that it announces as a binary `.stl`.
+fn is_binary_stl(source: &Source) -> bool {
+    let count = source.start().get(80..STL[0]).and_then(|bytes| Scalar::U32.one::<i64>(bytes, false));
+    let length = count.and_then(|n| usize::try_from(n).ok()?.checked_mul(STL[1])?.checked_add(STL[0]));
+    length == Some(source.len())
+}
+
 /// Each triangle has three vertices of its own.
 fn stl(source: &Source) -> Result<Vec<[f64; 3]>> {
-    /// Bytes of the header and the number of triangles, and of a triangle: its normal, its vertices, and two more.
-    const SIZES: [usize; 2] = [84, 50];
     let mut tokens = Tokens::new(source, None);
-    let head = tokens.bytes(SIZES[0])?.and_then(|head| Scalar::U32.one::<i64>(&head[80..], false));
-    let length = head.and_then(|n| usize::try_from(n).ok()?.checked_mul(SIZES[1])?.checked_add(SIZES[0]));
-    if length != Some(source.len()) {
+    if !is_binary_stl(source) {
         // Text, unless a binary file is cut off.
         let points = lines(source, b"vertex")?;
         let is_text = !points.is_empty() || source.start().trim_ascii_start().starts_with(b"solid");
@@ -57,7 +64,8 @@ fn stl(source: &Source) -> Result<Vec<[f64; 3]>> {
         };
     }
     let mut points = Vec::new();
-    while let Some(triangle) = tokens.bytes(SIZES[1])? {
+    tokens.bytes(STL[0])?;
+    while let Some(triangle) = tokens.bytes(STL[1])? {
         let values: Vec<f64> = Scalar::F32.convert(&triangle[12..48], false);
         points.extend(values.chunks_exact(3).map(|p| [p[0], p[1], p[2]]));
     }
@@ -150,6 +158,10 @@ mod tests {
         binary.extend(WANTED.as_flattened().iter().flat_map(|v| (*v as f32).to_le_bytes()));
         binary.extend([0; 2]);
         assert_eq!(read("a.stl", &binary).unwrap(), WANTED);
+        // From a stream, its length tells it.
+        binary[..5].copy_from_slice(b"made ");
+        assert_eq!(read("-", &binary).unwrap(), WANTED);
+        assert!(super::points(&Source::new("-".as_ref(), binary[1..].to_vec())).is_none());
     }
 
     #[test]

@@ -145,13 +145,16 @@ fn nodes(source: &Source, assembly: &mut Assembly) -> Result<Tags> {
         for (c, column) in columns.iter_mut().enumerate() {
             let word = line.word(4 + c); // empty: a marker that is missing
             let value = if word.is_empty() { Ok(0.0) } else { parse_float(word).ok_or_else(|| wrong(word)) };
-            column.push(value? as f32);
+            column.push(value?);
         }
     }
     lines.end(n, "points")?;
     for (c, values) in columns.into_iter().enumerate() {
-        let name = if c < attributes { format!("attribute{c}") } else { "boundary_marker".into() };
-        assembly.arrays.push(Array { name, on: On::Points, components: 1, values });
+        assembly.arrays.push(if c < attributes {
+            Array::rounded(format!("attribute{c}"), On::Points, 1, &values)
+        } else {
+            Array::whole("boundary_marker".into(), On::Points, &values)
+        });
     }
     assembly.set_points(points);
     let numbers = Tags::new(&tags, false).map_err(|tag| source.error(format!("two points have the number {tag}")))?;
@@ -191,13 +194,13 @@ fn elements(source: &Source, points: &Tags, assembly: &mut Assembly) -> Result<(
         assembly.push(kind, &nodes)?;
         for (c, column) in columns.iter_mut().enumerate() {
             let word = line.word(1 + width + c);
-            column.push(parse_float(word).ok_or_else(|| wrong(word))? as f32);
+            column.push(parse_float(word).ok_or_else(|| wrong(word))?);
         }
     }
     lines.end(n, "tetrahedra")?;
     for (c, values) in columns.into_iter().enumerate() {
         let name = if c == 0 { "region".into() } else { format!("region{c}") };
-        assembly.arrays.push(Array { name, on: On::Cells, components: 1, values });
+        assembly.arrays.push(Array::rounded(name, On::Cells, 1, &values));
     }
     Ok(())
 }

@@ -78,8 +78,8 @@ pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
             _ => {
                 let arrays = reader.attribute(&keyword, at, section)?;
                 let Some((on, _)) = section else { continue };
-                for (name, components, values) in arrays {
-                    assembly.arrays.push(Array { name, on, components, values });
+                for (name, components, (values, loss)) in arrays {
+                    assembly.arrays.push(Array { name, on, components, values, loss });
                 }
             }
         }

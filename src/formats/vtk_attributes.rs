@@ -1,5 +1,6 @@
 //! Reader for the arrays of legacy VTK files.
 
+use super::loss::Loss;
 use super::scalar::Scalar;
 use super::source::excerpt;
 use super::tokens::parse_integer;
@@ -10,8 +11,11 @@ use crate::mesh::On;
 /// What the last `POINT_DATA` or `CELL_DATA` stated: what values belong to, and their number.
 pub(super) type Section = (On, usize);
 
+/// Values in single precision.
+type Rounded = (Vec<f32>, Loss);
+
 /// Name, number of components, and values of an array.
-pub(super) type Named = (String, usize, Vec<f32>);
+pub(super) type Named = (String, usize, Rounded);
 
 impl Reader<'_> {
     fn name(&mut self) -> Result<String> {
@@ -40,7 +44,7 @@ impl Reader<'_> {
         let name = self.name()?;
         let components = if components == 0 { self.components()? } else { components };
         if typed {
-            let values = self.typed(&name, n * components)?;
+            let values = self.typed(&name, components, n)?;
             return Ok(values.map(|values| (name, components, values)).into_iter().collect());
         }
         // Colours are bytes in binary files and fractions of 255 in text files. VTK writes any bytes so that are the active
@@ -50,20 +54,31 @@ impl Reader<'_> {
         if !self.binary {
             values.iter_mut().for_each(|value| *value = (*value * 255.0).round());
         }
-        Ok(vec![(name, components, values)])
+        Ok(vec![(name, components, (values, Loss::default()))])
     }
 
-    /// Reads the type of `count` values and then the values; `None` if they are text, which is skipped.
-    fn typed(&mut self, name: &str, count: usize) -> Result<Option<Vec<f32>>> {
+    /// Reads the type of `tuples` tuples and then their values; `None` if they are text, which is skipped.
+    fn typed(&mut self, name: &str, components: usize, tuples: usize) -> Result<Option<Rounded>> {
+        let count = components * tuples;
         let kind = self.tokens.peek()?.unwrap_or_default().to_ascii_lowercase();
         match kind.as_slice() {
             b"string" | b"utf8_string" => self.strings(count).map(|()| None),
             b"variant" => self.variants(count).map(|()| None),
             _ => {
                 let scalar = self.scalar()?;
-                self.values(scalar, count, &value_of(name)).map(Some)
+                self.rounded(scalar, components, count, &value_of(name)).map(Some)
             }
         }
+    }
+
+    fn rounded(&mut self, scalar: Option<Scalar>, components: usize, count: usize, what: &str) -> Result<Rounded> {
+        let before = self.tokens.at;
+        let values: Vec<f32> = self.values(scalar, count, what)?;
+        let loss = Loss::of(scalar, components, &values, || {
+            self.tokens.at = before;
+            self.values(scalar, count, what)
+        })?;
+        Ok((values, loss))
     }
 
     fn components(&mut self) -> Result<usize> {
@@ -82,7 +97,7 @@ impl Reader<'_> {
             components = self.components()?;
             self.skip_table()?;
         }
-        let values = self.values(scalar, n * components, &value_of(&name))?;
+        let values = self.rounded(scalar, components, n * components, &value_of(&name))?;
         Ok(vec![(name, components, values)])
     }
 
@@ -125,8 +140,8 @@ impl Reader<'_> {
             }
             let name = self.name()?;
             let components = self.size("a number of components")?;
-            let count = components * self.size("a number of tuples")?;
-            arrays.extend(self.typed(&name, count)?.map(|values| (name, components, values)));
+            let tuples = self.size("a number of tuples")?;
+            arrays.extend(self.typed(&name, components, tuples)?.map(|values| (name, components, values)));
         }
         Ok(arrays)
     }

@@ -9,6 +9,7 @@ use super::assemble::Assembly;
 use super::budget::Budget;
 use super::cells::{self, CellType, Shape};
 use super::lattice::{GridKind, Lattice};
+use super::loss::Loss;
 use super::report::Fate;
 use super::source::{Source, excerpt};
 use super::vtu_data::Codec;
@@ -17,9 +18,6 @@ use super::vtu_files::{Files, Grid, Origin, grids};
 use super::vtu_parser::Piece;
 use crate::error::Result;
 use crate::mesh::On;
-
-/// Up to here, single precision has all whole numbers.
-const MOST_WHOLE: f32 = 16_777_216.0;
 
 /// Reads a mesh from a grid, or from the grids that the file lists, which are taken as pieces of one.
 pub(crate) fn read(source: &Source, options: &LoadOptions) -> Result<Assembly> {
@@ -114,10 +112,9 @@ fn read_arrays<'p>(
                 assembly.warn(format!("array `{}` has {} components and is left out", shown(), array.components));
             } else {
                 let values: Vec<f32> = codec.floats(source, array, count)?;
-                if array.scalar.is_some_and(|scalar| !scalar.is_float()) && values.iter().any(|v| v.abs() > MOST_WHOLE) {
-                    let rounded = "which are rounded to single precision, so that numbers beside each other become one";
-                    assembly.warn(format!("array `{}` has whole numbers beyond {MOST_WHOLE}, {rounded}", shown()));
-                }
+                let budget = codec.budget.clone();
+                let loss = Loss::of(array.scalar, array.components as usize, &values, || codec.floats(source, array, count))?;
+                codec.budget = budget; // what is read again takes no more memory than before
                 // An empty piece does not require that an array is filled up.
                 if values.is_empty() {
                     continue;
@@ -126,11 +123,12 @@ fn read_arrays<'p>(
                 let turn = *turns.entry(key).and_modify(|turn| *turn += 1).or_default();
                 let place = *places.entry((key, turn)).or_insert_with(|| {
                     let components = array.components as usize;
-                    assembly.arrays.push(Array { name: array.name.clone(), on, components, values: Vec::new() });
+                    assembly.arrays.push(Array { name: array.name.clone(), on, components, values: Vec::new(), loss: Loss::default() });
                     assembly.arrays.len() - 1
                 });
                 // An array that the budget does not allow to be filled up stays too short, and is left out at the end.
                 let array = &mut assembly.arrays[place];
+                array.loss.add(loss);
                 if array.fill(before, &mut assembly.padding).is_ok() {
                     array.values.extend_from_slice(&values);
                 }

@@ -1,25 +1,20 @@
-//! The grids of a VTK XML file: its own, or those of the files that it lists (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`,
-//! `.series`).
+//! The grids of a VTK XML file: its own, or those of the files that it lists (`.pvtu`, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`).
 
 use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use super::budget::Budget;
 use super::lattice::GridKind;
+use super::listed::MOST_FILES;
 use super::source::ending;
 use super::source::{Source, excerpt};
-use super::vtk_series;
 use super::vtu_data::Codec;
 use super::vtu_parser::{Document, List, Piece, Skeleton, parse};
 use super::{LoadOptions, TimeStep};
 use crate::error::Result;
 
-/// Most files that a list and the lists in it may name.
-const MOST_FILES: usize = 1 << 16;
 /// Most lists within each other.
 const MOST_DEEP: usize = 4;
-/// Endings of lists.
-const LISTS: [&str; 9] = ["pvtu", "pvts", "pvtr", "pvti", "vtm", "vtpd", "vtpc", "pvd", "series"];
 /// Endings of files of VTK with surfaces and tables.
 const NO_VOLUMES: [&str; 3] = ["vtp", "pvtp", "vtt"];
 /// Endings of files of VTK with volumes of another kind.
@@ -70,15 +65,10 @@ pub(crate) struct Files<'a> {
     pub warnings: Vec<String>,
 }
 
-/// What a file is: a grid, or a list.
-fn document(source: &Source, step: TimeStep) -> Result<Document> {
-    if vtk_series::is_series(source) { vtk_series::read(source).map(Document::List) } else { parse(source, step) }
-}
-
 /// Finds the grids of a file.
 pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Files<'a>> {
     let bytes = source.len();
-    let list = match document(source, options.step)? {
+    let list = match parse(source, options.step)? {
         Document::Grid(mut skeleton) => {
             let (format, warnings) = (std::mem::take(&mut skeleton.format), std::mem::take(&mut skeleton.warnings));
             return Ok(Files { format, grids: vec![Grid::new(Origin::Named(source), skeleton, 0, bytes, options)], bytes, warnings });
@@ -104,26 +94,6 @@ pub(crate) fn grids<'a>(source: &'a Source, options: &LoadOptions) -> Result<Fil
         warnings.push(format!("listed files are left out: {unread}; {why}"));
     }
     Ok(Files { format, grids: found.grids, bytes: found.bytes, warnings })
-}
-
-/// The files that a list (`.pvtu` and the like, `.vtm`, `.vtpd`, `.vtpc`, `.pvd`, `.series`) names, of all time steps, and those that lists
-/// among these name; none if the file is no list, or cannot be read. Tells whether a result would replace one of them.
-pub fn listed_files(path: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    collect(path, 1, &mut found);
-    found
-}
-
-fn collect(path: &Path, deep: usize, found: &mut Vec<PathBuf>) {
-    if deep > MOST_DEEP || !LISTS.contains(&ending(path).as_str()) {
-        return;
-    }
-    let Ok(Document::List(list)) = Source::open(path, ".vtu").and_then(|source| document(&source, TimeStep::Last)) else { return };
-    let folder = path.parent().unwrap_or(Path::new(""));
-    for listed in list.files.iter().map(|file| folder.join(&file.path)).take(MOST_FILES) {
-        collect(&listed, deep + 1, found);
-        found.push(listed);
-    }
 }
 
 /// What has been found in lists.
@@ -159,7 +129,6 @@ impl Found<'_, '_> {
         } else {
             None
         };
-        let folder = source.path.parent().unwrap_or(Path::new(""));
         let mut block = None;
         // What has no time belongs to all steps.
         for listed in list.files.iter().filter(|file| step.is_none() || file.step.is_none() || file.step.as_deref() == step) {
@@ -167,7 +136,7 @@ impl Found<'_, '_> {
                 self.blocks += 1;
             }
             let fail = |message: String| Err(source.error_line(listed.at, format!("`{}`: {message}", excerpt(listed.path.as_bytes()))));
-            let path = folder.join(&listed.path);
+            let path = source.beside(&listed.path);
             let kind = ending(&path);
             if NO_VOLUMES.contains(&kind.as_str()) || OTHERS.contains(&kind.as_str()) {
                 *self.others.entry(kind).or_default() += 1;
@@ -186,8 +155,11 @@ impl Found<'_, '_> {
                 Ok(opened) => opened,
                 Err(error) => return fail(format!("the listed file cannot be read ({error})")),
             };
+            if !opened.start().trim_ascii_start().starts_with(b"<") {
+                return fail("no VTK XML file, as such a list needs; read it by itself, or save it as .vtu".into());
+            }
             self.bytes += opened.len();
-            match document(&opened, self.options.step)? {
+            match parse(&opened, self.options.step)? {
                 Document::Grid(mut skeleton) => {
                     self.warnings.extend(std::mem::take(&mut skeleton.warnings));
                     let grid = Grid::new(Origin::Listed(path), skeleton, self.blocks, opened.len(), self.options);

@@ -1,6 +1,6 @@
 //! Remarks on cells that are small beside the whole mesh, and on fields that vary little beside their size.
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
 use super::Assembly;
@@ -9,6 +9,8 @@ use crate::formats::source::excerpt;
 
 /// A field with a smaller range than this part of its largest value has less than 256 different values.
 const NARROW: f32 = 1.0 / 65536.0;
+/// Up to here, single precision has all whole numbers.
+const MOST_WHOLE: f32 = 16_777_216.0;
 
 /// How much of its volume a cell may gain or lose by rounding before it is remarked on.
 const CHANGE: f64 = 0.02;
@@ -21,12 +23,13 @@ const NEARLY_FLAT: f64 = 1e-3;
 
 impl Assembly {
     /// Warnings if most cells are much smaller than the smallest leaf of a tree, whose lists are then long, and if rounding
-    /// changes the shape of cells: those that are very small beside their distance from the mesh's origin, as where
-    /// another part lies far away.
+    /// changes the shape of cells: those that are very small beside the mesh, as where another part lies far away.
     pub(super) fn remark_on_small_cells(&self, rounded: &[[f32; 3]], origin: [f64; 3], [lo, hi]: [[f64; 3]; 2]) -> Vec<String> {
         let [origin, lo, hi] = [origin, lo, hi].map(DVec3::from_array);
         let small = SMALL * (hi - lo).max_element();
-        let farthest = (hi - origin).abs().max((lo - origin).abs()).max_element();
+        // Queries subtract the lower bound in single precision, which rounds what is near 0 once more.
+        let corner = (lo - origin).as_vec3();
+        let farthest = (hi - origin).abs().max((lo - origin).abs()).max(hi - lo).max_element();
         let of = |tet: &[u32; 4]| {
             let corners = tet.map(|v| DVec3::from_array(self.points[v as usize]));
             let (lo, hi) = (corners.into_iter().fold(corners[0], DVec3::min), corners.into_iter().fold(corners[0], DVec3::max));
@@ -34,7 +37,7 @@ impl Assembly {
             // Rounding moves corners by 2^-24 of the distance at most.
             let changed = size.min_element() < farthest / 4096.0 && {
                 let there = volume(corners.map(|p| p - origin));
-                let here = volume(tet.map(|v| DVec3::from_array(rounded[v as usize].map(f64::from))));
+                let here = volume(tet.map(|v| (Vec3::from_array(rounded[v as usize]) - corner).as_dvec3()));
                 there.abs() > NEARLY_FLAT * size.element_product() && (here - there).abs() > CHANGE * there.abs()
             };
             (size.max_element() < small, changed)
@@ -65,12 +68,28 @@ impl Assembly {
 
 /// A warning if single precision tells few of an array's values apart.
 pub(super) fn remark_on_resolution(array: &Array) -> Option<String> {
-    let finite = || array.values.iter().copied().filter(|v| v.is_finite());
-    let (lo, hi) = finite().fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)));
-    let narrow = array.components == 1 && lo < hi && hi - lo < NARROW * lo.abs().max(hi.abs());
-    narrow.then(|| {
-        let name = excerpt(array.name.as_bytes());
-        format!("array `{name}` goes from {lo} to {hi}: single precision has few values between; subtract what they have in common")
+    let range = |c: usize| {
+        let finite = array.values.iter().copied().skip(c).step_by(array.components).filter(|v| v.is_finite());
+        finite.fold((f32::INFINITY, f32::NEG_INFINITY), |(lo, hi), v| (lo.min(v), hi.max(v)))
+    };
+    let shown = |c: usize| excerpt(array.name_of(c).as_bytes());
+    let ranges: Vec<(f32, f32)> = (0..array.components).map(range).collect();
+    let narrow = ranges.iter().enumerate().find_map(|(c, &(lo, hi))| {
+        let largest = lo.abs().max(hi.abs());
+        if lo == hi && array.loss.collapsed >> c & 1 == 1 {
+            let remedy = "subtract what they have in common, or scale them";
+            Some(format!("array `{}` has several values at {lo}, which are one in single precision; {remedy}", shown(c)))
+        } else if lo < hi && hi - lo < NARROW * largest {
+            let few = "single precision has few values between; subtract what they have in common";
+            Some(format!("array `{}` goes from {lo} to {hi}: {few}", shown(c)))
+        } else {
+            None
+        }
+    });
+    narrow.or_else(|| {
+        let beyond = array.loss.whole && ranges.iter().any(|&(lo, hi)| lo < hi && lo.abs().max(hi.abs()) > MOST_WHOLE);
+        let rounded = "which are rounded to single precision, so that numbers beside each other become one";
+        beyond.then(|| format!("array `{}` has whole numbers beyond {MOST_WHOLE}, {rounded}", excerpt(array.name.as_bytes())))
     })
 }
 

@@ -9,7 +9,7 @@ fn finish(arrays: &[(&str, On, usize, usize)]) -> (Vec<String>, Vec<String>) {
     assembly.set_points(vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]);
     assembly.push(crate::formats::cells::vtk(10).unwrap(), &[0, 1, 2, 3]).unwrap();
     for &(name, on, components, values) in arrays {
-        assembly.arrays.push(Array { name: name.into(), on, components, values: vec![0.0; values] });
+        assembly.arrays.push(Array::rounded(name.into(), on, components, &vec![0.0; values]));
     }
     let (mesh, report) = assembly.finish().unwrap();
     (mesh.fields.into_iter().map(|f| f.name).collect(), report.warnings)
@@ -59,11 +59,42 @@ fn small_cells_far_from_others_are_remarked_on() {
     }
 }
 
+/// Tiny cells in the middle of a mesh around 0 are exact, but not relative to its corner.
+#[test]
+fn small_cells_in_the_middle_are_remarked_on() {
+    let source = Source::new("middle".as_ref(), Vec::new());
+    for (far, remarks) in [(100.0, 1), (0.1, 0)] {
+        let mut assembly = Assembly::new(&source, &LoadOptions::default(), "three tetrahedra".into());
+        let corner = [[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
+        let of = |scale: f64| corner.map(|p| p.map(|x| scale * x));
+        assembly.set_points([of(-far), of(far), of(1e-5)].concat());
+        for first in [0, 4, 8] {
+            assembly.push(crate::formats::cells::vtk(10).unwrap(), &[first, first + 1, first + 2, first + 3]).unwrap();
+        }
+        let warnings = assembly.finish().unwrap().1.warnings;
+        let found = warnings.iter().filter(|w| w.starts_with("1 of 3 tetrahedra are so small") && w.contains("the first of cell 2"));
+        assert_eq!(found.count(), remarks, "{warnings:?}");
+    }
+}
+
 #[test]
 fn fields_that_vary_little_are_remarked_on() {
-    let remark = |values: [f32; 4]| remark_on_resolution(&Array { name: "p".into(), on: On::Points, components: 1, values: values.into() });
-    assert!(remark([1e7, 1e7 + 1.0, f32::NAN, 1e7 + 2.0]).is_some_and(|w| w.contains("`p` goes from 10000000 to 10000002")));
-    assert_eq!([[1e7; 4], [0.0, 1.0, 2.0, 3.0], [1.0, 1.0001, 1.0, 1.0]].map(remark), [None, None, None]);
+    let of = |components: usize, values: &[f64]| remark_on_resolution(&Array::rounded("p".into(), On::Points, components, values));
+    let starts = |remark: Option<String>, with: &str| assert!(remark.as_deref().is_some_and(|w| w.starts_with(with)), "{remark:?}");
+    starts(of(1, &[1e7, 1e7 + 1.0, f64::NAN, 1e7 + 2.0]), "array `p` goes from 10000000 to 10000002");
+    starts(of(3, &[1.0, 1e7, 2.0, 2.0, 1e7 + 1.0, 3.0]), "array `p.y` goes from 10000000 to 10000001");
+    // Different values that become one.
+    starts(of(1, &[1e9, 1e9 + 1.0, f64::NAN, 1e300]), "array `p` has several values at 1000000000, which are one in single precision");
+    starts(of(2, &[1.0, 1e9, 2.0, 1e9 + 1.0]), "array `p.1` has several values at 1000000000");
+    starts(of(1, &[1e-60, 2e-60]), "array `p` has several values at 0");
+    // Neither constants nor what differs by rounding only.
+    for values in [&[1e7; 4][..], &[0.0, 1.0, 2.0, 3.0], &[1.0, 1.0001, 1.0, 1.0], &[0.1, 0.1 + 1e-15], &[1e300, f64::NAN], &[1e9]] {
+        assert_eq!(of(1, values), None);
+    }
+    let whole = |values: &[f64]| remark_on_resolution(&Array::whole("p".into(), On::Points, values));
+    starts(whole(&[1.0, 20_000_001.0]), "array `p` has whole numbers beyond 16777216");
+    starts(whole(&[16_777_220.0, 16_777_224.0]), "array `p` goes from");
+    assert_eq!([&[16_777_217.0; 2][..], &[-1.0, 16_777_216.0]].map(whole), [None, None]);
 }
 
 /// A chain of small cells, and one cell far away.

@@ -8,6 +8,7 @@ use std::path::Path;
 use serde::ser::{Serialize, SerializeMap, Serializer};
 use zip::write::SimpleFileOptions;
 
+use super::quiet::Quiet;
 use super::vtu::{Block, Column, Grid};
 use super::{NpyNumber, OutputFile, OutputFormat, write_file, write_json};
 use crate::error::{Error, Result};
@@ -96,7 +97,7 @@ fn records(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> 
 
 fn archive(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {
     let n = located.owner.len();
-    let mut zip = zip::ZipWriter::new(&mut *file);
+    let mut zip = zip::ZipWriter::new(Quiet::new(&mut *file));
     let mut member = |name: &str, descr: &str, shape: &[usize], bytes: &[u8]| {
         let large = bytes.len() as u64 > 0xf000_0000;
         zip.start_file(name, SimpleFileOptions::default().compression_method(zip::CompressionMethod::Stored).large_file(large))?;
@@ -108,8 +109,7 @@ fn archive(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> 
     for (name, values) in located.values {
         member(&format!("{name}.npy"), f32::DESCR, &[n], bytemuck::cast_slice(values))?;
     }
-    zip.finish()?;
-    file.flush()
+    zip.finish()?.into_inner()?.flush()
 }
 
 fn table(file: &mut OutputFile, located: &Located<'_>) -> std::io::Result<()> {

@@ -4,6 +4,7 @@
 
 mod image;
 mod located;
+mod quiet;
 mod slices;
 mod voxels;
 mod vtu;
@@ -187,13 +188,13 @@ pub fn is_part(name: &OsStr, target: &Path) -> bool {
     random.is_some_and(|random| !random.contains('.'))
 }
 
-/// Removes the name of the temporary file, which nobody asked for, from an error.
+/// Removes the name of the temporary file, which nobody asked for, from an error. The code of the system, by which the
+/// message names a remedy, is left in the text only.
 fn nameless(error: std::io::Error) -> std::io::Error {
     let text = error.to_string();
-    match text.split_once(" at path \"") {
-        Some((reason, _)) => std::io::Error::new(error.kind(), reason),
-        None => error,
-    }
+    let Some((reason, _)) = text.split_once(" at path \"") else { return error };
+    let code = reason.rsplit_once("(os error ").and_then(|(_, rest)| rest.strip_suffix(')')?.parse().ok());
+    code.map_or_else(|| std::io::Error::new(error.kind(), reason), std::io::Error::from_raw_os_error)
 }
 
 impl Write for OutputFile {
@@ -293,4 +294,21 @@ pub fn xml_attribute(text: &str) -> String {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Errors of temporary files are those of the system.
+    #[cfg(unix)]
+    #[test]
+    fn full_disks_are_named() {
+        let full = std::io::Error::from_raw_os_error(28);
+        let error = nameless(std::io::Error::new(full.kind(), format!("{full} at path \"/tmp/.a.csv.x.part\"")));
+        let shown = Error::Io { path: "a.csv".into(), source: error }.to_string();
+        assert_eq!(shown, "a.csv: there is no room left on its disk; make room, or take another path");
+        let other = nameless(std::io::Error::other("too bad at path \"/tmp/x\""));
+        assert_eq!(other.to_string(), "too bad");
+    }
 }

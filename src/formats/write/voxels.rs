@@ -8,6 +8,7 @@ use std::path::Path;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
+use super::quiet::Quiet;
 use super::{OutputFile, xml_attribute};
 use crate::error::{Error, Result};
 
@@ -39,7 +40,7 @@ pub enum Channel {
 pub struct VoxelWriter {
     package: VoxelPackage,
     path: std::path::PathBuf,
-    zip: ZipWriter<OutputFile>,
+    zip: ZipWriter<Quiet<OutputFile>>,
     layer: u32,
 }
 
@@ -54,7 +55,7 @@ impl VoxelWriter {
         if package.size.contains(&0) || !(package.voxel > 0.0 && package.voxel.is_finite()) {
             return Err(Error::Invalid(format!("{}: voxels of size {} in a grid of {:?}", path.display(), package.voxel, package.size)));
         }
-        Ok(Self { zip: ZipWriter::new(OutputFile::create(path)?), path: path.into(), package, layer: 0 })
+        Ok(Self { zip: ZipWriter::new(Quiet::new(OutputFile::create(path)?)), path: path.into(), package, layer: 0 })
     }
 
     fn fail(&self, source: impl Into<std::io::Error>) -> Error {
@@ -130,7 +131,7 @@ impl VoxelWriter {
         xml += "</metadata>\n</grid>\n";
         self.entry("manifest.xml", xml.as_bytes())?;
         let path = self.path.clone();
-        self.zip.finish().map_err(|e| Error::Io { path, source: e.into() })?.commit()
+        self.zip.finish().map_err(Into::into).and_then(Quiet::into_inner).map_err(|source| Error::Io { path, source })?.commit()
     }
 }
 
