@@ -188,11 +188,14 @@ pub fn is_part(name: &OsStr, target: &Path) -> bool {
     random.is_some_and(|random| !random.contains('.'))
 }
 
-/// Removes the name of the temporary file, which nobody asked for, from an error. The code of the system, by which the
-/// message names a remedy, is left in the text only.
+/// The error of the system behind one of a library, which hides the code that tells the remedy, and names the temporary file,
+/// which nobody asked for.
 fn nameless(error: std::io::Error) -> std::io::Error {
+    if error.raw_os_error().is_some() {
+        return error;
+    }
     let text = error.to_string();
-    let Some((reason, _)) = text.split_once(" at path \"") else { return error };
+    let reason = text.split(" at path \"").next().unwrap_or_default();
     let code = reason.rsplit_once("(os error ").and_then(|(_, rest)| rest.strip_suffix(')')?.parse().ok());
     code.map_or_else(|| std::io::Error::new(error.kind(), reason), std::io::Error::from_raw_os_error)
 }
@@ -300,14 +303,16 @@ pub fn xml_attribute(text: &str) -> String {
 mod tests {
     use super::*;
 
-    /// Errors of temporary files are those of the system.
+    /// Errors of temporary files and of archives are those of the system.
     #[cfg(unix)]
     #[test]
     fn full_disks_are_named() {
-        let full = std::io::Error::from_raw_os_error(28);
-        let error = nameless(std::io::Error::new(full.kind(), format!("{full} at path \"/tmp/.a.csv.x.part\"")));
-        let shown = Error::Io { path: "a.csv".into(), source: error }.to_string();
-        assert_eq!(shown, "a.csv: there is no room left on its disk; make room, or take another path");
+        let full = || std::io::Error::from_raw_os_error(28);
+        let of_file = std::io::Error::new(full().kind(), format!("{} at path \"/tmp/.a.csv.x.part\"", full()));
+        for error in [full(), of_file, zip::result::ZipError::Io(full()).into()] {
+            let shown = Error::Io { path: "a.csv".into(), source: nameless(error) }.to_string();
+            assert_eq!(shown, "a.csv: there is no room left on its disk; make room, or take another path");
+        }
         let other = nameless(std::io::Error::other("too bad at path \"/tmp/x\""));
         assert_eq!(other.to_string(), "too bad");
     }

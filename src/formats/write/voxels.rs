@@ -9,7 +9,7 @@ use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
 use super::quiet::Quiet;
-use super::{OutputFile, xml_attribute};
+use super::{OutputFile, nameless, xml_attribute};
 use crate::error::{Error, Result};
 
 /// Description of a voxel package.
@@ -59,7 +59,7 @@ impl VoxelWriter {
     }
 
     fn fail(&self, source: impl Into<std::io::Error>) -> Error {
-        Error::Io { path: self.path.clone(), source: source.into() }
+        Error::Io { path: self.path.clone(), source: nameless(source.into()) }
     }
 
     fn entry(&mut self, name: &str, bytes: &[u8]) -> Result<()> {
@@ -131,7 +131,7 @@ impl VoxelWriter {
         xml += "</metadata>\n</grid>\n";
         self.entry("manifest.xml", xml.as_bytes())?;
         let path = self.path.clone();
-        self.zip.finish().map_err(Into::into).and_then(Quiet::into_inner).map_err(|source| Error::Io { path, source })?.commit()
+        self.zip.finish().map_err(Into::into).and_then(Quiet::into_inner).map_err(|e| Error::Io { path, source: nameless(e) })?.commit()
     }
 }
 
