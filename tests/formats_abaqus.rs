@@ -99,6 +99,7 @@ fn instances_of_parts() {
     let quoted = [part.replace("Tip", "\"a, tip\""), part.replace("Tip", "\"a, top\"").replace("4, 0, 0, 1", "4, 0, 0, 3")].concat();
     let mesh = open(&format!("{quoted}*INSTANCE, NAME=\"i, 1\", PART=\"A, Tip\"\n*END INSTANCE\n"));
     assert_eq!((mesh.tets.len(), mesh.points[3]), (1, [0.0, 0.0, 1.0]), "names may have commas");
+    assert_eq!(open(&part.replace("*ELEMENT, ", "*ELEMENT, ELSET=5\" pipe, ")).tets, [[0, 1, 2, 3]], "inches");
     let error = fails("a.inp", format!("{part}{part}").into_bytes());
     assert!(error.contains("line 10: a second part `TIP`; give each a name of its own"), "{error}");
     let error = fails("a.inp", format!("{part}*INSTANCE, PART=Top\n").into_bytes());

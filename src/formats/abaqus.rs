@@ -87,10 +87,10 @@ impl Keyword {
 
     fn new(line: &[u8]) -> Self {
         let text = String::from_utf8_lossy(line).into_owned();
-        let mut quoted = false;
-        // Names in quotation marks may have commas.
+        // Names in quotation marks may have commas; a single mark is one of inches.
+        let (mut quoted, paired) = (false, text.matches('"').count().is_multiple_of(2));
         let mut fields = text.trim_start_matches('*').split(|c| {
-            quoted ^= c == '"';
+            quoted ^= paired && c == '"';
             c == ',' && !quoted
         });
         let upper = |text: &str| text.split_whitespace().collect::<Vec<_>>().join(" ").to_uppercase();
