@@ -14,8 +14,9 @@ use olbvh::options::{BuildOptions, Lists};
 use olbvh::primitives::{Count, SortScratch, cmd_sort_pairs};
 use olbvh::query::{
     LocateMethod, LocateOptions, LocateOutput, NearestMemory, OverlapMemory, OwnersMemory, PairMemory, PointInput, PointOrder, RenderInput,
-    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, cmd_count_owners, cmd_count_pairs, cmd_interpolate, cmd_list_owners,
-    cmd_list_pairs, cmd_locate, cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible, visible_bytes,
+    RenderMemory, Rounds, Scene, SliceInput, SliceMemory, Visibility, cmd_count_owners, cmd_count_pairs, cmd_depths, cmd_interpolate,
+    cmd_list_owners, cmd_list_pairs, cmd_locate, cmd_nearest, cmd_overlap, cmd_render, cmd_slice, cmd_sort_points, cmd_visible,
+    visible_bytes,
 };
 use olbvh::render::TABLE_SIZE;
 use olbvh::slicing::{Extrapolate, Rows, VoxelGrid};
@@ -160,6 +161,12 @@ fn pictures_and_slices() {
     refused(draw(RenderInput { field: short, ..input }), "a field");
     refused(draw(RenderInput { normals: normals.map(less), ..input }), "normals");
     refused(draw(RenderInput { depth: depth.map(less), ..input }), "a depth buffer");
+    let skipping = RenderInput { visibility: Some(Visibility { ranges: lab.part(64), values: lab.part(8), count: 1 }), ..input };
+    let without = draw(skipping);
+    assert!(matches!(&without, Err(Error::Invalid(text)) if text.contains("memory without room for")), "{without:?}");
+    let depths = |to| lab.rehearse(|r| cmd_depths(r, &input, &memory, to));
+    depths(lab.part(4 * 16 * 16)).unwrap();
+    refused(depths(lab.part(4 * 16 * 16 - 1)), "a depth buffer");
 
     let axis = |c: usize| [0, 1, 2].map(|k| if k == c { 0.4 } else { 0.0 });
     let half = [axis(0), axis(1), axis(2)];

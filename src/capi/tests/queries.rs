@@ -426,6 +426,7 @@ pub fn owned(gpu: *mut OlbvhGpu) {
     }
     let mut none = OlbvhPictureSettings { iso_count: 9, ..settings };
     assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
+    assert!(message().contains("9 iso-surfaces"), "{}", message());
     none = OlbvhPictureSettings { camera: c"nowhere".as_ptr(), ..settings };
     assert_eq!(olbvh_render(other_tree, &raw const none, null(), 0, null_mut()), OlbvhStatus::Invalid);
     assert!(message().contains("nowhere"), "{}", message());
