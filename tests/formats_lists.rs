@@ -50,6 +50,23 @@ fn read(folder: &TempDir, name: &str, content: &str) -> Result<Loaded, String> {
     load(&path).map_err(|error| error.to_string().replace(&format!("{}/", folder.path().display()), ""))
 }
 
+/// Points of different pieces that coincide become one, 0 and -0 too, but not those of one piece: that is a crack.
+#[test]
+fn pieces_are_joined_at_their_points() {
+    let folder = tempfile::tempdir().unwrap();
+    let piece = |points: &str| {
+        format!(
+            "<Piece NumberOfPoints='5' NumberOfCells='1'><Points><DataArray type='Float64' NumberOfComponents='3'>{points}</DataArray></Points>\
+             <Cells><DataArray type='Int32' Name='connectivity'>0 1 2 3</DataArray><DataArray type='Int32' Name='offsets'>4</DataArray>\
+             <DataArray type='UInt8' Name='types'>10</DataArray></Cells></Piece>"
+        )
+    };
+    let pieces = [piece("0 0 0 0 1 0 0 0 1 1 0 0 1 0 0"), piece("-0 0 0 -0 1 0 -0 0 1 -1 0 0 -1 0 0")].concat();
+    let read = read(&folder, "two.vtu", &file("UnstructuredGrid", &pieces)).unwrap();
+    let points: Vec<_> = read.mesh.tets.iter().flatten().copied().collect::<std::collections::BTreeSet<_>>().into_iter().collect();
+    assert_eq!((read.mesh.tets.len(), points.len(), read.mesh.points.len()), (2, 5, 7));
+}
+
 #[test]
 fn listed_grids_are_pieces_of_one_mesh() {
     let folder = folder();

@@ -97,11 +97,15 @@ fn file(points: &[[f64; 3]], cells: &[Vec<usize>], types: &[u8]) -> String {
     text
 }
 
-fn read(text: &str) -> Mesh {
+fn loaded(text: &str) -> Loaded {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("grid.vtk");
     std::fs::write(&path, text).unwrap();
-    load(path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}")).mesh
+    load(path, &LoadOptions::default()).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn read(text: &str) -> Mesh {
+    loaded(text).mesh
 }
 
 #[test]
@@ -130,6 +134,20 @@ fn wedges_of_both_orientations() {
             let mesh = read(&file(&p, &[first.to_vec(), second.to_vec()], &[13, 13]));
             assert_eq!(mesh.tets.len(), 6);
             check(&mesh, 1.0, 12);
+        }
+    }
+}
+
+/// A hexahedron whose nodes go round the other way is no more warped than another.
+#[test]
+fn inverted_cells_are_not_tangled() {
+    let p = [[0., 0., 0.], [1., 0., 0.], [1., 1., 0.], [0., 1., 0.], [0., 0., 1.], [1., 0., 1.], [1., 1., 1.], [0., 1., 1.]];
+    let mut warped = p;
+    warped[6] = [-2.0, -2.0, -2.0];
+    for (points, tangled) in [(p, 0), (warped, 1)] {
+        for hex in [[0, 1, 2, 3, 4, 5, 6, 7], [0, 3, 2, 1, 4, 7, 6, 5]] {
+            let report = loaded(&file(&points, &[hex.to_vec()], &[12])).report;
+            assert_eq!(report.tangled, tangled, "{hex:?}: {report}");
         }
     }
 }

@@ -8,7 +8,7 @@ mod submit;
 use olbvh::build::{BadCells, DeviceMesh, Tree};
 use olbvh::gpu::{Arena, Gpu, GpuOptions};
 use olbvh::mesh::{Mesh, kuhn, kuhn_jittered};
-use olbvh::options::{BuildOptions, Lists, TOLERANCE};
+use olbvh::options::{BuildOptions, LIST_PART, Lists, TOLERANCE};
 use olbvh::query::{
     LocateOptions, OwnersMemory, PointInput, SILENT, Scene, cmd_count_owners, cmd_list_owners, locate, locate_all, overlap,
 };
@@ -89,6 +89,37 @@ fn owners_within_the_tolerance_of_a_long_list() {
     assert!(!owners.contains(&u32::MAX));
     let all = locate_all(&tree, &points, TOLERANCE, SILENT).unwrap().owners;
     assert!(all.iter().zip(&owners).all(|(all, owner)| all == &[*owner]), "{all:?}");
+}
+
+/// A list that ends with a part, or just behind one, is searched to its end, and the answer is complete, also where more parts
+/// are recorded since the host does not know how long lists are.
+#[test]
+fn lists_of_whole_parts() {
+    let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+    for more in [0, 1] {
+        // All of one part lie in one place, and the last tetrahedron in another.
+        let length = LIST_PART + more;
+        let mut tets = vec![[0, 1, 2, 3]; length as usize - 1];
+        tets.push([4, 5, 6, 7]);
+        let mesh = Mesh::new([corner(0.0, 0.5), corner(0.9, 0.1)].concat(), tets);
+        let device = on_device(&gpu, &mesh);
+        let tree = Tree::build(&gpu, &device, &BuildOptions { level: Some(0), lists: Lists::All, ..BuildOptions::default() }).unwrap();
+        assert_eq!(tree.status().longest_leaf, length);
+        let (known, points) = (Scene::of(&tree), [[0.1f32; 3], [0.91; 3]]);
+        let asked = gpu.upload("olbvh.test.points", &points).unwrap();
+        let input = PointInput { points: asked.all(), stride: 3, count: 2, hints: None, order: None };
+        for longest_leaf in [length, 3 * LIST_PART] {
+            let scene = Scene { longest_leaf, ..known };
+            let (buffer, memory) = Arena::reserve(&gpu, "olbvh.test.owners", |a| OwnersMemory::carve(&gpu, a, 2)).unwrap();
+            let options = LocateOptions::default();
+            submit(&gpu, "olbvh.test.count", |r| cmd_count_owners(r, &scene, &input, &memory, &options)).unwrap();
+            assert_eq!(gpu.download_one::<u32>(&buffer, memory.total).unwrap(), length);
+            let owners: Vec<u32> = gpu.download(&buffer, memory.located.owners.part(0, 8)).unwrap();
+            assert_eq!(owners, [0, length - 1]);
+            let barycentrics: Vec<[f32; 4]> = gpu.download(&buffer, memory.located.barycentrics.part(0, 32)).unwrap();
+            assert!(barycentrics.iter().all(|b| (b.iter().sum::<f32>() - 1.0).abs() < 1e-5 && b[1] > 0.05), "{barycentrics:?}");
+        }
+    }
 }
 
 /// Of two meshes, the one whose list has the vertex of the other in its last part may be either.

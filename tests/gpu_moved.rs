@@ -41,6 +41,15 @@ fn what_is_bad_for_a_while_is_left_out_for_as_long() {
         assert_eq!(status.bad, topology.counts.bad, "step {step}");
         assert!((status.bad > 0) == (step % 2 == 1), "step {step}");
         boundary.push(status.boundary);
+        // What is bad is no neighbour, and has none. Once found, a boundary stays.
+        if step < 2 {
+            assert_eq!(status.boundary, topology.counts.boundary, "step {step}");
+        }
+        if step % 2 == 1 || step == 0 {
+            let neighbours: Vec<[u32; 4]> =
+                gpu.download(&frame.memory, frame.arrays.neighbours.part(0, 16 * mesh.tets.len() as u64)).unwrap();
+            assert_eq!(neighbours, topology.neighbours, "step {step}");
+        }
         let tree = build(mesh, &topology, &BuildOptions::default()).unwrap();
         let locator = Locator::new(mesh, &topology, &tree);
         let owners: Vec<u32> = gpu.download(&frame.memory, frame.output.owners.part(0, 4 * mesh.points.len() as u64)).unwrap();

@@ -42,6 +42,8 @@ pub use queue::HostQueue;
 pub(crate) use ray_pipeline::RayPipeline;
 pub(crate) use recorder::Groups;
 pub use recorder::Recorder;
+#[cfg(test)]
+pub(crate) use recorder::fold_groups;
 pub use requirements::{DeviceKind, DeviceReport, RayTracing, Requirements};
 
 use crate::error::Error;

@@ -71,3 +71,23 @@ impl Count {
         Ok(Groups::Indirect(words))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::gpu::{Arena, GpuOptions, fold_groups};
+
+    /// Numbers of workgroups that the device writes are folded like those of the host, also beyond the limit of an axis.
+    #[test]
+    fn many_workgroups_are_folded() {
+        let gpu = Gpu::new(&GpuOptions::default()).unwrap();
+        for n in [0, 1, 65_535, 65_536, 65_537, 70_000, 98_305, 1 << 24] {
+            let live = gpu.upload("olbvh.test.live", &[n]).unwrap();
+            let (buffer, groups) = Arena::reserve(&gpu, "olbvh.test.groups", |a| a.words(3)).unwrap();
+            let count = Count::device(u32::MAX, live.all());
+            gpu.submit("olbvh.test.groups", |r| count.arguments(r, 1, groups).map(drop)).unwrap();
+            let written: Vec<u32> = gpu.download(&buffer, groups.part(0, 12)).unwrap();
+            assert_eq!(written, fold_groups(n.max(1)), "{n} workgroups");
+        }
+    }
+}
