@@ -169,14 +169,11 @@ uvec3 olbvh_unmorton(uint code) { return uvec3(olbvh_gather(code >> 2), olbvh_ga
 float olbvh_reciprocal(float x) {
     float a = abs(x);
     precise float r = uintBitsToFloat(0x7ef311c7u - floatBitsToUint(a));
-    for (int i = 0; i < 2; ++i) {
+    for (int i = 0; i < 4; ++i) {
         precise float e = a * r;
         precise float f = 2.0 - e;
         r = r * f;
     }
-    precise float e = a * r;
-    precise float rest = r * (1.0 - e);
-    r = r + rest;
     return x < 0.0 ? -r : r;
 }
 // Orientation, containment and barycentric coordinates in normalised coordinates (SPEC 2.1, 3.1). Twin of

@@ -4,7 +4,6 @@
 mod assign;
 mod boundary;
 mod build;
-mod grid;
 mod lists;
 mod locate;
 mod nearest;
