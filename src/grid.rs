@@ -165,7 +165,7 @@ fn gather(v: u32) -> u32 {
 
 /// Deterministic reciprocal of a normal `x`. It takes an estimate from the bits of `x` and refines it by four Newton
 /// steps of correctly rounded operations, because Vulkan's division is not correctly rounded. The relative error is
-/// below 2^-22; of 0 it is no number.
+/// below 2^-22; 0 has none (the result is NaN).
 pub fn reciprocal(x: f32) -> f32 {
     let mut r = f32::from_bits(0x7ef3_11c7u32.wrapping_sub(x.to_bits() & 0x7fff_ffff));
     let a = x.abs();

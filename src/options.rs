@@ -54,7 +54,7 @@ pub enum Lists {
 ///
 /// α refers to the largest extent of a tetrahedron as a fraction of the bounds along that axis. The tree over a plate
 /// whose tetrahedra span its thickness is therefore a single node, and points beside thin parts meet long lists. The
-/// other variants build finer trees after it, one or two, where that repays the time, as far as capacity and memory allow; with a
+/// other variants build finer trees after it, one by one, where that repays the time, as far as capacity and memory allow; with a
 /// budget none is built. This applies to [`crate::build::Tree::build`] and the reference implementation, which know the
 /// counts in time. A recorded build ignores it, and should be given the level of a tree over the undeformed mesh
 /// ([`BuildOptions::level`]).

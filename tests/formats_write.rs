@@ -246,7 +246,7 @@ fn components_are_gathered_in_arrays() {
 fn located_points() {
     let folder = tempfile::tempdir().unwrap();
     let points = [[0.5, 1.5, 2.5], [9.0, 9.0, 9.0]];
-    let bary = [[0.25f32, 0.25, 0.25, 0.25], [f32::NAN; 4]];
+    let bary = [[0.25f32, 0.5, 0.25, -0.0], [f32::NAN; 4]];
     let located =
         Located { points: &points, of: None, owner: &[7, u32::MAX], bary: &bary, values: &[("value".into(), vec![1.5, f32::NAN])] };
     for ending in ["npy", "npz", "csv", "vtu", "json"] {
@@ -261,7 +261,7 @@ fn located_points() {
     assert_eq!((&data[..4], &data[20..24], &data[24..28]), (&7u32.to_le_bytes()[..], &1.5f32.to_le_bytes()[..], &[255u8; 4][..]));
     assert_eq!(
         String::from_utf8(read("csv")).unwrap(),
-        "x,y,z,owner,b0,b1,b2,b3,value\n0.5,1.5,2.5,7,0.25,0.25,0.25,0.25,1.5\n9,9,9,4294967295,NaN,NaN,NaN,NaN,NaN\n"
+        "x,y,z,owner,b0,b1,b2,b3,value\n0.5,1.5,2.5,7,0.25,0.5,0.25,0,1.5\n9,9,9,4294967295,NaN,NaN,NaN,NaN,NaN\n"
     );
     let json: serde_json::Value = serde_json::from_slice(&read("json")).unwrap();
     assert_eq!((&json["owner"][0], &json["value"][0], &json["value"][1]), (&7.into(), &1.5.into(), &serde_json::Value::Null));

@@ -210,7 +210,7 @@ fn overlaps() {
     overlap(&scene, &scene).unwrap();
     refused(overlap(&with(1, 0), &scene), "places of vertices");
     refused(overlap(&scene, &with(1, 0)), "places of vertices");
-    refused(overlap(&with(0, 1), &scene), "tetrahedra to be searched for");
+    refused(overlap(&with(0, 1), &scene), "states of tetrahedra");
     refused(overlap(&scene, &with(0, 32)), "tetrahedra around vertices");
 
     let whole = Tree::build(&lab.gpu, &lab.device, &BuildOptions { lists: Lists::All, ..BuildOptions::default() }).unwrap();
@@ -219,7 +219,7 @@ fn overlaps() {
     let count = |a: &Scene| lab.rehearse(|r| cmd_count_pairs(r, a, &whole, &memory, Rounds::begin(1)));
     let list = |a: &Scene| lab.rehearse(|r| cmd_list_pairs(r, a, &whole, &memory, lab.part(64), Rounds::begin(1)));
     count(&scene).and_then(|()| list(&scene)).unwrap();
-    [count(&more), list(&more)].into_iter().for_each(|result| refused(result, "counts of pairs"));
+    [count(&more), list(&more)].into_iter().for_each(|result| refused(result, "states of tetrahedra"));
 }
 
 /// Keys have 32 bits, so that a sort by more of them sorts by all, in the place that it says.

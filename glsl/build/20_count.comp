@@ -1,8 +1,8 @@
 #version 460
-// Codes, count: counts the candidates of every tetrahedron, or (IN_SHARES) its shares of up to SHARE candidates, of which
-// it has at least one. `counts` has one more element, for the total. Where every tetrahedron has a single share, only that total
-// is written, as the one count to be scanned. With CLEAR, the kernel also clears the marks of the level, whatever they
-// were.
+// Codes, count: counts the candidates of every tetrahedron, or (IN_SHARES) its shares of up to SHARE candidates, of
+// which it has at least one. `counts` has one more element, for the total. Where every tetrahedron has a single
+// share, only that total is written, as the one count to be scanned. With CLEAR, the kernel also clears the marks of
+// the level, whatever they were.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

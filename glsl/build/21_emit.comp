@@ -1,6 +1,6 @@
 #version 460
-// Codes, emit all candidates (Lists::All with Aabb): every invocation writes a run of ROWS entries, whichever tetrahedra they belong to, so that a
-// large tetrahedron among small ones does not become a long loop.
+// Codes, emit all candidates (Lists::All with Aabb): every invocation writes a run of ROWS entries, whichever
+// tetrahedra they belong to, so that a large tetrahedron among small ones does not become a long loop.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

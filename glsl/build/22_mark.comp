@@ -1,6 +1,7 @@
 #version 460
-// Codes, filter 1, with Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation takes a few tetrahedra, of
-// which hardly any are on the boundary, and marks the first share of each; with LATER, it takes one other share.
+// Codes, filter 1, with Lists::Boundary (SPEC 2.6): marks the cells that boundary tetrahedra touch. An invocation
+// takes a few tetrahedra, of which hardly any are on the boundary, and marks the first share of each; with LATER, it
+// takes one other share.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

@@ -1,6 +1,7 @@
 #version 460
-// Codes, filter 4, where counts stay on the device: checks whether the entries that the filter kept fit. If they do not, the next coarser level is counted and filtered.
-// Such an attempt lies between every two dispatches of this kernel; its dispatches are empty once the entries fit.
+// Codes, filter 4, where counts stay on the device: checks whether the entries that the filter kept fit. If they do
+// not, the next coarser level is counted and filtered. Such an attempt lies between every two dispatches of this
+// kernel; its dispatches are empty once the entries fit.
 #include "shared/kernel.glsl"
 #include "shared/layout.glsl"
 #include "shared/grid.glsl"

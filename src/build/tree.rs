@@ -33,11 +33,13 @@ impl Tree {
     /// Builds a tree over a mesh in four submissions (three if every candidate is an entry, as with the paper's lists),
     /// not counting those that read numbers back where the host cannot do so itself. Between them the numbers of
     /// candidates, entries and nodes are read back, so that exactly the needed memory is allocated. If
-    /// [`BuildOptions::fineness`] calls for finer trees, these are built afterwards, one or two, provided there is memory for both at a time.
+    /// [`BuildOptions::fineness`] calls for a finer tree, that is built afterwards, provided there is memory for both, until
+    /// none is finer.
     ///
     /// # Errors
-    /// [`crate::Error::Invalid`] for α outside 0…10, a level beyond 10 or a mesh on another device, [`crate::Error::TooLarge`] if the tree
-    /// does not fit 32-bit entries or the given capacity, [`crate::Error::Memory`] if it does not fit the device.
+    /// [`crate::Error::Invalid`] for α outside 0…10, a level beyond 10 or a mesh on another device,
+    /// [`crate::Error::TooLarge`] if the tree does not fit 32-bit entries or the given capacity, [`crate::Error::Memory`]
+    /// if it does not fit the device.
     pub fn build(gpu: &Gpu, mesh: &DeviceMesh, options: &BuildOptions) -> Result<Self> {
         let mut tree = Self::build_once(gpu, mesh, options)?;
         let mut room = MAX_LEVEL; // the finest level that fits the memory

@@ -86,8 +86,8 @@ pub struct LoadOptions {
     /// refused. Within the same limit, arrays that do not cover the mesh are filled up with NaN; those that would need
     /// more are left out. Default 100.
     pub expansion: u64,
-    /// Which time step of a series is read: of a `.pvd` or `.series`, or of a `.vtu` or `.msh` with several. What has no time steps is the same
-    /// at all of them.
+    /// Which time step of a series is read: of a `.pvd` or `.series`, or of a `.vtu` or `.msh` with several. What has no
+    /// time steps is the same at all of them.
     pub step: TimeStep,
     /// What becomes of curved cells.
     pub curved: Curved,

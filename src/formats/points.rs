@@ -17,8 +17,8 @@ use crate::error::{Error, Result};
 /// point per line and columns separated by commas, semicolons, tabs or spaces, in the same way throughout. Fields may
 /// be in quotation marks, and where commas do not separate columns they may be decimal marks. The first line of a table
 /// may name the columns, `x`, `y` and `z` among them (also as in `X [ m ]`, `x-coordinate` or `Points:0`): these are used.
-/// Without names there must be three columns.
-/// Lines that start with `#` are comments; the last one before the points may name the columns as well. A table without points is valid, even an empty file.
+/// Without names there must be three columns. Lines that start with `#` are comments; the last one before the points may
+/// name the columns as well. A table without points is valid, even an empty file.
 ///
 /// Of a mesh, in any format of [`super::load`] or procedural, these are all points in the order of the file, also those
 /// that no cell uses; it may consist of surfaces only. Files named `.vtp`, `.obj`, `.ply` or `.stl`, and a `.vtk` with

@@ -147,15 +147,17 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, StageTimes)> 
     // SAFETY: the query was written if the submission succeeded, and nothing uses the pool any more.
     let read = unsafe {
         let flags = vk::QueryResultFlags::TYPE_64 | vk::QueryResultFlags::WAIT;
-        let read =
-            asked.and_then(|_| gpu.device().get_query_pool_results(queries, 0, &mut bytes, flags).map_err(failed("vkGetQueryPoolResults")));
+        let read = asked.and_then(|((), times)| {
+            let read = gpu.device().get_query_pool_results(queries, 0, &mut bytes, flags);
+            read.map(|()| times).map_err(failed("vkGetQueryPoolResults"))
+        });
         gpu.device().destroy_query_pool(queries, None);
         read
     };
-    read?;
+    let mut times = read?;
     let ty = vk::AccelerationStructureTypeKHR::BOTTOM_LEVEL;
     let smaller = Structure::new(gpu, "olbvh.acceleration.compacted", ty, bytes[0])?;
-    let ((), times) = gpu.submit("olbvh.acceleration.compact", |r| {
+    let ((), more) = gpu.submit("olbvh.acceleration.compact", |r| {
         r.stage("acceleration.compact", |r| {
             let info = vk::CopyAccelerationStructureInfoKHR::default().src(structure.handle).dst(smaller.handle);
             // SAFETY: the copy has the size that the device reported.
@@ -167,6 +169,7 @@ fn compact(gpu: &Gpu, structure: &Structure) -> Result<(Structure, StageTimes)> 
         barrier_after(r);
         Ok(())
     })?;
+    times.add(more);
     Ok((smaller, times))
 }
 

@@ -62,8 +62,8 @@ pub struct ReadArgs {
     /// points that become one, the first counts that has a value.
     #[arg(long, default_value_t = Merge::default(), value_parser = named::<Merge>, value_name = "nothing|pieces|all")]
     merge: Merge,
-    /// Time step to read, counted from 0, or `last`: of a .pvd or .series, or of a .vtu or .msh with several. What has no time steps is the
-    /// same at all of them.
+    /// Time step to read, counted from 0, or `last`: of a .pvd or .series, or of a .vtu or .msh with several. What has
+    /// no time steps is the same at all of them.
     #[arg(long, default_value_t = TimeStep::Number(0), value_parser = named::<TimeStep>, value_name = "N|last", allow_hyphen_values = true)]
     time_step: TimeStep,
     /// What becomes of curved cells. corners: edges are straight, and fields are linear in a cell. split: quadratic cells,

@@ -47,7 +47,7 @@ impl PairMemory {
 
     /// Rejects memory that was carved for fewer tetrahedra.
     fn check(&self, a: &Scene) -> Result<()> {
-        self.counts.check(4 * u64::from(a.mesh.input.tets), "counts of pairs")
+        self.states.check(size_of::<SearchState>() as u64 * u64::from(a.mesh.input.tets), "states of tetrahedra")
     }
 }
 

@@ -47,7 +47,7 @@ impl Arrays {
     /// Rejects memory that was carved for fewer points or tetrahedra.
     fn check(&self, own: &MeshInput, other: &MeshInput) -> Result<()> {
         self.places.check(4 * u64::from(own.points), "places of vertices")?;
-        self.waiting.check(4 * u64::from(own.tets), "tetrahedra to be searched for")?;
+        self.states.check(size_of::<SearchState>() as u64 * u64::from(own.tets), "states of tetrahedra")?;
         self.around.check(4 * u64::from(other.tets.div_ceil(32)), "tetrahedra around vertices")
     }
 }

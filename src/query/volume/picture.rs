@@ -126,7 +126,8 @@ impl<'a> Canvas<'a> {
         Ok(())
     }
 
-    /// Draws a picture of this size from this row of the view on, or what a block with these cells has of it. `report` receives the number of rays done and their total.
+    /// Draws a picture of this size from this row of the view on, or what a block with these cells has of it. `report`
+    /// receives the number of rays done and their total.
     fn draw(&mut self, size: [u32; 2], row: u32, cells: Option<CellRange>, report: Progress<'_>) -> Result<()> {
         let Self { gpu, searched, plan, memory, stats, times, .. } = self;
         let [view, table, values] = self.uniforms.each_ref().map(Buffer::all);
